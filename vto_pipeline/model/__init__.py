@@ -1,0 +1,1 @@
+"""The nouns: frozen dataclasses of arrays, checked once when made. No algorithms."""

@@ -1,0 +1,37 @@
+"""A kind of artifact: how one noun is kept in a file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from vto_pipeline.model.job import Job
+
+
+@dataclass(frozen=True)
+class ArtifactKind:
+    """How a value is written to and read from a folder.
+
+    Args:
+        name: Identifier used in plans and by `want`.
+        filename: Fixed file name under RUN/out.
+        about: One line for people.
+        read: Path -> value. Raises InputError on a bad file.
+        write: (Path, value) -> None. The same value gives the same bytes.
+        inline: What a document may hold in place of a path (a preset's name, a mapping) -> value; None where only a
+            path will do. Paths inside a mapping arrive resolved, as Path.
+        receive: (Path the user gave, Job) -> value, for kinds that are read otherwise when they come from outside: in a
+            limited child process, with the unit guessed and every change told to the job. None: `read` serves both.
+        previews: Further files written beside it for other programs, never read back: (file name, writer).
+    """
+
+    name: str
+    filename: str
+    about: str
+    read: Callable[[Path], Any]
+    write: Callable[[Path, Any], None]
+    inline: Callable[[Any], Any] | None = None
+    receive: Callable[[Path, Job], Any] | None = None
+    previews: tuple[tuple[str, Callable[[Path, Any], None]], ...] = ()

@@ -1,0 +1,110 @@
+"""Bodies: measurements, landmarks, the avatar. World frame: metres, +Y up, +Z forward, y = 0 the floor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from vto_pipeline.errors import InputError
+from vto_pipeline.model.arrays import FloatArray, IntArray, freeze
+from vto_pipeline.model.mesh import TriangleMesh
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """Lengths of a body under ISO 8559-1 names.
+
+    Args:
+        values: Name -> length [m] (mass, if present, in kg under "mass").
+        sigmas: Name -> standard uncertainty in the same unit; a name may be absent.
+        sex: "female", "male" or "neutral".
+    """
+
+    values: Mapping[str, float]
+    sigmas: Mapping[str, float] = field(default_factory=dict)
+    sex: str = "neutral"
+
+    def __post_init__(self) -> None:
+        if self.sex not in ("female", "male", "neutral"):
+            raise InputError(f"sex is {self.sex!r}; wanted female, male or neutral")
+        for name, value in self.values.items():
+            if not 0 < value < 1000:
+                raise InputError(f"measurement {name} is {value}; wanted a positive number")
+
+
+@dataclass(frozen=True)
+class Avatar:
+    """A body of the project's own template: fixed topology, a skeleton, and named loops and landmarks.
+
+    Args:
+        bind_vertices: Shaped body in the bind pose (A-pose) [m], shape (V, 3).
+        faces: Shape (F, 3).
+        joint_names: J names.
+        joints: Joint centres in the bind pose [m], shape (J, 3).
+        parents: Index of each joint's parent, -1 for the root, shape (J,).
+        weights: Skinning weights, rows sum to 1, shape (V, J).
+        pose: Rotation vector of each joint relative to the bind pose [rad], shape (J, 3).
+        translation: Of the root [m], shape (3,).
+        vertices: Posed body [m], shape (V, 3).
+        sex: 0 female ... 1 male.
+        landmarks: Name -> vertex index.
+        loops: Name -> closed loop of vertex indices.
+        parameters: Name -> value of the shape parameters, for the record.
+    """
+
+    bind_vertices: FloatArray
+    faces: IntArray
+    joint_names: tuple[str, ...]
+    joints: FloatArray
+    parents: IntArray
+    weights: FloatArray
+    pose: FloatArray
+    translation: FloatArray
+    vertices: FloatArray
+    sex: float = 0.5
+    landmarks: Mapping[str, int] = field(default_factory=dict)
+    loops: Mapping[str, IntArray] = field(default_factory=dict)
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        count, bones = len(self.bind_vertices), len(self.joint_names)
+        for name, shape, dtype in (
+            ("bind_vertices", (count, 3), "f8"),
+            ("faces", (None, 3), "i4"),
+            ("joints", (bones, 3), "f8"),
+            ("parents", (bones,), "i4"),
+            ("weights", (count, bones), "f8"),
+            ("pose", (bones, 3), "f8"),
+            ("translation", (3,), "f8"),
+            ("vertices", (count, 3), "f8"),
+        ):
+            object.__setattr__(self, name, freeze(f"avatar {name}", getattr(self, name), shape, dtype))
+
+    @property
+    def mesh(self) -> TriangleMesh:
+        """The posed body."""
+        return TriangleMesh(self.vertices, self.faces)
+
+
+@dataclass(frozen=True)
+class MovingBody:
+    """A body that changes shape or pose: the collider of a drape.
+
+    Args:
+        keyframes: Positions [m], shape (K, V, 3), K >= 1, evenly spaced over the motion; linear in between.
+        faces: Shape (F, 3).
+    """
+
+    keyframes: FloatArray
+    faces: IntArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "keyframes", freeze("keyframes", self.keyframes, (None, None, 3), "f8"))
+        object.__setattr__(self, "faces", freeze("faces", self.faces, (None, 3), "i4"))
+        if len(self.keyframes) == 0:
+            raise InputError("moving body has no keyframe")
+
+    @property
+    def final(self) -> TriangleMesh:
+        """Where the motion ends."""
+        return TriangleMesh(self.keyframes[-1], self.faces)

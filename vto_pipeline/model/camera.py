@@ -1,0 +1,65 @@
+"""Cameras. Pixel (0, 0) is the centre of the first pixel (OpenCV); +X right, +Y down, +Z forward."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vto_pipeline.errors import InputError
+from vto_pipeline.model.arrays import FloatArray, freeze
+
+
+@dataclass(frozen=True)
+class Intrinsics:
+    """A pinhole camera with one radial coefficient, x_d = x (1 + k1 r²).
+
+    Args:
+        width, height: Image size [px].
+        fx, fy, cx, cy: Focal lengths and principal point [px].
+        k1: Radial distortion of normalized coordinates, dimensionless.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    k1: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.width < 1 or self.height < 1 or not (self.fx > 0 and self.fy > 0):
+            raise InputError(f"camera {self.width} x {self.height} px with focal length {self.fx}, {self.fy} px")
+        if not np.isfinite([self.cx, self.cy, self.k1]).all():
+            raise InputError("camera: principal point or distortion is not finite")
+
+    @property
+    def matrix(self) -> FloatArray:
+        """K, shape (3, 3)."""
+        return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
+
+
+@dataclass(frozen=True)
+class CameraSet:
+    """Posed photos.
+
+    Args:
+        names: File names of the registered photos, C of them.
+        intrinsics: One per photo.
+        world_from_cam: Rigid transforms, translation in metres when `metric`, shape (C, 4, 4).
+        metric: Whether lengths are metres (a board or depth fixed the scale) or arbitrary.
+        unregistered: File names that got no pose.
+    """
+
+    names: tuple[str, ...]
+    intrinsics: tuple[Intrinsics, ...]
+    world_from_cam: FloatArray
+    metric: bool = True
+    unregistered: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        count = len(self.names)
+        if len(self.intrinsics) != count:
+            raise InputError(f"{count} photos but {len(self.intrinsics)} intrinsics")
+        object.__setattr__(self, "world_from_cam", freeze("world_from_cam", self.world_from_cam, (count, 4, 4), "f8"))

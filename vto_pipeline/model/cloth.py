@@ -1,0 +1,48 @@
+"""What a drape returns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from vto_pipeline.model.arrays import FloatArray, freeze
+from vto_pipeline.model.mesh import TriangleMesh
+
+
+@dataclass(frozen=True)
+class TraceRow:
+    """One line of a drape's error against run time.
+
+    Args:
+        seconds: Wall time since the first step [s].
+        step: Steps taken.
+        error_mm: Predicted distance to the state of rest [mm].
+        residual: Out-of-balance force, rms over vertices, as a share of a vertex's weight.
+    """
+
+    seconds: float
+    step: int
+    error_mm: float
+    residual: float
+
+
+@dataclass(frozen=True)
+class Draped:
+    """A garment on a body.
+
+    Args:
+        mesh: The simulation mesh at its end [m].
+        velocities: [m/s], shape (V, 3).
+        frames: Positions over a motion [m], shape (K, V, 3), or None.
+        trace: Error against run time.
+        audit: Name -> finding of the after-the-fact judge; plain JSON values.
+    """
+
+    mesh: TriangleMesh
+    velocities: FloatArray
+    frames: FloatArray | None = None
+    trace: Sequence[TraceRow] = ()
+    audit: Mapping[str, object] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "velocities", freeze("velocities", self.velocities, self.mesh.vertices.shape, "f8"))

@@ -1,0 +1,80 @@
+"""Garments as they leave the scan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vto_pipeline.model.arrays import FloatArray, IntArray, freeze
+from vto_pipeline.model.mesh import TriangleMesh
+
+
+@dataclass(frozen=True)
+class SurfaceLabels:
+    """What each vertex of a scanned surface belongs to.
+
+    Args:
+        garment: Part of the garment, shape (V,), bool.
+        observed: Seen by a sensor, as against filled in, shape (V,), bool.
+        confidence: Of `garment`, 0 to 1, shape (V,).
+    """
+
+    garment: NDArray[np.bool_]
+    observed: NDArray[np.bool_]
+    confidence: FloatArray
+
+    def __post_init__(self) -> None:
+        count = len(self.garment)
+        object.__setattr__(self, "garment", freeze("labels garment", self.garment, (count,), "?"))
+        object.__setattr__(self, "observed", freeze("labels observed", self.observed, (count,), "?"))
+        object.__setattr__(self, "confidence", freeze("labels confidence", self.confidence, (count,), "f8"))
+
+
+@dataclass(frozen=True)
+class Opening:
+    """A real opening of a garment: neck, hem, cuff.
+
+    Args:
+        loop: Boundary vertices in order, shape (L,).
+        perimeter: [m].
+        center: [m], shape (3,).
+        normal: Out of the garment, unit, shape (3,).
+    """
+
+    loop: IntArray
+    perimeter: float
+    center: FloatArray
+    normal: FloatArray
+
+
+@dataclass(frozen=True)
+class RestShape:
+    """What the cloth would be without forces.
+
+    Args:
+        positions: Rest positions of the simulation mesh [m], shape (V, 3). Edge lengths and areas are taken from them.
+        rest_angles: Dihedral rest angles are those of `positions` where True, else flat.
+        mode: How it was found: "as_scanned", "gravity_removed", "inverse".
+    """
+
+    positions: FloatArray
+    rest_angles: bool = False
+    mode: str = "as_scanned"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "positions", freeze("rest positions", self.positions, (None, 3), "f8"))
+
+
+@dataclass(frozen=True)
+class Garment:
+    """A garment ready to simulate.
+
+    Args:
+        mesh: Simulation mesh where it is now [m].
+        rest: Its rest shape.
+    """
+
+    mesh: TriangleMesh
+    rest: RestShape

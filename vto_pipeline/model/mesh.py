@@ -1,0 +1,63 @@
+"""Surfaces and clouds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from vto_pipeline.errors import InputError
+from vto_pipeline.model.arrays import ByteArray, FloatArray, IntArray, freeze
+
+
+@dataclass(frozen=True)
+class TriangleMesh:
+    """A triangle mesh in metres, +Y up.
+
+    Args:
+        vertices: Positions [m], shape (V, 3).
+        faces: Vertex indices, counter-clockwise seen from outside, shape (F, 3); at least one.
+        colors: sRGB, shape (V, 3), or None.
+
+    Raises:
+        InputError: wrong shape, not finite, no face, or an index out of range.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    colors: ByteArray | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "vertices", freeze("vertices", self.vertices, (None, 3), "f8"))
+        object.__setattr__(self, "faces", freeze("faces", self.faces, (None, 3), "i4"))
+        count = len(self.vertices)
+        if len(self.faces) == 0:
+            raise InputError(f"mesh has no faces ({count} vertices)", hint="is it a point cloud?")
+        low, high = int(self.faces.min()), int(self.faces.max())
+        if low < 0 or high >= count:
+            raise InputError(f"face index {low if low < 0 else high} is outside 0..{count - 1}")
+        if self.colors is not None:
+            object.__setattr__(self, "colors", freeze("colors", self.colors, (count, 3), "u1"))
+
+
+@dataclass(frozen=True)
+class PointCloud:
+    """Points on a surface.
+
+    Args:
+        points: Positions [m], shape (N, 3); at least one.
+        normals: Unit normals, shape (N, 3), or None.
+        colors: sRGB, shape (N, 3), or None.
+    """
+
+    points: FloatArray
+    normals: FloatArray | None = None
+    colors: ByteArray | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", freeze("points", self.points, (None, 3), "f8"))
+        count = len(self.points)
+        if count == 0:
+            raise InputError("point cloud is empty")
+        if self.normals is not None:
+            object.__setattr__(self, "normals", freeze("normals", self.normals, (count, 3), "f8"))
+        if self.colors is not None:
+            object.__setattr__(self, "colors", freeze("colors", self.colors, (count, 3), "u1"))
