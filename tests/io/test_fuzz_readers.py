@@ -1,0 +1,111 @@
+"""Damaged files of every format: an error or a sound value, never a crash, a hang, or something between.
+
+All damages of one format run in one limited child, as a parser does, so that a crash or a hang is seen as such.
+"""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from io_shapes import capsule, write_all_formats
+from PIL import Image
+
+from vto_pipeline.errors import InputError
+from vto_pipeline.io import clouds, images, meshes
+from vto_pipeline.io.arrays import Arrays
+from vto_pipeline.io.sandbox import run_limited
+from vto_pipeline.io.tidy import check_sound, drop_needless
+from vto_pipeline.model.mesh import PointCloud, TriangleMesh
+
+COUNT = 200
+
+
+def damages(data: bytes, rng: np.random.Generator) -> list[bytes]:
+    """A quarter cut short, a quarter with changes in the header (first 400 bytes), the rest with changes anywhere."""
+    found = []
+    for i in range(COUNT):
+        damaged = np.frombuffer(data, np.uint8).copy()
+        if i % 4 == 0:
+            damaged = damaged[: rng.integers(1, len(data))]
+        else:
+            reach = min(len(data), 400) if i % 4 == 1 else len(data)
+            damaged[rng.integers(0, reach, rng.integers(1, 9))] = rng.integers(0, 256)
+        found.append(damaged.tobytes())
+    return found
+
+
+def read_damaged(name: str) -> Arrays:
+    """In the child: read every damaged copy of a file.
+
+    Returns:
+        refused, sound: how many were; shorter: how many cut copies gave a sound mesh.
+    """
+    warnings.simplefilter("ignore")
+    path = Path(name)
+    rng = np.random.default_rng(11)
+    copy = Path(f"damaged{path.suffix}")
+    refused = sound = shorter = 0
+    for i, data in enumerate(damages(path.read_bytes(), rng)):
+        copy.write_bytes(data)
+        try:
+            read_one(copy)
+            sound += 1
+            shorter += i % 4 == 0
+        except InputError:
+            refused += 1
+    return {"refused": np.array(refused), "sound": np.array(sound), "shorter": np.array(shorter)}
+
+
+def read_one(path: Path) -> None:
+    """What reading in earnest does, in this process; the model's constructors check what comes out."""
+    suffix = path.suffix
+    if suffix in images.SUFFIXES:
+        images.decode_all(str(path))
+        return
+    is_mesh = suffix in meshes.PARSERS
+    arrays = (meshes.PARSERS if is_mesh else clouds.PARSERS)[suffix](str(path))
+    check_sound(arrays, path)
+    if not is_mesh or "faces" not in arrays:
+        PointCloud(arrays["vertices"])
+        return
+    arrays, _ = drop_needless(arrays)
+    TriangleMesh(arrays["vertices"], arrays["faces"], arrays.get("colors"))
+
+
+def write_others(folder: Path) -> dict[str, Path]:
+    """Clouds and pictures."""
+    points = np.array(capsule().vertices)
+    files = {
+        name: folder / name for name in ("a.xyz", "ascii.pcd", "binary.pcd", "a.png", "a.jpg", "a.tif", "deep.png")
+    }
+    np.savetxt(files["a.xyz"], points)
+    header = f"VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nPOINTS {len(points)}\nDATA "
+    files["ascii.pcd"].write_text(header + "ascii\n" + "\n".join(" ".join(map(str, p)) for p in points) + "\n")
+    files["binary.pcd"].write_bytes(f"{header}binary\n".encode() + points.astype("<f4").tobytes())
+    rng = np.random.default_rng(12)
+    picture = Image.fromarray(rng.integers(0, 256, (30, 40, 3)).astype(np.uint8))
+    tags = picture.getexif()
+    tags.get_ifd(34665)[41989] = 50
+    for name in ("a.png", "a.jpg", "a.tif"):
+        picture.save(files[name], exif=tags)
+    Image.fromarray(rng.integers(0, 65536, (30, 40)).astype(np.uint16)).save(files["deep.png"])
+    return files
+
+
+MESHES = ["ply", "ply_ascii", "obj", "stl", "stl_ascii", "off", "glb"]
+OTHERS = ["a.xyz", "ascii.pcd", "binary.pcd", "a.png", "a.jpg", "a.tif", "deep.png"]
+
+
+@pytest.mark.parametrize("name", MESHES + OTHERS)
+def test_damaged_files_are_refused_or_sound(tmp_path: Path, name: str) -> None:
+    path = (write_all_formats(tmp_path) if name in MESHES else write_others(tmp_path))[name]
+    read_one(path)  # undamaged
+    counts = run_limited(read_damaged, str(path), seconds=60.0)
+    refused, sound = int(counts["refused"]), int(counts["sound"])
+    assert refused + sound == COUNT
+    assert refused > COUNT // 8  # most cuts at least
+    if name not in ("obj", "a.xyz"):  # these two count nothing, so that a cut between two lines leaves no trace
+        assert int(counts["shorter"]) <= (2 if name in ("a.jpg", "ply_ascii", "ascii.pcd", "off", "stl_ascii") else 0)

@@ -1,0 +1,82 @@
+"""What happens in a child process, well or badly, comes back as arrays or as one error."""
+
+from __future__ import annotations
+
+import ctypes
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vto_pipeline.errors import FormatError, InputError
+from vto_pipeline.io.arrays import Arrays
+from vto_pipeline.io.sandbox import run_limited
+
+
+def square(count: int) -> Arrays:
+    return {"values": np.arange(count) ** 2}
+
+
+def refuse(problem: str) -> Arrays:
+    raise InputError(problem, where="a place", hint="an advice")
+
+
+def write_much(bytes_: int) -> Arrays:
+    Path("much").write_bytes(b"0" * bytes_)
+    return {}
+
+
+def count_forever(start: int) -> Arrays:
+    while True:
+        start += 1
+
+
+def return_an_object() -> Arrays:
+    return {"values": np.array([object()])}
+
+
+def test_arrays_come_back() -> None:
+    assert run_limited(square, 4)["values"].tolist() == [0, 1, 4, 9]
+
+
+def test_a_refusal_keeps_its_class_and_fields() -> None:
+    with pytest.raises(InputError) as caught:
+        run_limited(refuse, "a problem")
+    error = caught.value
+    assert (type(error), error.problem, error.where, error.hint) == (InputError, "a problem", "a place", "an advice")
+
+
+def test_a_segmentation_fault_is_a_format_error() -> None:
+    with pytest.raises(FormatError, match="the reader crashed \\(signal 11\\)"):
+        run_limited(ctypes.string_at, 0, where="x.ply")
+
+
+def test_too_much_memory_is_a_format_error() -> None:
+    with pytest.raises(FormatError, match="more than 512 MB of memory"):
+        run_limited(bytearray, 2**30, memory_bytes=2**29)
+
+
+@pytest.mark.parametrize("function", [time.sleep, count_forever])
+def test_too_much_time_is_a_format_error(function: Callable[[int], Arrays]) -> None:
+    start = time.monotonic()
+    with pytest.raises(FormatError, match="longer than 1 s"):
+        run_limited(function, 60, seconds=1.0)
+    assert 0.5 < time.monotonic() - start < 10.0  # s: the limit of 1 s, and the start of an interpreter
+
+
+def test_too_large_a_file_is_a_format_error() -> None:
+    with pytest.raises(FormatError, match="File too large"):
+        run_limited(write_much, 2_000_000, file_bytes=1_000_000)
+
+
+def test_an_exception_of_a_parser_is_a_format_error_with_its_text() -> None:
+    with pytest.raises(FormatError, match="the reader failed: ZeroDivisionError") as caught:
+        run_limited(divmod, 1, 0, where="x.ply")
+    assert caught.value.where == "x.ply"
+
+
+def test_no_object_crosses_the_border() -> None:
+    with pytest.raises(FormatError, match="Object arrays cannot be saved"):
+        run_limited(return_an_object)

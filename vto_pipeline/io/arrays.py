@@ -1,0 +1,63 @@
+"""NumPy archives (.npz) without pickles, whose bytes depend on nothing but the arrays."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+from vto_pipeline.errors import FormatError
+from vto_pipeline.io.files import check_file, replacing
+
+Arrays = dict[str, NDArray[Any]]
+
+_LIMIT_BYTES = 4_000_000_000
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the oldest date a zip can hold; a real one would change the bytes
+
+
+def write_arrays(path: Path, arrays: Mapping[str, Any], *, compress: bool = False) -> None:
+    """Write named arrays to an .npz file, in the order of their names.
+
+    Args:
+        path: The file.
+        arrays: Name -> array, number or string; no objects.
+        compress: Deflate; slower, for arrays with much repetition such as depth maps.
+    """
+    kind = zipfile.ZIP_DEFLATED if compress else zipfile.ZIP_STORED
+    with replacing(path) as beside, zipfile.ZipFile(beside, "w", kind, compresslevel=1) as archive:
+        for name in sorted(arrays):
+            entry = zipfile.ZipInfo(f"{name}.npy", _EPOCH)
+            entry.compress_type = kind
+            with archive.open(entry, "w", force_zip64=True) as stream:
+                npy.write_array(stream, np.asarray(arrays[name], order="C"), version=(1, 0), allow_pickle=False)
+
+
+def read_arrays(path: Path, required: Collection[str] = ()) -> Arrays:
+    """Read all arrays of an .npz file.
+
+    Args:
+        path: The file.
+        required: Names that must be there.
+
+    Raises:
+        InputError: missing or too large; FormatError: not an archive of plain arrays, or a name is missing.
+    """
+    path = check_file(Path(path), {".npz"}, _LIMIT_BYTES)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            promised = sum(entry.file_size for entry in archive.infolist())
+        if promised > _LIMIT_BYTES:
+            raise FormatError(f"unpacks to {promised} bytes; the limit is {_LIMIT_BYTES}", where=str(path))
+        with np.load(path, allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in stored.files}
+    except (zipfile.BadZipFile, ValueError, EOFError, KeyError, OSError, NotImplementedError) as e:
+        raise FormatError(f"not an archive of plain arrays: {e}", where=str(path)) from None
+    missing = sorted(set(required) - set(arrays))
+    if missing:
+        raise FormatError(f"arrays missing: {', '.join(missing)}; found {', '.join(sorted(arrays))}", where=str(path))
+    return arrays

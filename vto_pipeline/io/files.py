@@ -1,0 +1,79 @@
+"""What every reader asks of a path before opening it, and how every writer replaces a file whole."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from difflib import get_close_matches
+from pathlib import Path
+
+from vto_pipeline.errors import InputError, VtoError
+
+
+def check_file(path: Path, suffixes: Collection[str], limit_bytes: int, *, error: type[VtoError] = InputError) -> Path:
+    """Return the path if it is a non-empty file of an allowed type and size.
+
+    Args:
+        path: The file.
+        suffixes: Allowed endings, lower case with the dot.
+        limit_bytes: Largest size read.
+        error: What to raise.
+
+    Raises:
+        VtoError: of the class `error`.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise error("no such file", where=str(path), hint=_neighbour(path))
+    if not path.is_file():
+        raise error("a file was wanted, this is not one", where=str(path))
+    if path.suffix.lower() not in suffixes:
+        allowed = ", ".join(sorted(suffixes))
+        raise error(f"files of type {path.suffix or '(none)'} are not read here; wanted {allowed}", where=str(path))
+    size = path.stat().st_size
+    if size == 0:
+        raise error("the file is empty (0 bytes)", where=str(path))
+    if size > limit_bytes:
+        raise error(f"the file has {size} bytes; the limit is {limit_bytes}", where=str(path))
+    return path
+
+
+def check_folder(path: Path) -> Path:
+    """Return the path if it is a folder.
+
+    Raises:
+        InputError: it is not.
+    """
+    path = Path(path)
+    if not path.is_dir():
+        problem = "a folder was wanted, this is a file" if path.exists() else "no such folder"
+        raise InputError(problem, where=str(path), hint=_neighbour(path))
+    return path
+
+
+def listed(folder: Path, suffixes: Collection[str]) -> tuple[Path, ...]:
+    """The folder's visible files with one of the suffixes, sorted by name."""
+    names = sorted(p.name for p in folder.iterdir() if p.suffix.lower() in suffixes and not p.name.startswith("."))
+    return tuple(folder / name for name in names)
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Give a path beside `path` to write to, and rename it into place when the block ends well: never half a file."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    beside = path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")
+    try:
+        yield beside
+        os.replace(beside, path)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def _neighbour(path: Path) -> str:
+    """Name a similarly named file in the same folder, if there is one."""
+    if not path.parent.is_dir():
+        return f"the folder {path.parent} does not exist either"
+    close = get_close_matches(path.name, [p.name for p in path.parent.iterdir()], n=1)
+    return f"did you mean {close[0]}?" if close else ""

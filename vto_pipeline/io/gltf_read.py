@@ -1,0 +1,130 @@
+"""The triangles of a glTF scene, in world coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vto_pipeline.errors import FormatError
+from vto_pipeline.io.arrays import Arrays
+from vto_pipeline.io.gltf_document import GltfDocument, open_gltf
+from vto_pipeline.model.arrays import FloatArray
+
+_TRIANGLES = 4
+_NODES = 10_000  # visits: a node may be reached by many parents in a broken file
+
+
+def parse_gltf(name: str) -> Arrays:
+    """Read the triangles of the default scene; skins, morph targets, textures and animations are left.
+
+    Args:
+        name: Path of a .gltf or .glb file.
+
+    Returns:
+        vertices (V, 3), placed by their nodes; faces (F, 3); colors (V, 3) uint8, where every part has them; notes.
+
+    Raises:
+        FormatError: the file breaks the format, or has no triangles.
+    """
+    document = open_gltf(Path(name))
+    vertices, faces, notes = [], [], []
+    colors: list[np.ndarray] = []
+    count = 0
+    for transform, mesh in _placed_meshes(document):
+        for primitive in mesh.get("primitives", []):
+            if primitive.get("mode", _TRIANGLES) != _TRIANGLES:
+                notes.append("left out a part that is not a list of triangles")
+                continue
+            points, triangles, color = _primitive(document, primitive)
+            if np.linalg.det(transform[:3, :3]) < 0:  # a mirror turns the triangles inside out
+                triangles = triangles[:, ::-1]
+            vertices.append(points @ transform[:3, :3].T + transform[:3, 3])
+            faces.append(triangles + count)
+            colors += [] if color is None else [color]
+            count += len(points)
+    if not faces:
+        raise FormatError("the scene has no triangles", where=name)
+    if len(faces) > 1:
+        notes.append(f"joined {len(faces)} parts into one mesh")
+    arrays: Arrays = {"vertices": np.concatenate(vertices), "faces": np.concatenate(faces)}
+    if len(colors) == len(faces):
+        arrays["colors"] = np.concatenate(colors)
+    return {**arrays, "notes": np.array(notes, dtype=np.str_)}
+
+
+def _primitive(
+    document: GltfDocument, primitive: Mapping[str, Any]
+) -> tuple[FloatArray, np.ndarray, np.ndarray | None]:
+    """Points (V, 3), triangles (F, 3) and colours (V, 3) or None, of one primitive."""
+    where = str(document.path)
+    attributes = primitive.get("attributes", {})
+    points = document.accessor(attributes.get("POSITION")).astype(np.float64)
+    if points.shape[1] != 3:
+        raise FormatError(f"positions have {points.shape[1]} coordinates", where=where)
+    if "indices" in primitive:
+        indices = document.accessor(primitive["indices"]).astype(np.int64).ravel()
+    else:
+        indices = np.arange(len(points))
+    if len(indices) % 3:
+        raise FormatError(f"{len(indices)} indices are no whole number of triangles", where=where)
+    if indices.min() < 0 or indices.max() >= len(points):  # here, since joined to other parts it would look valid
+        raise FormatError(f"face index {indices.max()} is outside 0..{len(points) - 1}", where=where)
+    color = None
+    if "COLOR_0" in attributes:
+        values = document.accessor(attributes["COLOR_0"])[:, :3]
+        if values.shape != points.shape:
+            raise FormatError(f"{len(values)} colours for {len(points)} vertices", where=where)
+        color = encode_srgb(values)
+    return points, indices.reshape(-1, 3), color
+
+
+def encode_srgb(linear: np.ndarray) -> np.ndarray:
+    """Linear light 0 to 1 to sRGB bytes, IEC 61966-2-1; glTF keeps vertex colours linear."""
+    linear = np.clip(np.nan_to_num(linear.astype(np.float64)), 0.0, 1.0)
+    curved = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - 0.055)
+    return np.round(curved * 255).astype(np.uint8)
+
+
+def _placed_meshes(document: GltfDocument) -> Iterator[tuple[FloatArray, Mapping[str, Any]]]:
+    """World transform (4, 4) and mesh of every node of the default scene that has one."""
+    scenes = document.items("scenes")
+    if scenes:
+        roots = document.item("scenes", document.json.get("scene", 0)).get("nodes", [])
+    else:
+        roots = list(range(len(document.items("nodes"))))
+    stack: list[tuple[Any, FloatArray, tuple[Any, ...]]] = [(root, np.eye(4), ()) for root in reversed(roots)]
+    visits = 0
+    while stack:
+        index, above, path = stack.pop()
+        visits += 1
+        if index in path or visits > _NODES:
+            raise FormatError("the nodes form a loop, or are too many", where=str(document.path))
+        node = document.item("nodes", index)
+        world = above @ _local(node, document.path)
+        if "mesh" in node:
+            yield world, document.item("meshes", node["mesh"])
+        stack += [(child, world, (*path, index)) for child in reversed(node.get("children", []))]
+
+
+def _local(node: Mapping[str, Any], path: Path) -> FloatArray:
+    """A node's own transform, from its matrix or its translation, rotation (x, y, z, w) and scale."""
+    try:
+        if "matrix" in node:
+            return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+        x, y, z, w = np.array(node.get("rotation", (0, 0, 0, 1)), dtype=np.float64)
+        rotation = np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+        local = np.eye(4)
+        local[:3, :3] = rotation * np.array(node.get("scale", (1, 1, 1)), dtype=np.float64).reshape(3)
+        local[:3, 3] = np.array(node.get("translation", (0, 0, 0)), dtype=np.float64).reshape(3)
+    except (TypeError, ValueError) as e:
+        raise FormatError(f"a node's transform is not understood: {e}", where=str(path)) from None
+    return local

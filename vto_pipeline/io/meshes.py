@@ -1,0 +1,116 @@
+"""Triangle meshes from files of any origin, and PLY files for meshes and clouds.
+
+The parsers are our own and short: the usual ones take a file that promises two thousand million vertices for four
+points, a face line cut in half for no face, and glTF indices beyond the last vertex for valid (all tried).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from vto_pipeline.errors import FormatError, InputError
+from vto_pipeline.io.arrays import Arrays
+from vto_pipeline.io.files import check_file, replacing
+from vto_pipeline.io.gltf_read import parse_gltf
+from vto_pipeline.io.lengths import to_metres
+from vto_pipeline.io.obj import parse_obj
+from vto_pipeline.io.off import parse_off
+from vto_pipeline.io.ply import parse_ply
+from vto_pipeline.io.sandbox import run_limited
+from vto_pipeline.io.stl import parse_stl
+from vto_pipeline.io.tidy import check_sound, drop_needless, join_corners
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import PointCloud, TriangleMesh
+
+PARSERS: dict[str, Callable[[str], Arrays]] = {
+    ".ply": parse_ply,
+    ".obj": parse_obj,
+    ".stl": parse_stl,
+    ".off": parse_off,
+    ".glb": parse_gltf,
+    ".gltf": parse_gltf,
+}
+"""Suffix -> parser."""
+
+_LIMIT_BYTES = 1_000_000_000
+
+
+def read_mesh(path: Path, *, unit: str | None = None, job: Job | None = None) -> TriangleMesh:
+    """Read a mesh made by anyone: parsed in a limited child process, checked, cleaned, scaled to metres.
+
+    Args:
+        path: PLY, OBJ, STL, OFF, glTF or GLB.
+        unit: Unit of length in the file, a key of `units.LENGTH_M`; None: guessed from the size.
+        job: Told of the guessed unit and of every change.
+
+    Returns:
+        The mesh [m]; the axes are the file's.
+
+    Raises:
+        InputError: no such file, or no unit fits; FormatError: the file breaks its format or holds no sound mesh.
+    """
+    path = check_file(Path(path), PARSERS, _LIMIT_BYTES)
+    suffix = path.suffix.lower()
+    arrays = run_limited(PARSERS[suffix], str(path.resolve()), where=str(path))
+    notes = [str(note) for note in arrays.pop("notes", np.empty(0))]
+    if not len(arrays.get("faces", ())):
+        problem = f"there are {len(arrays['vertices'])} points and no faces; wanted a mesh"
+        raise FormatError(problem, where=str(path), hint="if it is a point cloud, give it as a cloud")
+    check_sound(arrays, path)
+    if suffix == ".stl":
+        arrays, more = join_corners(arrays)
+        notes += more
+    count = len(arrays["vertices"])
+    arrays, more = drop_needless(arrays)
+    vertices = to_metres(arrays["vertices"], unit, path, job)
+    if job is not None:
+        for note in notes + more:
+            job.note(f"{path.name}: {note}")
+        if (
+            suffix == ".obj" and len(vertices) < count
+        ):  # OBJ counts nothing, so that a cut between two lines leaves no trace
+            job.warn(f"{path.name}: {count - len(vertices)} vertices are in no face: is the file cut off?")
+    try:
+        return TriangleMesh(vertices, arrays["faces"], arrays.get("colors"))
+    except InputError as e:
+        raise FormatError(e.problem, where=str(path), hint=e.hint) from None
+
+
+def read_own_mesh(path: Path) -> TriangleMesh:
+    """Read a mesh that `write_ply` wrote: in metres and sound, so neither child process nor cleaning.
+
+    Raises:
+        InputError: no such file; FormatError: damaged since.
+    """
+    path = check_file(Path(path), {".ply"}, _LIMIT_BYTES)
+    arrays = parse_ply(str(path))
+    if "faces" not in arrays:
+        raise FormatError("points without faces; wanted a mesh", where=str(path))
+    return TriangleMesh(arrays["vertices"], arrays["faces"], arrays.get("colors"))
+
+
+def write_ply(path: Path, value: TriangleMesh | PointCloud) -> None:
+    """Write a mesh or a cloud as binary PLY: doubles, so that reading gives the same bits back."""
+    points = value.vertices if isinstance(value, TriangleMesh) else value.points
+    normals = None if isinstance(value, TriangleMesh) else value.normals
+    fields: list[tuple[str, str, np.ndarray]] = [(name, "<f8", points[:, i]) for i, name in enumerate("xyz")]
+    if normals is not None:
+        fields += [(f"n{name}", "<f8", normals[:, i]) for i, name in enumerate("xyz")]
+    if value.colors is not None:
+        fields += [(name, "u1", value.colors[:, i]) for i, name in enumerate(("red", "green", "blue"))]
+    table = np.empty(len(points), [(name, kind) for name, kind, _ in fields])
+    for name, _, column in fields:
+        table[name] = column
+    header = ["ply", "format binary_little_endian 1.0", "comment metres, +Y up", f"element vertex {len(points)}"]
+    header += [f"property {'double' if kind == '<f8' else 'uchar'} {name}" for name, kind, _ in fields]
+    faces = b""
+    if isinstance(value, TriangleMesh):
+        header += [f"element face {len(value.faces)}", "property list uchar int vertex_indices"]
+        rows = np.empty(len(value.faces), [("sides", "u1"), ("corners", "<i4", 3)])
+        rows["sides"], rows["corners"] = 3, value.faces
+        faces = rows.tobytes()
+    with replacing(path) as beside:
+        beside.write_bytes("\n".join([*header, "end_header\n"]).encode() + table.tobytes() + faces)

@@ -1,0 +1,76 @@
+"""Find out what a path holds: which way into the pipeline it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from vto_pipeline.errors import InputError
+from vto_pipeline.io import clouds, images, meshes
+from vto_pipeline.io.documents import load_yaml
+from vto_pipeline.io.files import listed
+from vto_pipeline.io.ply_header import read_header
+
+_WANTED = (
+    "a folder of photos, of depth frames, or of front and side pictures; a point cloud, a mesh, a measurements file, "
+    "or an avatar"
+)
+
+
+def find_kind(path: Path) -> tuple[str, str]:
+    """What a path holds, from its name, its header, and for a folder its contents.
+
+    Args:
+        path: File or folder.
+
+    Returns:
+        "photos", "depth", "cloud", "surface", "silhouettes", "measurements" or "avatar", and the reason.
+
+    Raises:
+        InputError: nothing there, or nothing known.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise InputError("no such file or folder", where=str(path))
+    found = _folder(path) if path.is_dir() else _file(path)
+    if found is None:
+        raise InputError("it is not clear what this is", where=str(path), hint=f"wanted {_WANTED}")
+    return found
+
+
+def _folder(path: Path) -> tuple[str, str] | None:
+    if (path / "intrinsics.json").is_file() and (path / "depth").is_dir():
+        return "depth", "it holds intrinsics.json and depth/"
+    pictures = listed(path, images.SUFFIXES)
+    if {"front", "side"} <= {p.stem.lower() for p in pictures} and (path / "stature.yaml").is_file():
+        return "silhouettes", "it holds front and side pictures and stature.yaml"
+    if pictures:
+        return "photos", f"it holds {len(pictures)} pictures"
+    return None
+
+
+def _file(path: Path) -> tuple[str, str] | None:
+    suffix = path.suffix.lower()
+    if suffix == ".npz":
+        return "avatar", "it is an .npz archive"
+    if suffix in (".yaml", ".yml", ".json"):
+        data = load_yaml(path, error=InputError).data
+        return (
+            ("measurements", "it has the key measurements")
+            if isinstance(data, dict) and "measurements" in data
+            else None
+        )
+    if suffix == ".ply":
+        return _ply(path)
+    if suffix in clouds.PARSERS:
+        return "cloud", f"{suffix} files hold points"
+    if suffix in meshes.PARSERS:
+        return "surface", f"{suffix} files hold meshes"
+    return None
+
+
+def _ply(path: Path) -> tuple[str, str]:
+    header = read_header(path.read_bytes(), path)
+    faces = sum(e.count for e in header.elements if e.name == "face")
+    if faces:
+        return "surface", f"its header counts {faces} faces"
+    return "cloud", "its header counts points and no faces"
