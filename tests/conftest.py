@@ -1,0 +1,7 @@
+"""Puts this folder on the import path, so that tests of several rooms can share a scene; threads as `vto` has them."""
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # its sums depend on the thread count
+
+import vto_pipeline.numerics  # noqa: F401  # Numba's thread pool must be loaded before Open3D brings an older one

@@ -1,0 +1,1 @@
+"""The engine: plans, runs, caches. Knows nothing of garments."""

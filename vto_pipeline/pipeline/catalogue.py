@@ -1,0 +1,69 @@
+"""The tables an engine works on: stages, kinds of artifact, and what may be given."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from vto_pipeline.model.artifact import ArtifactKind
+from vto_pipeline.model.settings import Config
+from vto_pipeline.pipeline.stage import Stage
+
+
+@dataclass(frozen=True)
+class Catalogue:
+    """What can be made, how, and from what. Both ends of every cross-reference are checked when it is built.
+
+    Args:
+        stages: In the order in which people think of them; the order of a plan where its needs leave a choice.
+        kinds: Every artifact.
+        given: Key in a document, such as "garment.photos" or "fabric" -> artifact.
+
+    Raises:
+        ValueError: a table contradicts itself; a bug, not a user's mistake.
+    """
+
+    stages: tuple[Stage, ...]
+    kinds: tuple[ArtifactKind, ...]
+    given: Mapping[str, str]
+
+    def __post_init__(self) -> None:
+        names = [kind.name for kind in self.kinds]
+        _refuse_twins("artifact", names)
+        _refuse_twins("stage", [stage.name for stage in self.stages])
+        made = {artifact for stage in self.stages for artifact in stage.makes}
+        files = [k.filename for k in self.kinds if k.name in made]
+        _refuse_twins("file name", files + [name for k in self.kinds for name, _ in k.previews])
+        named = {a for stage in self.stages for a in (*stage.needs, *stage.makes, *stage.optional)}
+        unknown = (named | set(self.given.values())) - set(names)
+        if unknown:
+            raise ValueError(f"artifacts without a kind: {sorted(unknown)}")
+        for stage in self.stages:
+            if self.sections[stage.section] is not stage.settings:
+                raise ValueError(f"two settings classes for stages.{stage.section}")
+
+    @property
+    def sections(self) -> dict[str, type[Config]]:
+        """Key under `stages:` in a document -> settings class."""
+        found: dict[str, type[Config]] = {}
+        for stage in self.stages:
+            found.setdefault(stage.section, stage.settings)
+        return found
+
+    def kind(self, artifact: str) -> ArtifactKind:
+        """The kind of an artifact that exists."""
+        return next(kind for kind in self.kinds if kind.name == artifact)
+
+    def makers(self, artifact: str) -> list[Stage]:
+        """Stages that make an artifact."""
+        return [stage for stage in self.stages if artifact in stage.makes]
+
+    def keys(self, artifact: str) -> list[str]:
+        """Keys under `given:` that hold an artifact."""
+        return [key for key, name in self.given.items() if name == artifact]
+
+
+def _refuse_twins(what: str, names: list[str]) -> None:
+    twins = sorted({name for name in names if names.count(name) > 1})
+    if twins:
+        raise ValueError(f"{what} named twice: {twins}")

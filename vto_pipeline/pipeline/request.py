@@ -1,0 +1,127 @@
+"""From a document to a checked request: every key known, every setting in range, every file there."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from vto_pipeline.errors import ConfigError
+from vto_pipeline.io.documents import Document, check_schema, suggest
+from vto_pipeline.model.settings import Config
+from vto_pipeline.pipeline.catalogue import Catalogue
+from vto_pipeline.pipeline.given import Given, find_given
+from vto_pipeline.pipeline.schema import VERSION, document_model
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a user asks of the engine.
+
+    Args:
+        given: Artifact -> what was given for it.
+        want: Artifacts, in the order asked for.
+        settings: Section -> settings, for every section.
+        choose: Artifact -> the stage that is to make it.
+        seed: For everything random.
+        places: Artifact or "given" -> file and line, for messages.
+    """
+
+    given: Mapping[str, Given]
+    want: tuple[str, ...]
+    settings: Mapping[str, Config]
+    choose: Mapping[str, str] = field(default_factory=dict)
+    seed: int = 0
+    places: Mapping[str, str] = field(default_factory=dict)
+
+
+def read_request(document: Document, base: Path, catalogue: Catalogue, overrides: Sequence[str] = ()) -> Request:
+    """Check a whole document.
+
+    Args:
+        document: As loaded.
+        base: Folder that relative paths start from: the document's own.
+        catalogue: The tables.
+        overrides: "section.key=value", which win over the document.
+
+    Raises:
+        ConfigError: unknown key, value out of range; with file, line, and suggestion.
+        InputError: a file that is given does not exist.
+    """
+    data = _check_version(document)
+    model = document_model(catalogue)
+    checked = check_schema(replace(document, data=data), model)
+    for text in overrides:
+        data = _override(data, text, catalogue)
+        checked = check_schema(replace(document, data=data), model)
+    made = [artifact for stage in catalogue.stages for artifact in stage.makes]
+    places = {"given": document.where(("given",))}
+    for index, artifact in enumerate(checked.want):
+        places[artifact] = document.where(("want", index))
+        if artifact not in made:
+            raise ConfigError(
+                f"want: unknown artifact {artifact!r}", where=places[artifact], hint=suggest(artifact, made)
+            )
+    for artifact, stage in checked.choose.items():
+        _check_choice(artifact, stage, catalogue, document.where(("choose", artifact)))
+    return Request(
+        given=find_given(data["given"], document, base, catalogue),
+        want=tuple(dict.fromkeys(checked.want)),
+        settings={section: getattr(checked.stages, section) for section in catalogue.sections},
+        choose=checked.choose,
+        seed=checked.seed,
+        places=places,
+    )
+
+
+def _check_version(document: Document) -> dict[str, Any]:
+    """The document's data without `schema`."""
+    if not isinstance(document.data, Mapping):
+        raise ConfigError("a pipeline document is a mapping with schema, given and want", where=document.where())
+    data = dict(document.data)
+    version = data.pop("schema", None)
+    if version != VERSION:
+        seen = "is missing" if version is None else f"is {version!r}"
+        raise ConfigError(f"schema {seen}; wanted {VERSION}", where=document.where(("schema",)))
+    return data
+
+
+def _override(data: dict[str, Any], text: str, catalogue: Catalogue) -> dict[str, Any]:
+    """The document's data with one setting changed; the change is checked alone first, so that errors name it."""
+    match = re.fullmatch(r"(\w+)\.(\w+)=(.*)", text, re.DOTALL)
+    if match is None:
+        raise ConfigError(f"--set takes stage.key=value (got {text!r})", hint="as in --set drape.target_error_mm=0.5")
+    section, key, value = match.groups()
+    source = Document({}, Path(f"--set {text}"))
+    if section not in catalogue.sections:
+        raise ConfigError(
+            f"stages.{section}: unknown stage", where=source.where(), hint=suggest(section, catalogue.sections)
+        )
+    change = {section: {key: _number_or_word(value)}}
+    check_schema(replace(source, data={"given": {}, "want": ["-"], "stages": change}), document_model(catalogue))
+    stages = dict(data.get("stages") or {})
+    stages[section] = {**stages.get(section, {}), **change[section]}
+    return {**data, "stages": stages}
+
+
+def _number_or_word(text: str) -> Any:
+    """JSON where it is JSON, else the word itself; the settings class has the last say."""
+    try:
+        return json.loads(text)
+    except ValueError:
+        return text
+
+
+def _check_choice(artifact: str, stage: str, catalogue: Catalogue, where: str) -> None:
+    """Refuse a choice of, or between, things that do not exist."""
+    made = {name for row in catalogue.stages for name in row.makes}
+    if artifact not in made:
+        raise ConfigError(f"choose.{artifact}: unknown artifact", where=where, hint=suggest(artifact, made))
+    makers = [maker.name for maker in catalogue.makers(artifact)]
+    if stage not in makers:
+        raise ConfigError(
+            f"choose.{artifact}: {stage!r} does not make it", where=where, hint=f"one of {', '.join(makers)}"
+        )

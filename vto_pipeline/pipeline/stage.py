@@ -1,0 +1,53 @@
+"""A stage is a row of a table: what it needs, what it makes, and the function in between."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.settings import Config
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One step of a pipeline.
+
+    Args:
+        name: Identifier; a stage bound to a role is called "role.section", as in "garment.sfm".
+        about: One line for people.
+        needs: Artifacts without which it cannot run.
+        makes: Artifacts it returns, all of them, every time.
+        run: (inputs by artifact, settings, job) -> outputs by artifact.
+        settings: Its settings class; stages of one section share it.
+        optional: Artifacts it takes when they can be made from what is given. They are absent from the inputs when not.
+            A final stage takes those that the rest of the plan holds, and causes none to be made.
+        uses: Distributions whose version changes the result, such as "pycolmap".
+        skip: Inputs -> the reason why this data does not need the stage, or None. Must be conservative.
+        passes: Made artifact -> needed artifact whose file it takes when the stage is skipped.
+        final: Runs last, every time, uncached; its inputs also hold "run_record", the dict that run.json holds.
+    """
+
+    name: str
+    about: str
+    needs: tuple[str, ...]
+    makes: tuple[str, ...]
+    run: Callable[[Mapping[str, Any], Any, Job], Mapping[str, Any]]
+    settings: type[Config] = Config
+    optional: tuple[str, ...] = ()
+    uses: tuple[str, ...] = ()
+    skip: Callable[[Mapping[str, Any]], str | None] | None = None
+    passes: Mapping[str, str] = field(default_factory=dict)
+    final: bool = False
+
+    def __post_init__(self) -> None:
+        if self.skip is not None and set(self.passes) != set(self.makes):
+            raise ValueError(f"stage {self.name} can be skipped: passes must name a source for each of {self.makes}")
+        if not set(self.passes.values()) <= set(self.needs):
+            raise ValueError(f"stage {self.name}: passes may only name what it needs, {self.needs}")
+
+    @property
+    def section(self) -> str:
+        """Key of its settings under `stages:` in a document; shared by the roles."""
+        return self.name.rpartition(".")[2]
