@@ -1,0 +1,59 @@
+"""Sheets, tubes and fabrics the cloth tests share."""
+
+import numpy as np
+import trimesh
+
+from vto_pipeline.model.fabric import Fabric
+from vto_pipeline.model.mesh import TriangleMesh
+
+
+def fabric(*, stretch=1000.0, weft=None, shear=200.0, poisson=0.0, bending=0.0, density=0.2, friction=0.3):
+    """A made-up fabric."""
+    return Fabric("test", density, 3e-4, stretch, weft or stretch, shear, poisson, bending, bending, 0.0, friction)
+
+
+def sheet(columns, rows, width, height, upright=True):
+    """A grid in the plane z = 0 (upright, row 0 on top) or y = 0."""
+    x, y = np.meshgrid(np.linspace(0, width, columns), np.linspace(0, -height, rows))
+    flat = np.zeros(x.size)
+    points = np.column_stack([x.ravel(), y.ravel(), flat] if upright else [x.ravel(), flat, -y.ravel()])
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    odd = (np.add.outer(np.arange(rows - 1), np.arange(columns - 1)).ravel() % 2).astype(bool)
+    a, b, c, d = corner, corner + 1, corner + columns, corner + columns + 1
+    one = np.where(odd[:, None], np.column_stack([a, c, b]), np.column_stack([a, c, d]))
+    two = np.where(odd[:, None], np.column_stack([b, c, d]), np.column_stack([a, d, b]))
+    return TriangleMesh(points, np.vstack([one, two]).astype(np.int32))
+
+
+def tube(radius, height, around, along, base=0.0):
+    """An open cylinder about the y axis, outward normals, with staggered rings."""
+    angle = np.add.outer(0.5 * (np.arange(along) % 2), np.arange(around)) * 2 * np.pi / around
+    y = np.repeat(base + np.linspace(0, height, along), around)
+    points = np.column_stack([radius * np.cos(angle.ravel()), y, radius * np.sin(angle.ravel())])
+    faces = []
+    for ring in range(along - 1):
+        i = np.arange(around)
+        a, b = ring * around + i, ring * around + (i + 1) % around
+        c, d = a + around, b + around
+        if ring % 2 == 0:
+            faces += [np.column_stack([a, c, b]), np.column_stack([b, c, d])]
+        else:
+            faces += [np.column_stack([a, c, d]), np.column_stack([a, d, b])]
+    return TriangleMesh(points, np.vstack(faces).astype(np.int32))
+
+
+def ball(radius, center=(0.0, 0.0, 0.0), levels=3):
+    """An icosphere."""
+    mesh = trimesh.creation.icosphere(levels, radius)
+    return TriangleMesh(mesh.vertices + np.asarray(center), mesh.faces)
+
+
+def box(size, center=(0.0, 0.0, 0.0)):
+    """A box."""
+    mesh = trimesh.creation.box(size).subdivide()
+    return TriangleMesh(mesh.vertices + np.asarray(center), mesh.faces)
+
+
+def moved(mesh, x, y, z):
+    """The same mesh elsewhere."""
+    return TriangleMesh(mesh.vertices + np.array([x, y, z]), mesh.faces)

@@ -1,0 +1,95 @@
+"""Whole drapes: a tube garment on a dumb body, riding along, growing, failing."""
+
+import numpy as np
+import pytest
+from cloth_scenes import ball, fabric, moved, tube
+from numpy.testing import assert_allclose, assert_array_equal
+
+from vto_pipeline.cloth.drape import drape
+from vto_pipeline.errors import ConfigError, IntersectingError
+from vto_pipeline.geometry.intersections import intersecting_faces
+from vto_pipeline.model.body import MovingBody
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+
+QUICK = {"settle_seconds": 1.5, "target_error_mm": 3.0}
+
+
+def pear(swell=1.0):
+    """A closed body: a ball drawn out to 0.6 m, wider below."""
+    mesh = ball(1.0, levels=4)
+    x, y, z = mesh.vertices.T
+    girth = 0.12 * swell * (1.0 - 0.35 * y)
+    return TriangleMesh(np.column_stack([girth * x, 0.3 * y, girth * z]), mesh.faces)
+
+
+def vest(shift=(0.0, 0.0, 0.0)):
+    """A tube that cannot slip over the wide part of the pear: its waist is 0.115 m, the pear 0.14 m."""
+    return moved(tube(0.115, 0.2, 72, 24, base=0.0), *shift)
+
+
+def test_a_vest_comes_to_rest_on_the_pear():
+    job = Job()
+    found = drape(vest(), pear(), fabric(bending=1e-5), {**QUICK, "settle_seconds": 4.0}, job)
+    assert found.audit["finite"] is True
+    assert found.audit["settled"] is True
+    assert len(intersecting_faces(found.mesh, pear())) == 0
+    assert 1.0 < found.audit["min_clearance_mm"] < 4.0
+    assert found.audit["max_stretch"] < 0.3
+    assert -0.1 < found.mesh.vertices[:, 1].min() < 0.05  # it hangs on the pear and has not fallen
+    assert len(found.trace) > 4
+    assert np.all(np.diff([row.step for row in found.trace]) > 0)
+    assert job.metrics["error_mm"] < 3.0
+    assert ("riding along with the body", "the body is at rest") in job.left_out
+
+
+def test_a_garment_beside_its_body_is_put_on_it():
+    job = Job()
+    found = drape(vest(shift=(0.4, 0.1, -0.3)), pear(), fabric(bending=1e-5), QUICK, job)
+    assert any(note.startswith("garment moved by") for note in job.notes)
+    assert len(intersecting_faces(found.mesh, pear())) == 0
+    assert_allclose(found.mesh.vertices[:, [0, 2]].mean(axis=0), 0.0, rtol=0, atol=0.02)  # about the pear's axis
+
+
+def test_the_garment_rides_on_a_body_that_swells():
+    thin, fat = pear(0.8), pear(1.1)
+    body = MovingBody(np.stack([thin.vertices, fat.vertices]), thin.faces)
+    job = Job()
+    found = drape(vest(), body, fabric(bending=1e-5), QUICK, job)
+    assert len(intersecting_faces(found.mesh, fat)) == 0
+    assert found.audit["rms_stretch"] > 0.005  # 0.132 m about the waist stretches the 0.115 m tube
+    assert "riding along with the body" not in dict(job.left_out)
+
+
+def test_two_runs_have_the_same_bits_and_a_budget_that_is_not_spent_changes_nothing():
+    first = drape(vest(), pear(), fabric(bending=1e-5), QUICK)
+    second = drape(vest(), pear(), fabric(bending=1e-5), {**QUICK, "time_budget_s": 1000})
+    assert_array_equal(first.mesh.vertices, second.mesh.vertices)
+    assert first.audit == second.audit
+
+
+def test_leaving_nothing_out_changes_nothing():
+    plain = drape(vest(), pear(), fabric(), QUICK)
+    whole = drape(vest(), pear(), fabric(), QUICK, Job(force_all=True))
+    assert_allclose(whole.mesh.vertices, plain.mesh.vertices, rtol=0, atol=1e-4)  # the promise: 0.1 mm
+
+
+def test_a_spent_budget_stops_and_says_so():
+    job = Job()
+    drape(vest(), pear(), fabric(bending=1e-5), {"time_budget_s": 0.01}, job)
+    assert any(text.startswith("not at rest") for text in job.warnings)
+    assert job.metrics["settled"] is False
+
+
+def test_what_cannot_be_cleared_is_an_error_with_places_and_the_partial_result():
+    plug = tube(0.02, 0.1, 24, 12, base=0.25)  # far too narrow for the pear's top, through which it is stuck
+    hopeless = {"place": "as_it_stands", "clear_rounds": 0, "grow_above_mm": 1000, "recovery_speed": 0.01}
+    with pytest.raises(IntersectingError, match=r"pairs of triangles .* near \(") as caught:
+        drape(plug, pear(), fabric(), {**hopeless, "settle_seconds": 0.1})
+    partial = caught.value.partial
+    assert partial["audit"]["body_intersections"] == len(intersecting_faces(partial["draped"], pear())) > 0
+
+
+def test_settings_are_checked():
+    with pytest.raises(ConfigError, match="skin_mm.*got 0"):
+        drape(vest(), pear(), fabric(), {"skin_mm": 0})

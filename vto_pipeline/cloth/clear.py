@@ -1,0 +1,44 @@
+"""The last pass of a drape: no triangle of the cloth may cross the body.
+
+Contacts are held at the vertices; between them a triangle can still cut a sharp bump. Where one does, the skin of the
+vertices around it thickens and the cloth relaxes, until none is left. The skin stays as it is: it is part of the
+equilibrium.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vto_pipeline.cloth.build import ClothState
+from vto_pipeline.cloth.stepper import Stepper
+from vto_pipeline.geometry.intersections import intersecting_faces
+from vto_pipeline.model.arrays import IntArray
+from vto_pipeline.model.mesh import TriangleMesh
+
+_THICKEN = 1e-3  # m a round
+_RELAX = 0.1  # s of cloth time a round
+
+
+def clear_of_body(
+    stepper: Stepper, state: ClothState, faces: IntArray, body: TriangleMesh, rounds: int
+) -> tuple[ClothState, IntArray]:
+    """Thicken and relax until no triangle of the cloth meets the body, or the rounds are spent.
+
+    Args:
+        stepper: The cloth among its colliders; its skin is raised.
+        state: The cloth.
+        faces: Its triangles, shape (F, 3).
+        body: Where the body is now.
+        rounds: How often to try.
+
+    Returns:
+        The state, and the pairs (cloth face, body face) still meeting, shape (K, 2).
+    """
+    pairs = intersecting_faces(TriangleMesh(state.positions, faces), body)
+    for _ in range(rounds):
+        if len(pairs) == 0:
+            break
+        stepper.skin[np.unique(faces[pairs[:, 0]])] += _THICKEN
+        state = stepper.run(state, _RELAX)
+        pairs = intersecting_faces(TriangleMesh(state.positions, faces), body)
+    return state, pairs

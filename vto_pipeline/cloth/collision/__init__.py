@@ -1,0 +1,1 @@
+"""Contacts with bodies and shapes. Knows no solver."""

@@ -1,0 +1,70 @@
+"""Three-vectors as tuples of floats: inside a Numba kernel they live in registers and cost no allocation."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from numba import njit
+
+
+@njit(cache=True, error_model="numpy")
+def load(array, i):
+    """Return row i of an (N, 3) array."""
+    return array[i, 0], array[i, 1], array[i, 2]
+
+
+@njit(cache=True, error_model="numpy")
+def store(array, i, a):
+    """Write a into row i of an (N, 3) array."""
+    array[i, 0], array[i, 1], array[i, 2] = a
+
+
+@njit(cache=True, error_model="numpy")
+def add(a, b):
+    """Return a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@njit(cache=True, error_model="numpy")
+def sub(a, b):
+    """Return a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@njit(cache=True, error_model="numpy")
+def scale(s, a):
+    """Return s a."""
+    return s * a[0], s * a[1], s * a[2]
+
+
+@njit(cache=True, error_model="numpy")
+def axpy(s, a, b):
+    """Return s a + b."""
+    return s * a[0] + b[0], s * a[1] + b[1], s * a[2] + b[2]
+
+
+@njit(cache=True, error_model="numpy")
+def dot(a, b):
+    """Return the inner product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(cache=True, error_model="numpy")
+def cross(a, b):
+    """Return the vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit(cache=True, error_model="numpy")
+def norm(a):
+    """Return the length."""
+    return sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+
+
+@njit(cache=True, error_model="numpy")
+def unit(a):
+    """Return a / |a|, or zero for the zero vector."""
+    length = norm(a)
+    if length == 0.0:
+        return 0.0, 0.0, 0.0
+    return a[0] / length, a[1] / length, a[2] / length

@@ -1,0 +1,1 @@
+"""What is looked at: the detailed garment after the drape, and pictures."""
