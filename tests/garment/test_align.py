@@ -1,0 +1,80 @@
+"""Alignment against a known motion."""
+
+from __future__ import annotations
+
+import dressed_form
+import numpy as np
+import pytest
+import trimesh
+from numpy.testing import assert_array_equal
+
+from vto_pipeline.errors import GarmentError
+from vto_pipeline.garment.align import AlignConfig, align_to_mannequin
+from vto_pipeline.geometry.rigid import moved
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+
+QUICK = AlignConfig(samples=4000)
+
+
+def misplacement(scene, found, motion):
+    """Largest distance between where a point of the form should be and where it comes to [m]."""
+    on_scan = moved(scene.form, np.linalg.inv(motion))
+    return np.linalg.norm(moved(on_scan, found).vertices - scene.form.vertices, axis=1).max()
+
+
+def test_a_turned_and_shifted_scan_comes_back(scene):
+    job = Job()
+    found = align_to_mannequin(scene.scan, scene.form, QUICK, job)
+    error = misplacement(scene, found, scene.mannequin_from_surface)
+    assert 1e-6 < error < 3e-4  # noise of 0.3 mm; exact would mean the answer leaked
+    assert 2e-4 < job.metrics["inlier_rms_mm"] * 1e-3 < 4e-4  # the noise that was put in
+    assert 0.1 < job.metrics["inlier_share"] < 0.5
+    assert job.metrics["uncertainty_mm"] * 1e-3 < 1e-4
+    assert job.left_out
+
+
+@pytest.mark.parametrize(
+    "turn",
+    [pytest.param([20, 0, 0], id="leaning far", marks=pytest.mark.slow), pytest.param([0, 200, 15], id="turned")],
+)
+def test_a_scan_that_leans_comes_back_too(scene, turn):
+    tilt = dressed_form.rigid(turn, [0.1, -0.3, 0.2])
+    upright = moved(scene.scan, scene.mannequin_from_surface)
+    found = align_to_mannequin(moved(upright, np.linalg.inv(tilt)), scene.form, QUICK, Job())
+    assert misplacement(scene, found, tilt) < 5e-4
+
+
+@pytest.mark.slow
+def test_a_scan_lying_on_its_side_comes_back(scene):
+    tilt = dressed_form.rigid([90, 0, 0], [0.1, -0.3, 0.2])
+    upright = moved(scene.scan, scene.mannequin_from_surface)
+    found = align_to_mannequin(moved(upright, np.linalg.inv(tilt)), scene.form, QUICK, Job())
+    assert misplacement(scene, found, tilt) < 5e-4
+
+
+def test_the_same_scan_gives_the_same_bits(scene):
+    few = AlignConfig(samples=1000, candidates=2)
+    one, two = (align_to_mannequin(scene.scan, scene.form, few, Job()) for _ in range(2))
+    assert_array_equal(one, two)
+
+
+@pytest.mark.slow
+def test_something_else_than_the_mannequin_is_refused(scene):
+    crate = trimesh.creation.box(extents=[0.5, 0.9, 0.5]).subdivide_to_size(0.03)
+    with pytest.raises(GarmentError) as caught:
+        align_to_mannequin(TriangleMesh(crate.vertices, crate.faces), scene.form, AlignConfig(samples=1000), Job())
+    assert "right mannequin" in caught.value.hint
+
+
+def test_a_mannequin_that_looks_alike_all_round_is_refused():
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.2)
+    rough = ball.vertices + np.random.default_rng(0).normal(0.0, 3e-4, ball.vertices.shape)
+    with pytest.raises(GarmentError, match="uncertain") as caught:
+        align_to_mannequin(
+            TriangleMesh(rough, ball.faces),
+            TriangleMesh(ball.vertices, ball.faces),
+            AlignConfig(samples=1000, worst_sigma_mm=0.2),  # the dressed form's is 0.03, this ball's facets leave 0.5
+            Job(),
+        )
+    assert "several sides" in caught.value.hint

@@ -1,0 +1,118 @@
+"""Distances, cuts, samples and smooth functions against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+from numpy.testing import assert_allclose
+
+from vto_pipeline.errors import InputError
+from vto_pipeline.geometry.cut import keep_positive
+from vto_pipeline.geometry.geodesic import distance_from
+from vto_pipeline.geometry.laplace import extend, laplacian
+from vto_pipeline.geometry.sampling import sample_surface
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.geometry.subdivide import split_long_edges
+from vto_pipeline.geometry.topology import boundary_loops, edge_faces, edges, face_area_vectors, submesh
+from vto_pipeline.model.mesh import TriangleMesh
+
+
+def area(mesh):
+    return np.linalg.norm(face_area_vectors(mesh), axis=1).sum()
+
+
+def test_signed_distance_to_a_sphere_even_with_a_hole():
+    ball = shapes.sphere(5)
+    holed = submesh(ball, shapes.centers(ball)[:, 1] < 0.99)[0]
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-1.5, 1.5, (500, 3))
+    points = points[points[:, 1] < 0.6]
+    wanted = np.linalg.norm(points, axis=1) - 1.0
+    for mesh in (ball, holed):
+        found = SurfaceDistance(mesh).signed(points)
+        assert_allclose(found.distance, wanted, atol=1.5e-3)  # sagitta of edges of 0.04 radii, and at the hole
+        assert_allclose(np.linalg.norm(found.point - points, axis=1), np.abs(found.distance), atol=1e-12)
+    assert (wanted < 0).sum() > 50
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.1003, 0.25])
+def test_a_cut_leaves_just_the_area_on_its_side(offset):
+    sheet = shapes.grid(10, 10, 0.1)
+    direction = np.array([0.6, 0.8, 0.0])
+    values = sheet.vertices @ direction - 0.3 - offset
+    part = keep_positive(sheet, values)
+    missing = (0.3 + offset) ** 2 / (2.0 * 0.6 * 0.8)  # the triangle cut off a square's corner
+    assert_allclose(area(part), 1.0 - missing, atol=0.15 * 0.1 * 0.6)  # snapping moves the line by 0.15 edges at most
+    assert len(boundary_loops(part)) == 1
+    assert_allclose((part.vertices @ direction - 0.3 - offset).min(), 0.0, atol=0.15 * 0.1 * 1.4)  # for the same reason
+
+
+def test_a_cut_through_a_ball_is_a_circle_and_mixes_colours():
+    ball = shapes.sphere(4)
+    rising = np.rint(127.5 * (1.0 + ball.vertices)).astype(np.uint8)
+    part = keep_positive(TriangleMesh(ball.vertices, ball.faces, rising), ball.vertices[:, 2] - 0.31)
+    (loop,) = boundary_loops(part)
+    assert_allclose(part.vertices[loop, 2], 0.31, atol=0.02)
+    assert_allclose(part.colors[:, 2], 127.5 * (1.0 + part.vertices[:, 2]), atol=1.5)
+
+
+def test_a_cut_that_leaves_nothing_is_refused():
+    sheet = shapes.grid(2, 2)
+    with pytest.raises(InputError, match="nothing"):
+        keep_positive(sheet, -np.ones(9))
+
+
+def test_samples_are_spread_by_area():
+    pipe = shapes.tube(30, 20)
+    squeezed = TriangleMesh(pipe.vertices * [1.0, 0.2, 1.0], pipe.faces)
+    both = TriangleMesh(
+        np.vstack([pipe.vertices, squeezed.vertices + 1.0]),
+        np.vstack([pipe.faces, squeezed.faces + len(pipe.vertices)]),
+    )
+    points, normals, faces = sample_surface(both, 6000, seed=0)
+    share = (faces >= len(pipe.faces)).mean()
+    assert_allclose(share, area(squeezed) / area(both), atol=2e-3)  # stratified: within a point per face
+    assert_allclose(SurfaceDistance(both).nearest(points).distance, 0.0, atol=1e-12)
+    assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-12)
+
+
+def test_laplacian_of_a_linear_function_vanishes_inside():
+    sheet = shapes.grid(8, 8, 0.1)
+    matrix, mass = laplacian(sheet)
+    rim = np.unique(np.concatenate(boundary_loops(sheet)))
+    inside = np.setdiff1d(np.arange(81), rim)
+    # Right angles have cotangent zero and are kept at 0.05: alike on both sides of each edge, so still exact here.
+    assert_allclose((matrix @ (sheet.vertices @ [2.0, -1.0, 0.0]))[inside], 0.0, atol=1e-12)
+    assert_allclose(mass.sum(), 0.64, rtol=1e-12)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_extension_of_a_linear_function_is_that_function(order):
+    sheet = shapes.grid(8, 8, 0.1)
+    free = np.abs(sheet.vertices[:, :2] - 0.4).max(axis=1) < 0.15
+    values = sheet.vertices @ np.array([[1.0], [2.0], [0.0]])
+    blanked = np.where(free[:, None], 99.0, values)
+    assert_allclose(extend(sheet, blanked, free, order), values, atol=1e-9)
+
+
+def test_paths_along_edges_are_as_long_as_the_grid_says():
+    sheet = shapes.grid(10, 10, 0.1)
+    found = distance_from(sheet, np.array([0]), limit=0.55)
+    along = np.arange(6) * 11  # vertices along the first column
+    assert_allclose(found[along], 0.1 * np.arange(6), atol=1e-12)
+    assert np.isinf(found[-1])
+
+
+def test_splitting_leaves_area_rim_and_short_edges():
+    fan = TriangleMesh(
+        np.vstack([[[0, 0, 0]], [[np.cos(t), np.sin(t), 0] for t in np.linspace(0, 2 * np.pi, 30, endpoint=False)]]),
+        [[0, 1 + k, 1 + (k + 1) % 30] for k in range(30)],
+    )
+    split = split_long_edges(fan, 0.25)
+    pair = edges(split)
+    inner = edge_faces(split)[:, 1] >= 0
+    length = np.linalg.norm(split.vertices[pair[:, 0]] - split.vertices[pair[:, 1]], axis=1)
+    assert length[inner].max() <= 0.25
+    assert_allclose(area(split), area(fan), rtol=1e-12)
+    assert len(boundary_loops(split)[0]) == 30

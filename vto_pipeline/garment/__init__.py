@@ -1,0 +1,1 @@
+"""From a scanned surface to a garment: alignment, subtraction, openings, simulation mesh."""

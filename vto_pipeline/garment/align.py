@@ -1,0 +1,119 @@
+"""Bring the scan of a dressed mannequin into the mannequin's frame."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import Field
+
+from vto_pipeline.errors import GarmentError
+from vto_pipeline.garment.coarse_align import PlacementSearch, tilted_rotations, upright_rotations
+from vto_pipeline.garment.robust_icp import Placed, refine
+from vto_pipeline.geometry.sampling import sample_surface
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.geometry.topology import face_area_vectors, face_normals
+from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.settings import Config
+
+COARSE_CELL = 0.02
+COARSE_BANDS = np.geomspace(0.04, 0.008, 15)
+FINE_BANDS = 12
+TIGHTENINGS = 5
+BAND_SIGMAS = 1.5
+"""The band ends at so many standard deviations of the scan's noise: tight cloth lies hardly further out. The noise
+looks larger while the placement is off, so that the band is tightened several times."""
+LEAST_BAND = 5e-4
+SPACING = 0.01
+"""Scan noise is taken as independent from one such square to the next when the uncertainty is estimated [m]."""
+
+
+class AlignConfig(Config):
+    """How the scan is brought onto the mannequin."""
+
+    samples: int = Field(8000, ge=1000, le=100_000, description="scan points used")
+    yaw_starts: int = Field(24, ge=4, le=180, description="directions tried about the vertical")
+    candidates: int = Field(6, ge=1, le=50, description="placements refined")
+    widest_band_mm: float = Field(3.0, ge=0.2, le=20, description="beyond this a point is never bare mannequin [mm]")
+    enough_bare: float = Field(0.03, ge=0, le=1, description="least share of the scan that must lie on bare mannequin")
+    upright_bare: float = Field(0.08, ge=0, le=1, description="with less than this share, other up axes are tried too")
+    most_inside: float = Field(0.02, ge=0, le=1, description="largest share of the scan inside the mannequin")
+    worst_sigma_mm: float = Field(1.0, ge=0.01, le=50, description="largest placement uncertainty accepted [mm]")
+
+
+def align_to_mannequin(surface: TriangleMesh, mannequin: TriangleMesh, config: AlignConfig, job: Job) -> FloatArray:
+    """Return mannequin_from_surface, rigid, shape (4, 4).
+
+    Only what shows of the bare mannequin (neck, forearms, stand) tells the placement; the garment stands off outwards
+    and is trimmed, and nothing may lie inside. All translations of many rotations are scored at once, the best
+    placements refined by robust point-to-plane steps, the best of these kept.
+
+    Raises:
+        GarmentError: too little bare mannequin shows, what shows leaves some motion undetermined, or too much of the
+            scan lies inside.
+    """
+    distance = SurfaceDistance(mannequin)
+    normals_there = face_normals(mannequin)
+    points, normals, _ = sample_surface(surface, config.samples, job.seed)
+    few = slice(None, None, max(config.samples // 2000, 1))
+    search = PlacementSearch(points, mannequin, distance, COARSE_CELL)
+
+    def best_of(rotations: list[FloatArray]) -> Placed:
+        scored = sorted((search.best(rotation) for rotation in rotations), key=lambda found: -found[0])
+        starts = [placement for _, placement in scored[: config.candidates]]
+        rough = [refine(points[few], normals[few], distance, normals_there, start, COARSE_BANDS) for start in starts]
+        best = min(rough, key=lambda placed: placed.cost)
+        bands = np.geomspace(COARSE_BANDS[-1], config.widest_band_mm * 1e-3, FINE_BANDS)
+        placed = refine(points, normals, distance, normals_there, best.mannequin_from_surface, bands)
+        for _ in range(TIGHTENINGS):
+            band = float(np.clip(BAND_SIGMAS * placed.noise, LEAST_BAND, bands[-1]))
+            bands = np.geomspace(bands[-1], band, FINE_BANDS)
+            placed = refine(points, normals, distance, normals_there, placed.mannequin_from_surface, bands)
+        return placed
+
+    job.progress(0.1, "trying upright placements")
+    placed = best_of(upright_rotations(config.yaw_starts))
+    fits = placed.bare.mean() >= config.upright_bare and placed.inside <= config.most_inside
+    if fits and not job.force_all:
+        reason = f"{placed.bare.mean():.0%} of the upright scan lies on bare mannequin, {placed.inside:.1%} inside it"
+        job.leave_out("other up axes", reason)
+    else:
+        job.progress(0.4, "trying other up axes")
+        placed = min((placed, best_of(tilted_rotations(12, np.deg2rad(15.0)))), key=lambda p: p.cost)
+    return _accept(placed, surface, config, job)
+
+
+def _accept(placed: Placed, surface: TriangleMesh, config: AlignConfig, job: Job) -> FloatArray:
+    """Measure the placement, and refuse one that the bare parts do not determine."""
+    share = float(placed.bare.mean())
+    if share < config.enough_bare:
+        raise GarmentError(
+            f"only {share:.1%} of the scan lies on bare mannequin, at least {config.enough_bare:.0%} is needed",
+            hint="is it the right mannequin, in metres? let neck, arms or stand show in the scan",
+        )
+    if placed.inside > config.most_inside:
+        raise GarmentError(
+            f"{placed.inside:.1%} of the scan lies inside the mannequin, at most {config.most_inside:.0%} may",
+            hint="is it the right mannequin, in metres, in the same pose?",
+        )
+    sigma = _uncertainty(placed, surface, config.samples)
+    job.measure(
+        inlier_rms_mm=placed.rms * 1e3, inlier_share=share, inside_share=placed.inside, uncertainty_mm=sigma * 1e3
+    )
+    if sigma > config.worst_sigma_mm * 1e-3:
+        raise GarmentError(
+            f"what shows of the mannequin leaves its placement uncertain by {sigma * 1e3:.1f} mm, "
+            f"at most {config.worst_sigma_mm:g} mm is allowed",
+            hint="let more of the mannequin show, on several sides",
+        )
+    return placed.mannequin_from_surface
+
+
+def _uncertainty(placed: Placed, surface: TriangleMesh, samples: int) -> float:
+    """Return the standard deviation of the least determined motion, as a displacement half the scan's size out [m]."""
+    lever = 0.5 * float(np.ptp(surface.vertices, axis=0).max())
+    scale = np.array([1.0 / lever] * 3 + [1.0] * 3)
+    area = float(np.linalg.norm(face_area_vectors(surface), axis=1).sum())
+    independent = min(area / samples / SPACING**2, 1.0)  # samples closer than the noise's reach do not add up
+    weakest = float(np.linalg.eigvalsh(placed.normal_matrix * np.outer(scale, scale))[0]) * independent
+    return float(placed.rms / np.sqrt(max(weakest, 1e-12)))

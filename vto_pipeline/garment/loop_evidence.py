@@ -1,0 +1,89 @@
+"""Is a boundary loop a real opening of the garment, or a hole in the scan?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.geometry.topology import boundary_walks, face_normals, half_edges
+from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.mesh import TriangleMesh
+
+DEEP = 0.2
+"""A body part goes through a loop when it is this share of the loop's radius deep, and at least a tenth of the disc."""
+RIM_OUTSIDE = 0.8
+"""Share of the rim that must stay outside the mannequin while the disc is moved inwards."""
+RINGS = np.arange(0.5, 10.0) / 10.0
+
+
+@dataclass(frozen=True)
+class LoopShape:
+    """A boundary loop measured.
+
+    Args:
+        walk: Boundary half-edges in order, shape (L,).
+        loop: The vertices where they start, shape (L,).
+        perimeter: [m].
+        center: Of the curve [m], shape (3,).
+        normal: Of the disc that would close it, out of the garment, unit, shape (3,).
+        tubular: How much the surface runs across that disc: 1 at the end of a tube, 0 at a hole in a sheet.
+    """
+
+    walk: IntArray
+    loop: IntArray
+    perimeter: float
+    center: FloatArray
+    normal: FloatArray
+    tubular: float
+
+
+def measure_loops(mesh: TriangleMesh) -> list[LoopShape]:
+    """Measure each boundary loop of a garment."""
+    start, normals = half_edges(mesh)[:, 0], face_normals(mesh)
+    return [_measure(mesh, walk, start[walk], normals[walk // 3]) for walk in boundary_walks(mesh)]
+
+
+def _measure(mesh: TriangleMesh, walk: IntArray, loop: IntArray, beside: FloatArray) -> LoopShape:
+    """Measure one loop; beside: the normals of its faces, shape (L, 3)."""
+    length, center, normal = _disc(mesh.vertices[loop])
+    tubular = 1.0 - float(np.average(np.abs(beside @ normal), weights=length))
+    return LoopShape(walk, loop, float(length.sum()), center, normal, tubular)
+
+
+def _disc(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the lengths of a loop's edges (L,), its centre, and the unit normal of its disc, out of the garment."""
+    after = np.roll(points, -1, axis=0)
+    length = np.linalg.norm(after - points, axis=1)
+    center = ((points + after) * length[:, None]).sum(axis=0) / (2.0 * length.sum())
+    area = -0.5 * np.cross(points - center, after - center).sum(axis=0)  # a filling runs against the boundary
+    return length, center, area / max(float(np.linalg.norm(area)), 1e-12)
+
+
+def encloses(points: FloatArray, distance: SurfaceDistance, reach: float) -> bool:
+    """Return whether the mannequin passes through a loop, or ends not far inside it.
+
+    The loop is spanned by a disc; the disc is moved into the garment by up to `reach`. A body part goes through when it
+    fills the middle of the disc while the rim stays outside of it. Before a hole in a sheet over the body,
+    middle and rim go inside together.
+
+    Args:
+        points: The loop in order, running as a boundary does [m], shape (L, 3).
+        distance: Signed distances to the mannequin.
+        reach: How far inside the body part may end [m].
+    """
+    length, center, normal = _disc(points)
+    radius = float(length.sum()) / (2.0 * np.pi)
+    disc = (center + RINGS[:, None, None] * (points - center)).reshape(-1, 3)
+    area = np.repeat(RINGS, len(points))
+    for shift in np.linspace(0.0, reach, 7):
+        inward = -shift * normal
+        outside = float(np.mean(distance.signed(points + inward).distance > -0.05 * radius))
+        if shift > 0.0 and outside < RIM_OUTSIDE:  # unmoved, the rim is cloth: what of it lies inside was bridged there
+            return False
+        depth = -distance.signed(disc + inward).distance
+        filled = float(np.average(depth > 0.0, weights=area))
+        if depth.max() > DEEP * radius and filled > 0.1:
+            return True
+    return False

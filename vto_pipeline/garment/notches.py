@@ -1,0 +1,161 @@
+"""Bays in the rim of an opening: scan holes that happen to reach it, as at the underside of a sleeve."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vto_pipeline.garment.loop_evidence import encloses
+from vto_pipeline.garment.rims import smooth_curve
+from vto_pipeline.geometry.holes import fill_bay
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.geometry.topology import boundary_walks, half_edges
+from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.mesh import TriangleMesh
+
+DETOUR = 1.6
+"""A rim whose way round a bay is so many times longer than across is notched; half a circle is π/2."""
+LEAST_DETOUR, LEAST_DEPTH = 0.03, 0.012
+"""Smaller bays are left to the fairing of rims [m]. Depth is into the garment: folds of a hem are no bays."""
+ROUNDER = 1.1
+"""A rim must become rounder by this factor when its bay is closed."""
+GRAZING = 0.15
+"""A mouth may cut a curved mannequin by this share of its width, as over a shoulder."""
+TANGENT = 0.02
+"""The direction of a rim beside a bay is taken over this length [m]."""
+LOOKED_AT = 120
+"""Points of each rim between which bays are looked for."""
+ROUNDS = 3
+"""How often bays are looked for: one rim may have several."""
+WAVELENGTH = 0.025
+"""Bays are looked for on the rim without its zigzag [m]."""
+
+
+def close_notches(
+    mesh: TriangleMesh, distance: SurfaceDistance, least_perimeter: float, reach: float
+) -> tuple[TriangleMesh, int]:
+    """Return the mesh with the bays of its rims filled, and how many there were.
+
+    The line across a bay runs outside the mannequin or grazes it, and the rim that is left goes round the mannequin.
+
+    Args:
+        mesh: The garment.
+        distance: Signed distances to the mannequin.
+        least_perimeter: Shorter loops are not looked at [m].
+        reach: How far inside an opening the mannequin may end [m].
+    """
+    closed = 0
+    for _ in range(ROUNDS):
+        rims = [walk for walk in boundary_walks(mesh) if _length(mesh, walk) > least_perimeter]
+        bays = [bay for walk in rims if (bay := _worst_bay(mesh, walk, distance, least_perimeter, reach)) is not None]
+        for shore, directions in bays:
+            mesh = _bridge(mesh, shore, directions)
+        if not bays:
+            break
+        closed += len(bays)
+    return mesh, closed
+
+
+def _length(mesh: TriangleMesh, walk: IntArray) -> float:
+    start, end = half_edges(mesh)[walk].T
+    return float(np.linalg.norm(mesh.vertices[end] - mesh.vertices[start], axis=1).sum())
+
+
+def _worst_bay(
+    mesh: TriangleMesh, walk: IntArray, distance: SurfaceDistance, least_perimeter: float, reach: float
+) -> tuple[IntArray, FloatArray] | None:
+    """Return the half-edges round the largest bay of a boundary loop, and the directions in which the rim comes to it
+    and goes on after it, shape (2, 3); None when there is no bay."""
+    points = mesh.vertices[half_edges(mesh)[walk, 0]]
+    for _ in range(2):
+        points = smooth_curve(points, WAVELENGTH)
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1))])
+    at = np.unique(np.searchsorted(along[:-1], np.arange(LOOKED_AT) / LOOKED_AT * along[-1]).clip(max=len(walk) - 1))
+    for start, end in _likely_bays(points, along, at, distance, least_perimeter):
+        left = at[np.argsort(np.mod(at - end, len(walk)))]  # from the bay's end round to its start
+        left = left[: np.count_nonzero(np.mod(at - end, len(walk)) <= np.mod(start - end, len(walk)))]
+        mouth = points[start] + np.linspace(0.0, 1.0, 12)[1:-1, None] * (points[end] - points[start])
+        if encloses(np.vstack([points[left], mouth]), distance, reach):
+            before = points[start] - points[_further(along, start, -TANGENT)]
+            after = points[_further(along, end, TANGENT)] - points[end]
+            shore = np.roll(walk, -start)[: (end - start) % len(walk)]
+            return shore, np.stack([before, after]) / np.linalg.norm([before, after], axis=1, keepdims=True)
+    return None
+
+
+def _likely_bays(
+    points: FloatArray, along: FloatArray, at: IntArray, distance: SurfaceDistance, least_perimeter: float
+) -> list[tuple[int, int]]:
+    """Return where bays may start and end, the best for each start, the best of all first.
+
+    The best leaves the roundest rim: greatest 4π area / perimeter².
+    """
+    steps = np.arange(1, len(at) - 1)
+    i, j = at[:, None], at[(np.arange(len(at))[:, None] + steps) % len(at)]
+    arc = np.mod(along[j] - along[i], along[-1])
+    across = np.linalg.norm(points[j] - points[i], axis=2)
+    height = points @ _axis(points)
+    depth = 0.5 * (height[i] + height[j]) - np.minimum.accumulate(height[j], axis=1)
+    left = along[-1] - arc + across
+    round_left = _roundness_left(points, i, j, left)
+    whole = 4.0 * np.pi * np.linalg.norm(_area_vector(points)) / along[-1] ** 2
+    bay = (arc - DETOUR * across > LEAST_DETOUR) & (depth > LEAST_DEPTH)
+    row, column = np.nonzero(bay & (left > least_perimeter) & (round_left > ROUNDER * whole))
+    free = _outside(points[at[row]], points[j[row, column]], distance)
+    row, column = row[free], column[free]
+    worth = np.full(arc.shape, -np.inf)
+    worth[row, column] = round_left[row, column]
+    best = np.argmax(worth, axis=1)
+    found = worth[np.arange(len(at)), best]
+    order = [int(r) for r in np.argsort(-found, kind="stable") if np.isfinite(found[r])]
+    return [(int(at[r]), int(j[r, best[r]])) for r in order]
+
+
+def _roundness_left(points: FloatArray, start: IntArray, end: IntArray, length: FloatArray) -> FloatArray:
+    """Return how round the rim is that is left when the bays from start to end are closed by straight lines."""
+    swept = 0.5 * np.cumsum(np.cross(points, np.roll(points, -1, axis=0)), axis=0)
+    before = np.vstack([np.zeros(3), swept])  # area vector of the path from the first point to each
+    bay = before[end] - before[start] + np.where((end < start)[..., None], swept[-1], 0.0)
+    area = swept[-1] - bay + 0.5 * np.cross(points[start], points[end])
+    return 4.0 * np.pi * np.linalg.norm(area, axis=-1) / np.square(length)
+
+
+def _axis(points: FloatArray) -> FloatArray:
+    """Return the unit normal of the disc in a rim, out of the garment: a filling runs against the boundary."""
+    area = _area_vector(points)
+    return -area / np.linalg.norm(area)
+
+
+def _area_vector(points: FloatArray) -> FloatArray:
+    return 0.5 * np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0)
+
+
+def _further(along: FloatArray, place: int, by: float) -> int:
+    """Return the place on a rim by so much further along [m]."""
+    return int(np.searchsorted(along[:-1], np.mod(along[place] + by, along[-1])) % (len(along) - 1))
+
+
+def _bridge(mesh: TriangleMesh, shore: IntArray, directions: FloatArray) -> TriangleMesh:
+    """Fill a bay up to the cubic that goes on as the rim does on both sides of it.
+
+    The tangents of the Hermite cubic are as long as those that make it a circle's arc, were the turn between them one.
+    """
+    halves = half_edges(mesh)
+    first, last = halves[shore[0], 0], halves[shore[-1], 1]
+    start, end = mesh.vertices[first], mesh.vertices[last]
+    chord = float(np.linalg.norm(end - start))
+    turn = np.arccos(np.clip(directions[0] @ directions[1], -0.5, 1.0))
+    pull = directions * chord / np.cos(turn / 4.0) ** 2
+    edge = np.linalg.norm(mesh.vertices[halves[shore, 1]] - mesh.vertices[halves[shore, 0]], axis=1).mean()
+    t = np.linspace(0.0, 1.0, int(np.ceil(1.1 * chord / edge)) + 1)[1:-1, None]
+    mouth = (2 * t**3 - 3 * t**2 + 1) * start + (t**3 - 2 * t**2 + t) * pull[0]
+    mouth += (3 * t**2 - 2 * t**3) * end + (t**3 - t**2) * pull[1]
+    return fill_bay(mesh, shore, mouth)
+
+
+def _outside(start: FloatArray, end: FloatArray, distance: SurfaceDistance) -> NDArray[np.bool_]:
+    """Return which straight lines hardly go into the mannequin, shape (N,)."""
+    share = np.linspace(0.1, 0.9, 9)[:, None, None]
+    line = (1.0 - share) * start + share * end
+    clearance = distance.signed(line.reshape(-1, 3)).distance.reshape(len(share), -1)
+    return clearance.min(axis=0, initial=np.inf) > -GRAZING * np.linalg.norm(end - start, axis=1)

@@ -1,0 +1,149 @@
+"""Tell real openings from holes in the scan; fill these, clean the rims of those."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from vto_pipeline.errors import GarmentError
+from vto_pipeline.garment.loop_evidence import LoopShape, encloses, measure_loops
+from vto_pipeline.garment.notches import close_notches
+from vto_pipeline.garment.rims import drop_crumbs, fair_rims, largest_piece, trim_ledges
+from vto_pipeline.geometry.decimate import decimate, faces_at
+from vto_pipeline.geometry.holes import fill_holes
+from vto_pipeline.geometry.remesh import edge_lengths
+from vto_pipeline.geometry.repair import RepairConfig, repair
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.geometry.topology import face_area_vectors, face_components
+from vto_pipeline.model.garment import Opening
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.settings import Config
+
+
+class OpeningsConfig(Config):
+    """What counts as an opening, and how far its rim is cleaned."""
+
+    edge_mm: float = Field(4.0, ge=0.5, le=50, description="finer scans are thinned to about this edge length [mm]")
+    expected: int | None = Field(None, ge=0, le=50, description="openings the garment has; another count is an error")
+    ledge_mm: float = Field(40.0, ge=0, le=200, description="widest ledge between cloth and mannequin looked for [mm]")
+    crumb_edges: float = Field(4.0, ge=0, le=50, description="what hangs on by less is dropped [edge lengths]")
+    fair_mm: float = Field(40.0, ge=0, le=200, description="zigzag shorter than this is taken out of rims [mm]")
+    reach_mm: float = Field(60.0, ge=0, le=300, description="how far inside an opening the mannequin may end [mm]")
+    clearance_mm: float = Field(1.0, ge=0, le=20, description="fillings lie at least so far off the mannequin [mm]")
+    least_perimeter_mm: float = Field(120.0, ge=0, le=5000, description="smaller loops are never openings [mm]")
+    tubular: float = Field(0.4, ge=0, le=1, description="without mannequin: how much the cloth runs across an opening")
+
+
+def close_scan_holes(
+    shell: TriangleMesh, mannequin: TriangleMesh | None, config: OpeningsConfig, job: Job
+) -> tuple[TriangleMesh, list[Opening], NDArray[np.bool_]]:
+    """Fill what the scanner missed and keep what the tailor left open.
+
+    With a mannequin a loop is an opening when the body passes through it. Without one, when it is long and the cloth
+    runs across its plane like the end of a tube; that is a guess, and said so.
+
+    Args:
+        shell: The garment cut out of the scan, oriented outward.
+        mannequin: In the same frame, or None.
+        config: Settings.
+        job: Is told counts and perimeters.
+
+    Returns:
+        The garment in one piece; its openings, highest first; which of its vertices were observed, shape (V,).
+
+    Raises:
+        GarmentError: another number of openings than expected, or a hole that cannot be filled.
+    """
+    job.progress(0.0, "cleaning rims")
+    thinned = _thinned(shell, config.edge_mm * 1e-3, job)
+    trimmed = thinned if mannequin is None else trim_ledges(thinned, mannequin, config.ledge_mm * 1e-3)
+    edge = float(np.median(edge_lengths(trimmed)))
+    clean = repair(drop_crumbs(trimmed, config.crumb_edges * edge), RepairConfig(weld_mm=0.0), job)
+    distance = None if mannequin is None else SurfaceDistance(mannequin)
+    bridged, notches = clean, 0
+    if distance is not None:
+        bridged, notches = close_notches(clean, distance, config.least_perimeter_mm * 1e-3, config.reach_mm * 1e-3)
+    shapes = measure_loops(bridged)
+    is_opening = _classify(bridged, shapes, distance, config, job)
+    count = sum(is_opening)
+    if config.expected is not None and count != config.expected:
+        raise GarmentError(f"{count} openings found, {config.expected} expected: {_listing(shapes, is_opening)}")
+    job.progress(0.5, f"filling {len(shapes) - count} scan holes")
+    if count == len(shapes):
+        job.leave_out("hole filling", "every boundary loop is a real opening")
+    filled = fill_holes(bridged, [shape.walk for shape, real in zip(shapes, is_opening, strict=True) if not real])
+    observed = np.arange(len(filled.vertices)) < len(clean.vertices)
+    if distance is not None:
+        filled = _pushed_out(filled, ~observed, distance, config.clearance_mm * 1e-3)
+    final = fair_rims(filled, config.fair_mm * 1e-3)
+    if face_components(final)[0] != 1:
+        raise GarmentError(f"the garment fell into {face_components(final)[0]} pieces")
+    found = list_openings(final)
+    job.measure(
+        openings=len(found),
+        filled_holes=len(shapes) - count,
+        filled_notches=notches,
+        perimeters_mm=[round(opening.perimeter * 1e3, 1) for opening in found],
+        trimmed_cm2=(_area(shell) - _area(clean)) * 1e4,
+        unobserved_share=1.0 - _area(final, np.all(observed[final.faces], axis=1)) / _area(final),
+    )
+    return final, found, observed
+
+
+def list_openings(garment: TriangleMesh) -> list[Opening]:
+    """Return the boundary loops of a finished garment, highest first."""
+    found = [Opening(s.loop, s.perimeter, s.center, s.normal) for s in measure_loops(garment)]
+    return sorted(found, key=lambda opening: (-opening.center[1], opening.center[0]))
+
+
+def _thinned(shell: TriangleMesh, edge: float, job: Job) -> TriangleMesh:
+    """Return the shell without triangles much smaller than wanted; what the thinning breaks is mended."""
+    faces = faces_at(shell, edge)
+    if len(shell.faces) <= faces:
+        job.leave_out("thinning", f"{len(shell.faces)} faces, {faces} are wanted")
+        return shell
+    job.note(f"thinned {len(shell.faces)} faces to {faces}")
+    return largest_piece(repair(decimate(shell, faces, aggressiveness=3.0), RepairConfig(weld_mm=0.0), job))
+
+
+def _pushed_out(
+    mesh: TriangleMesh, which: NDArray[np.bool_], distance: SurfaceDistance, clearance: float
+) -> TriangleMesh:
+    """Return the mesh with some vertices moved out to a distance [m] from the mannequin where they are nearer."""
+    near = distance.signed(mesh.vertices[which])
+    outward = (mesh.vertices[which] - near.point) / np.where(near.distance == 0.0, 1.0, near.distance)[:, None]
+    vertices = mesh.vertices.copy()
+    vertices[which] += np.maximum(clearance - near.distance, 0.0)[:, None] * outward
+    return TriangleMesh(vertices, mesh.faces, mesh.colors)
+
+
+def _classify(
+    mesh: TriangleMesh, shapes: list[LoopShape], distance: SurfaceDistance | None, config: OpeningsConfig, job: Job
+) -> list[bool]:
+    """Return which loops are real openings."""
+    long_enough = [shape.perimeter >= config.least_perimeter_mm * 1e-3 for shape in shapes]
+    if distance is None:
+        real = [ok and shape.tubular >= config.tubular for ok, shape in zip(long_enough, shapes, strict=True)]
+        if not all(real):
+            job.warn(f"no mannequin to tell openings from scan holes: {_listing(shapes, real)}")
+        return real
+    reach = config.reach_mm * 1e-3
+    return [
+        ok and encloses(mesh.vertices[shape.loop], distance, reach)
+        for ok, shape in zip(long_enough, shapes, strict=True)
+    ]
+
+
+def _listing(shapes: list[LoopShape], real: list[bool]) -> str:
+    """Return each loop with its verdict, length and place, for messages."""
+    return "; ".join(
+        f"{'opening' if is_opening else 'scan hole'} of {shape.perimeter * 1e3:.0f} mm at "
+        f"({shape.center[0]:.2f}, {shape.center[1]:.2f}, {shape.center[2]:.2f}) m"
+        for shape, is_opening in zip(shapes, real, strict=True)
+    )
+
+
+def _area(mesh: TriangleMesh, which: NDArray[np.bool_] | slice = slice(None)) -> float:
+    return float(np.linalg.norm(face_area_vectors(mesh)[which], axis=1).sum())

@@ -1,0 +1,139 @@
+"""Clean edges for the openings of a scanned garment: no ledges to the body, no crumbs, no zigzag."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from vto_pipeline.geometry.cut import keep_positive
+from vto_pipeline.geometry.geodesic import distance_from
+from vto_pipeline.geometry.laplace import extend
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.geometry.topology import (
+    boundary_loops,
+    edge_faces,
+    face_area_vectors,
+    face_components,
+    face_normals,
+    submesh,
+)
+from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.mesh import TriangleMesh
+
+LEDGE_COSINE = 0.45
+"""A face near a rim that is steeper to the mannequin than this bridges the gap from cloth to body."""
+ROUNDS = 4
+"""A rim is smoothed so often, for the arc length of a zigzag overstates the curve's and each round measures it anew."""
+BAND = 4.0
+"""Fairing a rim moves the surface within this many times the largest displacement."""
+
+
+def trim_ledges(shell: TriangleMesh, mannequin: TriangleMesh, widest: float) -> TriangleMesh:
+    """Return the shell without the faces that lead from a rim down to the mannequin.
+
+    A fused scan closes the gap under a hem or in a collar by a ledge. It hangs together with the rim, stands across
+    the mannequin's surface, and is no wider than the gap.
+
+    Args:
+        shell: The cut-out garment.
+        mannequin: What it was on.
+        widest: The widest ledge looked for [m].
+    """
+    loops = boundary_loops(shell)
+    if not loops:
+        return shell
+    middle = shell.vertices[shell.faces].mean(axis=1)
+    nearest = SurfaceDistance(mannequin).nearest(middle)
+    facing = np.einsum("fd,fd->f", face_normals(shell), face_normals(mannequin)[nearest.face])
+    rim = np.concatenate(loops)
+    to_rim, _ = cKDTree(shell.vertices[rim]).query(middle, distance_upper_bound=widest)
+    steep = (facing < LEDGE_COSINE) & np.isfinite(to_rim)
+    on_rim = np.zeros(len(shell.vertices), dtype=bool)
+    on_rim[rim] = True
+    ledge = _reached(shell, steep, steep & (on_rim[shell.faces].sum(axis=1) >= 2))
+    return largest_piece(submesh(shell, ~ledge)[0]) if ledge.any() else shell
+
+
+def drop_crumbs(shell: TriangleMesh, width: float) -> TriangleMesh:
+    """Return the shell without what hangs on it by less than `width` [m]: erode by half of it, keep the largest piece,
+    grow back."""
+    loops = boundary_loops(shell)
+    if not loops:
+        return shell
+    radius = 0.5 * width
+    depth = distance_from(shell, np.concatenate(loops), 4.0 * radius)
+    inside = np.isfinite(depth) & (depth <= radius)
+    kept_faces = ~np.any(inside[shell.faces], axis=1)
+    if not kept_faces.any():
+        return shell
+    core, source = submesh(shell, kept_faces)
+    core_faces = _largest_mask(core)
+    seeds = source[np.unique(core.faces[core_faces])]
+    reach = distance_from(shell, seeds.astype(np.int32), 8.0 * radius)
+    return largest_piece(keep_positive(shell, 1.5 * radius - np.minimum(reach, 8.0 * radius)))
+
+
+def fair_rims(shell: TriangleMesh, wavelength: float) -> TriangleMesh:
+    """Return the shell with zigzag shorter than a wavelength [m] taken out of its boundary loops.
+
+    Each loop is smoothed as a curve by its arc length; the surface nearby follows by a harmonic displacement.
+    """
+    loops = boundary_loops(shell)
+    if not loops:
+        return shell
+    target = shell.vertices.copy()
+    for loop in loops:
+        for _ in range(ROUNDS):
+            target[loop] = smooth_curve(target[loop], wavelength)
+    rim = np.concatenate(loops)
+    largest = float(np.linalg.norm(target - shell.vertices, axis=1).max())
+    near = np.isfinite(distance_from(shell, rim, max(BAND * largest, 1e-9)))
+    free = near.copy()
+    free[rim] = False
+    band, source = submesh(shell, np.any(near[shell.faces], axis=1))
+    moved = shell.vertices.copy()
+    moved[source] += extend(band, (target - shell.vertices)[source], free[source], order=1)
+    return TriangleMesh(moved, shell.faces, shell.colors)
+
+
+def smooth_curve(points: FloatArray, wavelength: float) -> FloatArray:
+    """Return a closed curve without its waves shorter than `wavelength` [m]; no point moves along it.
+
+    A Gaussian low-pass over arc length; the shrinking it brings is taken back by filtering what it removed once more.
+    """
+    count = len(points)
+    closed = np.vstack([points, points[:1]])
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
+    even = np.arange(count + 1) / count * along[-1]
+    curve = np.column_stack([np.interp(even[:-1], along, closed[:, d]) for d in range(3)])
+    frequency = np.fft.rfftfreq(count, along[-1] / count)
+    gain = np.exp(-0.5 * np.square(frequency * wavelength))
+    gain = gain * (2.0 - gain)
+    move = np.fft.irfft(np.fft.rfft(curve, axis=0) * gain[:, None], count, axis=0) - curve
+    move = np.vstack([move, move[:1]])
+    return points + np.column_stack([np.interp(along[:-1], even, move[:, d]) for d in range(3)])
+
+
+def largest_piece(mesh: TriangleMesh) -> TriangleMesh:
+    """Return the piece of largest area."""
+    return submesh(mesh, _largest_mask(mesh))[0]
+
+
+def _largest_mask(mesh: TriangleMesh) -> NDArray[np.bool_]:
+    count, piece = face_components(mesh)
+    area = np.bincount(piece, np.linalg.norm(face_area_vectors(mesh), axis=1), count)
+    return piece == int(np.argmax(area))
+
+
+def _reached(mesh: TriangleMesh, among: NDArray[np.bool_], seeds: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the faces connected to a seed through edges between faces of the set, shape (F,)."""
+    beside = edge_faces(mesh)
+    beside = beside[beside[:, 1] >= 0]
+    beside = beside[among[beside].all(axis=1)]
+    count = len(mesh.faces)
+    graph = coo_matrix((np.ones(len(beside), np.int8), (beside[:, 0], beside[:, 1])), (count, count))
+    pieces, piece = connected_components(graph, directed=False)
+    return np.bincount(piece, seeds, pieces)[piece] > 0

@@ -1,0 +1,128 @@
+"""Take the mannequin away: which part of the scan is the garment, and its open shell."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import Field
+
+from vto_pipeline.errors import GarmentError
+from vto_pipeline.garment.color_model import cielab, color_evidence
+from vto_pipeline.garment.graph_cut import cut
+from vto_pipeline.garment.robust_icp import scan_noise
+from vto_pipeline.geometry.cut import keep_positive
+from vto_pipeline.geometry.repair import RepairConfig, repair
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.geometry.smooth import smooth_values
+from vto_pipeline.geometry.topology import (
+    edges,
+    face_area_vectors,
+    face_components,
+    face_normals,
+    submesh,
+    vertex_normals,
+)
+from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.garment import SurfaceLabels
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.settings import Config
+
+CERTAIN = 6.0
+"""Log-likelihood ratio up to which colour is believed, and the distance of what lies close; far cloth counts double."""
+TIGHT = 0.007
+"""Cloth is as dense close to the mannequin as if it were spread evenly over this distance [m]."""
+LEAST_SIGMA = 1e-4
+"""Scans claim to be better than this only by accident [m]."""
+MOST_SIGMA = 5e-3
+
+
+class SubtractConfig(Config):
+    """What tells the garment from the mannequin."""
+
+    thickness_mm: float = Field(0.5, ge=0, le=20, description="of the cloth: it lies at least so far out [mm]")
+    smoothness: float = Field(2.0, ge=0, le=100, description="price of a label boundary, per edge of mean length")
+    color_step: float = Field(15.0, gt=0, le=200, description="CIELAB difference at which a boundary costs 1/e")
+    smallest_piece_cm2: float = Field(20.0, ge=0, le=10_000, description="smaller garment pieces are dropped [cm²]")
+
+
+def label_garment(surface: TriangleMesh, mannequin: TriangleMesh, config: SubtractConfig, job: Job) -> SurfaceLabels:
+    """Divide the scan into garment and the rest by an exact graph cut.
+
+    Evidence per vertex: the signed distance against the noise measured on the bare parts, the colour, and whether the
+    normal agrees with the mannequin's. A boundary is cheap where the colour changes. What lies under the mannequin's
+    lowest point is floor, board or stand.
+
+    Args:
+        surface: The scan in the mannequin's frame.
+        mannequin: What the garment was on.
+        config: Settings.
+        job: Is told the noise and the shares.
+
+    Raises:
+        GarmentError: nothing of the scan stands off from the mannequin.
+    """
+    near = SurfaceDistance(mannequin).signed(surface.vertices)
+    facing = np.einsum("vd,vd->v", vertex_normals(surface), face_normals(mannequin)[near.face])
+    sigma = float(np.clip(scan_noise(near.distance, 4.0 * MOST_SIGMA), LEAST_SIGMA, MOST_SIGMA))
+    floor = surface.vertices[:, 1] < mannequin.vertices[:, 1].min() + 3.0 * sigma
+    thickness = config.thickness_mm * 1e-3
+    sure_garment = (near.distance > thickness + 3.0 * sigma) & ~floor
+    sure_bare = (np.abs(near.distance) < 2.0 * sigma) & (facing > 0.7) & ~floor
+    if not sure_garment.any():
+        raise GarmentError(
+            f"no part of the scan stands off from the mannequin by more than {(thickness + 3 * sigma) * 1e3:.1f} mm",
+            hint="is the garment on the mannequin, and the scan aligned?",
+        )
+    evidence = _distance_evidence(near.distance, sigma, thickness)
+    evidence = np.where(facing < 0.0, np.maximum(evidence, CERTAIN / 2.0), evidence)
+    if surface.colors is None:
+        job.leave_out("colour evidence", "the scan has no colours")
+    elif not sure_bare.any():
+        job.leave_out("colour evidence", "no bare mannequin shows")
+    else:
+        by_color = color_evidence(surface.colors, sure_garment, sure_bare)
+        evidence = evidence + np.clip(by_color, -CERTAIN, CERTAIN)
+    evidence = np.where(floor, -4.0 * CERTAIN, evidence)
+    garment = cut(evidence, edges(surface), _boundary_price(surface, config))
+    job.measure(noise_mm=sigma * 1e3, garment_share=float(garment.mean()))
+    confidence = 1.0 / (1.0 + np.exp(-np.where(garment, evidence, -evidence)))
+    return SurfaceLabels(garment, np.ones(len(garment), dtype=bool), confidence)
+
+
+def extract_garment(surface: TriangleMesh, labels: SurfaceLabels, config: SubtractConfig, job: Job) -> TriangleMesh:
+    """Return the garment as an open shell: cut smoothly along the label boundary, repaired, small pieces dropped.
+
+    A piece stays if it is larger than the limit and touches the mannequin's part of the scan; of these the largest.
+
+    Raises:
+        GarmentError: no piece is left.
+    """
+    side = smooth_values(surface, np.where(labels.garment, 1.0, -1.0), rounds=10)
+    shell = keep_positive(surface, side)
+    shell = repair(shell, RepairConfig(weld_mm=0.001), job)
+    count, piece = face_components(shell)
+    area = np.bincount(piece, np.linalg.norm(face_area_vectors(shell), axis=1), count)
+    if area.max() < config.smallest_piece_cm2 * 1e-4:
+        raise GarmentError(f"the largest piece of garment has {area.max() * 1e4:.1f} cm²")
+    if count > 1:
+        job.note(f"dropped {count - 1} smaller pieces of {(area.sum() - area.max()) * 1e4:.1f} cm² in all")
+    job.measure(area_cm2=float(area.max() * 1e4), dropped_pieces=count - 1)
+    return submesh(shell, piece == int(np.argmax(area)))[0]
+
+
+def _distance_evidence(distance: FloatArray, sigma: float, thickness: float) -> FloatArray:
+    """Return the log-likelihood ratio of cloth, anywhere beyond its thickness, against bare mannequin at zero."""
+    bare = np.square(distance / sigma)
+    cloth = np.square(np.minimum((distance - thickness) / sigma, 0.0))
+    return np.clip(0.5 * (bare - cloth) - np.log(TIGHT / sigma), -CERTAIN, 2.0 * CERTAIN)
+
+
+def _boundary_price(surface: TriangleMesh, config: SubtractConfig) -> FloatArray:
+    """Return the price of cutting each edge, shape (E,): by length, and less where the colour changes."""
+    pair: IntArray = edges(surface)
+    length = np.linalg.norm(surface.vertices[pair[:, 0]] - surface.vertices[pair[:, 1]], axis=1)
+    price = config.smoothness * length / length.mean()
+    if surface.colors is not None:
+        lab = cielab(surface.colors)
+        price = price * np.exp(-np.linalg.norm(lab[pair[:, 0]] - lab[pair[:, 1]], axis=1) / config.color_step)
+    return price

@@ -1,0 +1,137 @@
+"""Which triangles of two surfaces, or of one with itself, pass through each other.
+
+Two triangles meet exactly when an edge of one meets the other; the test is exact in sign (`predicates`) and closed, so
+touching counts. An edge is never held against a triangle with which it shares a vertex: two faces that share one vertex
+are still tested by the edges opposite to it. Weld first: coincident vertices with different indices count as touching.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from vto_pipeline.geometry.predicates import orient2d, orient3d
+from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.mesh import TriangleMesh
+
+
+def intersecting_faces(one: TriangleMesh, other: TriangleMesh) -> IntArray:
+    """Return the pairs (face of one, face of other) that meet, sorted, shape (K, 2)."""
+    vertices = np.vstack([one.vertices, other.vertices])
+    faces = np.vstack([one.faces, other.faces + np.int32(len(one.vertices))])
+    side = np.repeat(np.array([0, 1], np.int8), [len(one.faces), len(other.faces)])
+    pairs = _meeting_pairs(vertices, faces, side)
+    return pairs - np.array([0, len(one.faces)], np.int32)
+
+
+def self_intersections(mesh: TriangleMesh) -> IntArray:
+    """Return the pairs of faces of one mesh that meet otherwise than in their shared vertices, sorted, shape (K, 2)."""
+    vertices, faces = (
+        mesh.vertices.copy(),
+        mesh.faces.copy(),
+    )  # writeable, so that one compiled kernel serves both callers
+    return _meeting_pairs(vertices, faces, np.full(len(faces), 2, np.int8))
+
+
+def _meeting_pairs(vertices: FloatArray, faces: IntArray, side: NDArray[np.int8]) -> IntArray:
+    corners = vertices[faces]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    axis = int(np.argmax(high.max(axis=0) - low.min(axis=0)))  # the longest way is the best to sweep along
+    order = np.argsort(low[:, axis], kind="stable")
+    candidates = _overlapping_boxes(low[order], high[order], side[order], axis)
+    pairs = np.sort(order[candidates], axis=1)
+    pairs = pairs[_triangles_meet(vertices, faces, pairs)]
+    return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].astype(np.int32)
+
+
+@njit(cache=True)
+def _overlapping_boxes(low, high, side, axis):  # type: ignore[no-untyped-def]
+    """Return the pairs of closed boxes that overlap, shape (K, 2); boxes come sorted by low[:, axis].
+
+    Boxes of side 2 pair with each other, of side 0 and 1 only across.
+    """
+    u, v = (axis + 1) % 3, (axis + 2) % 3
+    pairs = np.empty((len(low) + 16, 2), np.int64)
+    count = 0
+    for i in range(len(low)):
+        for j in range(i + 1, len(low)):
+            if low[j, axis] > high[i, axis]:
+                break
+            if side[i] == side[j] and side[i] != 2:
+                continue
+            if low[j, u] > high[i, u] or low[i, u] > high[j, u] or low[j, v] > high[i, v] or low[i, v] > high[j, v]:
+                continue
+            if count == len(pairs):
+                pairs = np.concatenate((pairs, np.empty_like(pairs)))
+            pairs[count, 0], pairs[count, 1] = i, j
+            count += 1
+    return pairs[:count]
+
+
+@njit(cache=True, parallel=True)
+def _triangles_meet(vertices, faces, pairs):  # type: ignore[no-untyped-def]
+    """Return whether each pair of faces meets, shape (K,)."""
+    meet = np.zeros(len(pairs), np.bool_)
+    for i in prange(len(pairs)):
+        one, other = faces[pairs[i, 0]], faces[pairs[i, 1]]
+        meet[i] = _edges_meet(vertices, one, other) or _edges_meet(vertices, other, one)
+    return meet
+
+
+@njit(cache=True)
+def _edges_meet(vertices, edges_of, face):  # type: ignore[no-untyped-def]
+    """Return whether an edge of the one face meets the other face."""
+    for k in range(3):
+        p, q = edges_of[k], edges_of[(k + 1) % 3]
+        shared = False
+        for m in range(3):
+            if face[m] == p or face[m] == q:
+                shared = True
+        if not shared and segment_meets_triangle(
+            vertices[p], vertices[q], vertices[face[0]], vertices[face[1]], vertices[face[2]]
+        ):
+            return True
+    return False
+
+
+@njit(cache=True)
+def segment_meets_triangle(p, q, a, b, c):  # type: ignore[no-untyped-def]
+    """Return whether the closed segment pq and the closed triangle abc have a point in common."""
+    side_p, side_q = orient3d(a, b, c, p), orient3d(a, b, c, q)
+    if side_p * side_q > 0:
+        return False
+    if side_p == 0 and side_q == 0:
+        return _meet_in_plane(p, q, a, b, c)
+    s0, s1, s2 = orient3d(p, q, a, b), orient3d(p, q, b, c), orient3d(p, q, c, a)
+    return (s0 >= 0 and s1 >= 0 and s2 >= 0) or (s0 <= 0 and s1 <= 0 and s2 <= 0)
+
+
+@njit(cache=True)
+def _meet_in_plane(p, q, a, b, c):  # type: ignore[no-untyped-def]
+    """Return whether segment and triangle of one plane meet, seen along the axis nearest to the plane's normal."""
+    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+    nx, ny, nz = abs(uy * vz - uz * vy), abs(uz * vx - ux * vz), abs(ux * vy - uy * vx)
+    i, j = 0, 1
+    if nx >= ny and nx >= nz:
+        i, j = 1, 2
+    elif ny >= nz:
+        i, j = 2, 0
+    inside = True
+    turn = orient2d(a[i], a[j], b[i], b[j], c[i], c[j])
+    for s, e in ((a, b), (b, c), (c, a)):
+        if orient2d(s[i], s[j], e[i], e[j], p[i], p[j]) * turn < 0:
+            inside = False
+        if _segments_meet(p[i], p[j], q[i], q[j], s[i], s[j], e[i], e[j]):
+            return True
+    return inside and turn != 0
+
+
+@njit(cache=True)
+def _segments_meet(px, py, qx, qy, rx, ry, sx, sy):  # type: ignore[no-untyped-def]
+    """Return whether two closed segments of the plane meet."""
+    if max(px, qx) < min(rx, sx) or max(rx, sx) < min(px, qx) or max(py, qy) < min(ry, sy) or max(ry, sy) < min(py, qy):
+        return False
+    across = orient2d(px, py, qx, qy, rx, ry) * orient2d(px, py, qx, qy, sx, sy) <= 0
+    return across and orient2d(rx, ry, sx, sy, px, py) * orient2d(rx, ry, sx, sy, qx, qy) <= 0

@@ -1,0 +1,57 @@
+"""How far points are from a surface, and on which side."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.mesh import TriangleMesh
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """The nearest surface point of each query.
+
+    Args:
+        distance: [m], shape (N,); negative inside where a sign was asked for.
+        face: Which face, shape (N,).
+        point: [m], shape (N, 3).
+    """
+
+    distance: FloatArray
+    face: IntArray
+    point: FloatArray
+
+
+class SurfaceDistance:
+    """Distance queries against one mesh, whose trees are built once.
+
+    Inside is where the generalised winding number is above one half (Barill et al. 2018, "Fast winding numbers for
+    soups and clouds"), so that small holes of the mesh do no harm.
+
+    Args:
+        mesh: The surface, oriented outward.
+    """
+
+    def __init__(self, mesh: TriangleMesh) -> None:
+        import igl
+
+        self._vertices = np.ascontiguousarray(mesh.vertices)
+        self._faces = np.ascontiguousarray(mesh.faces, dtype=np.int64)
+        self._tree = igl.AABB()
+        self._tree.init(self._vertices, self._faces)
+        self._winding = igl.FastWindingNumberBVH()
+        self._winding.init(self._vertices, self._faces)
+
+    def nearest(self, points: FloatArray) -> Nearest:
+        """Return the nearest surface points; distances are not negative."""
+        squared, face, point = self._tree.squared_distance(self._vertices, self._faces, np.ascontiguousarray(points))
+        return Nearest(np.sqrt(squared), face.astype(np.int32), point)
+
+    def signed(self, points: FloatArray) -> Nearest:
+        """Return the nearest surface points; distances are negative inside."""
+        found = self.nearest(points)
+        inside = self._winding.winding_number(np.ascontiguousarray(points)) > 0.5
+        return Nearest(np.where(inside, -found.distance, found.distance), found.face, found.point)
