@@ -1,0 +1,118 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scan_scene import distances, render
+
+from vto_pipeline.errors import ScanError
+from vto_pipeline.model.camera import Intrinsics
+from vto_pipeline.model.frames import DepthMaps
+from vto_pipeline.model.job import Job
+from vto_pipeline.scan.canonical import canonical_mesh
+from vto_pipeline.scan.depth_mask import clean_depth
+from vto_pipeline.scan.fuse import FuseConfig, fuse_depth_frames, fuse_depth_maps
+
+COARSE = FuseConfig(voxel_mm=4)
+
+
+@pytest.fixture(scope="module")
+def true_maps(scene, shot, true_cameras):
+    depth = np.stack([render(scene, true_cameras.intrinsics[0], pose, samples=1)[1] for pose in shot[1]])
+    return DepthMaps(true_cameras.names, true_cameras.intrinsics, shot[1], np.where(depth < 1.25, depth, 0))
+
+
+def test_fused_surface_lies_on_the_truth_and_keeps_both_ends_open(true_maps, shot, scene):
+    job = Job()
+    mesh = fuse_depth_maps(shot[0], true_maps, COARSE, job)
+    tube = mesh.vertices[mesh.vertices[:, 1] > 0.06]
+    error = distances(scene, tube)
+    assert np.percentile(error, 50) < 4e-4
+    assert np.percentile(error, 99) < 6e-3  # 1.5 voxels, what support allows at the rims; a false sheet is 16 mm off
+    assert job.metrics["voxel_mm"] == 4
+    across = np.linalg.norm(mesh.vertices[:, [0, 2]], axis=1)
+    above = (mesh.vertices[:, 1] > 0.47) & (mesh.vertices[:, 1] < 0.6)
+    assert not (above & (across < 0.08)).any()  # no lid
+    assert np.ptp(mesh.colors[mesh.vertices[:, 1] > 0.2], axis=0).min() > 100  # the print came along
+
+
+def test_two_runs_give_the_same_bits(true_maps, shot):
+    first, second = (fuse_depth_maps(shot[0], true_maps, COARSE, Job()) for _ in range(2))
+    assert first.vertices.tobytes() == second.vertices.tobytes()
+    assert first.faces.tobytes() == second.faces.tobytes()
+    assert first.colors.tobytes() == second.colors.tobytes()
+
+
+def test_depth_frames_with_known_poses(walk, scene):
+    frames, poses = walk
+    mesh = fuse_depth_frames(frames, poses, FuseConfig(), Job())
+    error = distances(scene, mesh.vertices[mesh.vertices[:, 1] > 0.06])
+    assert 5e-5 < np.median(error) < 1e-3  # readings have 1 mm of noise
+    assert np.percentile(error, 95) < 3e-3
+
+
+def test_empty_depth_is_refused(true_maps, shot):
+    blank = DepthMaps(true_maps.names, true_maps.intrinsics, true_maps.world_from_cam, np.zeros_like(true_maps.depth))
+    with pytest.raises(ScanError, match="none of 16"):
+        fuse_depth_maps(shot[0], blank, COARSE, Job())
+
+
+def test_view_with_hardly_a_reading_is_left_out(true_maps, shot):
+    """Open3D would abort: it looks at every fourth pixel, and finds none."""
+    thin = true_maps.depth.copy()
+    thin[3] = 0
+    thin[3, 101:103, 101:103] = 0.9
+    job = Job()
+    maps = DepthMaps(true_maps.names, true_maps.intrinsics, true_maps.world_from_cam, thin)
+    assert len(fuse_depth_maps(shot[0], maps, COARSE, job).faces) > 10_000
+    assert any("003.jpg: 4 readings" in text for text in job.notes)
+
+
+def test_views_that_never_meet_are_refused(true_maps, shot):
+    lonely = np.zeros_like(true_maps.depth)
+    lonely[0] = true_maps.depth[0]
+    single = DepthMaps(true_maps.names, true_maps.intrinsics, true_maps.world_from_cam, lonely)
+    with pytest.raises(ScanError, match="2 of 16|supported"):
+        fuse_depth_maps(shot[0], single, COARSE, Job())
+
+
+def test_canonical_mesh_does_not_depend_on_the_order():
+    random = np.random.default_rng(0)
+    vertices = random.normal(size=(40, 3))
+    faces = np.array([random.choice(40, 3, replace=False) for _ in range(60)])
+    colors = random.integers(0, 255, (40, 3), dtype=np.uint8)
+    order, rows = random.permutation(40), random.permutation(60)
+    place = np.argsort(order)
+    turned = np.roll(place[faces[rows]], 1, axis=1)
+    a, b = canonical_mesh(vertices, faces, colors), canonical_mesh(vertices[order], turned, colors[order])
+    for name in ("vertices", "faces", "colors"):
+        assert getattr(a, name).tobytes() == getattr(b, name).tobytes()
+
+    def corners(v, f):
+        return np.sort(np.linalg.norm(np.cross(v[f[:, 1]] - v[f[:, 0]], v[f[:, 2]] - v[f[:, 0]]), axis=1))
+
+    kept = np.unique(np.sort(faces, axis=1), axis=0)
+    assert len(a.faces) >= len(kept)
+    assert_allclose(
+        corners(a.vertices, a.faces)[-1], corners(vertices, faces)[-1], rtol=1e-12, atol=0
+    )  # same triangles
+
+
+def test_canonical_mesh_welds_and_drops_flat_faces():
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0], [0, 0, 0]], float)
+    mesh = canonical_mesh(vertices, np.array([[0, 1, 2], [3, 4, 1]]), None)
+    assert len(mesh.vertices) == 3
+    assert len(mesh.faces) == 1
+
+
+def test_flying_pixels_and_grazing_surfaces_are_masked():
+    camera = Intrinsics(64, 48, 60.0, 60.0, 31.5, 23.5)
+    depth = np.full((48, 64), 1.0, np.float32)
+    depth[:, 30:34] = 1.2  # a step, and on its edge:
+    depth[:, 29] = 1.1
+    clean = clean_depth(depth, camera)
+    assert (clean[:, 27:36] == 0).mean() > 0.7
+    assert (clean[5:-5, 5:20] == 1).all()
+    u = np.arange(64)
+    wall = np.tile((1.0 / (1 + 9 * (u - 31.5) / 60 * 0.1)).astype(np.float32), (48, 1))
+    assert (clean_depth(wall, camera) > 0).mean() > 0.9  # tilted 42 degrees: kept

@@ -1,0 +1,115 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scan_scene import distances
+
+from vto_pipeline.errors import ScanError
+from vto_pipeline.model.frames import PhotoSet
+from vto_pipeline.model.job import Job
+from vto_pipeline.scan.scale import ScaleConfig, apply_board
+from vto_pipeline.scan.sfm import SfmConfig, estimate_cameras
+from vto_pipeline.scan.similarity import fit_similarity
+
+
+@pytest.fixture(scope="module")
+def sparse(shot):
+    job = Job()
+    return *estimate_cameras(shot[0], SfmConfig(), job), job
+
+
+def test_every_photo_is_placed_where_it_was_taken(sparse, shot):
+    cameras, _, job = sparse
+    assert cameras.names == tuple(path.name for path in shot[0].paths)
+    assert not cameras.unregistered
+    assert not cameras.metric
+    assert job.metrics["registered"] == job.metrics["photos"] == 16
+    assert 0.05 < job.metrics["reprojection_px"] < 0.6
+    centers, truth = cameras.world_from_cam[:, :3, 3], shot[1][:, :3, 3]
+    scale, transform = fit_similarity(centers, truth)
+    error = np.linalg.norm(scale * centers @ transform[:3, :3].T + transform[:3, 3] - truth, axis=1)
+    assert np.median(error) < 2e-3  # at 1 m and 1.9 mm per pixel
+    assert_allclose(cameras.intrinsics[0].fx, 528.0, rtol=0.01, atol=0)  # focal length is refined, from 16 photos
+
+
+def test_first_camera_is_in_front_and_up_is_up(sparse):
+    cameras, cloud, _ = sparse
+    assert cameras.world_from_cam[0, 2, 3] > abs(cameras.world_from_cam[0, 0, 3])
+    assert (cameras.world_from_cam[:, 1, 3] > np.median(cloud.points[:, 1])).all()
+    assert (cameras.world_from_cam[:, 1, 1] < 0).all()  # the picture's down is the world's down
+
+
+def test_normals_of_sparse_points_face_their_cameras(sparse):
+    cameras, cloud, _ = sparse
+    towards = cameras.world_from_cam[:, :3, 3][:, None] - cloud.points
+    towards /= np.linalg.norm(towards, axis=2, keepdims=True)
+    facing = (towards * cloud.normals).sum(2).max(0)
+    assert (facing > 0.3).all()  # a point of the board that all see has its normal straight up
+    assert np.median(facing) > 0.9
+
+
+def test_two_runs_give_the_same_bits(sparse, shot):
+    again, cloud = estimate_cameras(shot[0], SfmConfig(), Job())
+    assert again.world_from_cam.tobytes() == sparse[0].world_from_cam.tobytes()
+    assert cloud.points.tobytes() == sparse[1].points.tobytes()
+    assert again.intrinsics == sparse[0].intrinsics
+
+
+def test_board_gives_metres_and_the_floor(sparse, shot, scene):
+    job = Job()
+    cameras, cloud = apply_board(shot[0], *sparse[:2], ScaleConfig(), job)
+    assert cameras.metric
+    assert not job.warnings
+    scale, _ = fit_similarity(cameras.world_from_cam[:, :3, 3], shot[1][:, :3, 3])
+    assert_allclose(scale, 1.0, rtol=3e-3, atol=0)  # the promise of the scale: 0.3 %
+    error = np.linalg.norm(cameras.world_from_cam[:, :3, 3] - shot[1][:, :3, 3], axis=1)
+    assert np.median(error) < 3e-3  # absolute: the board's frame is the scene's
+    on_tube = cloud.points[cloud.points[:, 1] > 0.1]
+    assert np.median(distances(scene, on_tube)) < 1e-3
+    assert 0 < job.metrics["scale_error_percent"] < 0.3
+    assert job.metrics["board_corners"] > 20
+
+
+def test_without_a_board_the_scan_stays_without_scale(sparse, shot):
+    job = Job()
+    cameras, cloud = apply_board(replace(shot[0], board=None), *sparse[:2], ScaleConfig(), job)
+    assert cameras is sparse[0]
+    assert cloud is sparse[1]
+    assert "no scale" in job.warnings[0]
+
+
+def test_wrong_board_warns_and_leaves_the_scale_alone(sparse, shot):
+    job = Job()
+    wrong = replace(shot[0].board, dictionary="DICT_6X6_50")
+    cameras, _ = apply_board(replace(shot[0], board=wrong), *sparse[:2], ScaleConfig(), job)
+    assert not cameras.metric
+    assert "board.yaml" in job.warnings[0]
+
+
+def grey_photos(folder, count, values):
+    paths = []
+    for k in range(count):
+        paths.append(folder / f"grey{k}.png")
+        cv2.imwrite(str(paths[-1]), np.full((120, 160, 3), values[k % len(values)], np.uint8))
+    return PhotoSet(tuple(paths), (None,) * count)
+
+
+def test_plain_photos_are_refused_with_counts_and_advice(tmp_path):
+    with pytest.raises(ScanError, match="grey1.png 0") as caught:
+        estimate_cameras(grey_photos(tmp_path, 4, (90, 130)), SfmConfig(), Job())
+    assert "texture" in caught.value.hint
+
+
+@pytest.mark.parametrize("copies", [2, 5])
+def test_photos_from_one_place_are_refused(shot, tmp_path, copies):
+    picture = shot[0].paths[0].read_bytes()
+    paths = []
+    for k in range(copies):
+        paths.append(tmp_path / f"same{k}.jpg")
+        paths[-1].write_bytes(picture)
+    with pytest.raises(ScanError, match="could be placed|sparse point"):
+        estimate_cameras(PhotoSet(tuple(paths), shot[0].intrinsics[:copies]), SfmConfig(), Job())

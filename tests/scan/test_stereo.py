@@ -1,0 +1,192 @@
+from __future__ import annotations
+
+import os
+
+import cv2
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scan_scene import distances, make_scene, photos, render
+
+from vto_pipeline.errors import InputError, ScanError
+from vto_pipeline.model.camera import CameraSet, Intrinsics
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import PointCloud
+from vto_pipeline.scan.consistency import consensus
+from vto_pipeline.scan.disparity import _in_second
+from vto_pipeline.scan.neighbours import choose_pairs, visibility
+from vto_pipeline.scan.rectify import View, depth_in_view, rectify, warp
+from vto_pipeline.scan.stereo import StereoConfig, estimate_depth_maps
+from vto_pipeline.scan.subpixel import refine_disparity
+
+
+@pytest.fixture(scope="module")
+def sparse(scene):
+    """Points on the tube with their outward directions."""
+    step = scene.vertices[::37]
+    normals = step * [1, 0, 1]
+    return PointCloud(step, normals / np.linalg.norm(normals, axis=1, keepdims=True))
+
+
+@pytest.fixture(scope="module")
+def maps(shot, true_cameras, sparse):
+    job = Job()
+    return estimate_depth_maps(shot[0], true_cameras, sparse, StereoConfig(), job), job
+
+
+def test_depth_agrees_with_the_ray_cast_truth(maps, shot, scene):
+    found, job = maps
+    errors, covered = [], []
+    for index in (0, 5, 11):
+        _, truth = render(scene, shot[0].intrinsics[index], shot[1][index], samples=1)
+        tube = truth > 0
+        known = found.depth[index] > 0
+        errors.append((found.depth[index] - truth)[known & tube])
+        covered.append(known.sum() / 20_000)
+    error = np.abs(np.concatenate(errors))
+    assert 5e-5 < np.median(error) < 8e-4  # a pixel is 1.9 mm; under 0.05 mm would be the truth itself
+    assert np.percentile(error, 95) < 4e-3
+    assert min(covered) > 0.5
+    assert 0.5 < job.metrics["consistent_share"] <= 1
+
+
+def test_same_bits_on_one_core_and_on_all(maps, shot, true_cameras, sparse, monkeypatch):
+    monkeypatch.setattr(os, "cpu_count", lambda: 1)
+    again = estimate_depth_maps(shot[0], true_cameras, sparse, StereoConfig(), Job())
+    assert again.depth.tobytes() == maps[0].depth.tobytes()
+
+
+def test_plain_surface_is_refused(tmp_path, true_cameras, sparse):
+    plain = make_scene(contrast=0.0)
+    few = CameraSet(true_cameras.names[:4], true_cameras.intrinsics[:4], true_cameras.world_from_cam[:4])
+    shots = photos(plain, tmp_path, few.world_from_cam, few.intrinsics[0], board=False)
+    with pytest.raises(ScanError, match="agreed on") as caught:
+        estimate_depth_maps(shots, few, sparse, StereoConfig(check_views=3), Job())
+    assert "print" in caught.value.hint
+
+
+def test_photos_that_share_nothing_are_refused(shot, true_cameras, sparse):
+    with pytest.raises(ScanError, match="share"):
+        estimate_depth_maps(shot[0], true_cameras, PointCloud(sparse.points[:2]), StereoConfig(), Job())
+
+
+def test_camera_without_photo_is_refused(shot, true_cameras, sparse):
+    names = ("gone.jpg", *true_cameras.names[1:])
+    cameras = CameraSet(names, true_cameras.intrinsics, true_cameras.world_from_cam)
+    with pytest.raises(InputError, match="gone.jpg"):
+        estimate_depth_maps(shot[0], cameras, sparse, StereoConfig(), Job())
+
+
+def test_pairs_are_neighbours_in_the_ring(true_cameras, sparse):
+    seen = visibility(true_cameras, sparse)
+    assert 0.2 < seen.mean() < 0.45  # a camera faces about a third of a tube within 60 degrees
+    pairs = choose_pairs(true_cameras, sparse, seen, per_photo=2, min_shared=12)
+    assert pairs == sorted([(i, i + 1) for i in range(15)] + [(0, 15)])
+
+
+def bent_view(k1):
+    return Intrinsics(160, 120, 150.0, 155.0, 78.0, 61.0, k1)
+
+
+def cluster():
+    """Points where the photos look."""
+    return np.random.default_rng(0).uniform([-0.15, 0.15, -0.15], [0.15, 0.45, 0.15], (50, 3))
+
+
+def test_a_point_falls_on_the_same_row_of_both_windows(true_cameras):
+    """Projection written out again, with distortion: warp must put each photo's pixel where the frame says."""
+    points = cluster()
+    camera = bent_view(-0.2)
+    ramp = np.tile(np.arange(160, dtype=np.uint8), (120, 1))
+    first, second = (View(ramp, camera, true_cameras.world_from_cam[k]) for k in (3, 4))
+    frame = rectify(first, second, points, 0.1)
+    for view, shift in ((first, 0), (second, frame.min_disparity)):
+        window = warp(view, frame, shift)
+        local = (points - first.world_from_cam[:3, 3]) @ frame.rect_from_world.T
+        if view is second:
+            local -= [frame.baseline, 0, 0]
+        u = frame.focal * local[:, 0] / local[:, 2] - frame.corner[0] + shift
+        v = frame.focal * local[:, 1] / local[:, 2] - frame.corner[1]
+        inside = (points - view.world_from_cam[:3, 3]) @ view.world_from_cam[:3, :3]
+        flat = inside[:, :2] / inside[:, 2:]
+        truth = camera.fx * flat[:, 0] * (1 - 0.2 * (flat**2).sum(1)) + camera.cx
+        seen = cv2.remap(window.astype(np.float32), u[:, None].astype(np.float32), v[:, None].astype(np.float32), 1)
+        assert_allclose(seen.ravel(), truth, rtol=0, atol=1.0)  # the ramp is kept in whole grey levels
+    assert frame.disparities % 16 == 0
+
+
+def test_depth_of_a_plane_comes_back(true_cameras):
+    """A constant disparity is a plane at f B / d in the rectified frame."""
+    camera = bent_view(0.0)
+    views = [View(np.zeros((120, 160), np.uint8), camera, true_cameras.world_from_cam[k]) for k in (3, 4)]
+    frame = rectify(*views, cluster(), 0.1)
+    disparity = np.full(frame.size[::-1], frame.focal * frame.baseline / 0.9, np.float32)
+    depth = depth_in_view(views[0], frame, disparity, 0)
+    v, u = np.nonzero(depth)
+    assert len(v) > 1000
+    ray = np.stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones(len(u))], axis=1)
+    world = (ray * depth[v, u][:, None]) @ views[0].world_from_cam[:3, :3].T
+    assert_allclose(world @ frame.rect_from_world[2], 0.9, rtol=1e-5, atol=0)  # single precision
+
+
+def smooth_texture(height, width):
+    noise = np.random.default_rng(3).normal(size=(height, 4 * width)).astype(np.float32)
+    fine = cv2.GaussianBlur(noise, (0, 0), 4.0)
+    return 120 + 40 * fine / fine.std()
+
+
+def test_subpixel_refinement_finds_a_slanted_shift():
+    height, width = 60, 200
+    fine = smooth_texture(height, width)  # four columns to a pixel
+    u, v = np.meshgrid(np.arange(width), np.arange(height))
+    truth = (9.3 + 0.05 * u + 0.02 * v).astype(np.float32)
+    sample = lambda x: cv2.remap(fine, (4 * x).astype(np.float32), v.astype(np.float32), cv2.INTER_CUBIC)  # noqa: E731
+    right = np.clip(np.round(sample(u.astype(np.float32))), 0, 255).astype(np.uint8)
+    left = np.clip(np.round(1.2 * sample(u - truth) - 10), 0, 255).astype(np.uint8)  # another exposure, too
+    start = np.round(truth)
+    start[:, :30] = np.nan
+    refined = refine_disparity(left, right, start, 0, 2, 3, 0.5)
+    known = ~np.isnan(refined)
+    assert known[:, :28].sum() == 0
+    assert known[4:-4, 40:-4].mean() > 0.95
+    error = np.abs(refined - truth)[known]
+    assert np.median(error) < 0.05
+    assert np.median(np.abs(start - truth)[known]) > 0.15  # what it had to mend
+
+
+def test_refinement_drops_what_does_not_match():
+    noise = np.random.default_rng(4).integers(0, 255, (2, 40, 80), dtype=np.uint8)
+    refined = refine_disparity(noise[0], noise[1], np.full((40, 80), 5.0, np.float32), 0, 2, 3, 0.5)
+    assert (~np.isnan(refined)).mean() < 0.1
+
+
+def test_disparity_is_carried_to_the_second_view_and_the_nearest_wins():
+    forward = np.full((1, 60), np.nan, np.float32)
+    forward[0, 20:40] = 4.0
+    forward[0, 40:50] = 12.25  # nearer: covers part of the first piece
+    backward = _in_second(forward, 2)
+    truth = np.full(60, np.nan, np.float32)
+    truth[18:38] = 4.0
+    truth[30:39] = 12.25  # u - 12.25 + 2, whole pixels inside
+    assert_allclose(backward[0], truth, rtol=0, atol=1e-6)  # constant pieces: exact
+
+
+def test_consensus_takes_the_heavier_agreement():
+    depths = np.zeros((4, 1, 4), np.float32)
+    depths[:, 0, 0] = 1.000, 1.001, 1.5, 1.5  # two against two: the heavier pair
+    depths[:, 0, 1] = 1.0, 1.2, 1.4, 0.0  # nobody agrees
+    depths[:, 0, 2] = 2.0, 0.0, 0.0, 0.0  # one voice
+    depths[:, 0, 3] = 1.0, 1.002, 1.001, 0.0
+    merged = consensus(depths, np.array([1.0, 3.0, 1.0, 1.0]), 0.003, 2)
+    assert_allclose(merged[0], [(1 + 3 * 1.001) / 4, 0, 0, (1 + 3 * 1.002 + 1.001) / 5], rtol=1e-6, atol=0)  # float32
+
+
+def test_unseen_side_is_left_out(maps, scene, shot):
+    """Every kept pixel lies on the tube or the floor, none floats."""
+    found = maps[0]
+    v, u = np.nonzero(found.depth[3])
+    camera, pose = found.intrinsics[3], found.world_from_cam[3]
+    ray = np.stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones(len(u))], axis=1)
+    world = (ray * found.depth[3][v, u][:, None]) @ pose[:3, :3].T + pose[:3, 3]
+    off = np.minimum(distances(scene, world), np.abs(world[:, 1]))
+    assert np.percentile(off, 99) < 0.008

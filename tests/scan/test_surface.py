@@ -1,0 +1,94 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from vto_pipeline.errors import InputError
+from vto_pipeline.geometry.topology import boundary_loops, face_normals
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import PointCloud
+from vto_pipeline.scan.surface import SurfaceConfig, reconstruct_cloud
+
+
+def bowl(count: int, noise: float, seed: int = 0) -> np.ndarray:
+    """A sphere of radius 0.2 m without its cap above y = 0.12 m, centre at height 0."""
+    random = np.random.default_rng(seed)
+    points = random.normal(size=(4 * count, 3))
+    points *= 0.2 / np.linalg.norm(points, axis=1, keepdims=True)
+    points = points[points[:, 1] < 0.12][:count]
+    return points * (1 + random.normal(0, noise / 0.2, (len(points), 1)))
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    job = Job()
+    return reconstruct_cloud(PointCloud(bowl(20_000, 2e-4)), SurfaceConfig(), job), job
+
+
+def test_surface_lies_on_the_sphere(mesh):
+    error = np.abs(np.linalg.norm(mesh[0].vertices, axis=1) - 0.2)
+    assert 1e-6 < np.percentile(error, 95) < 5e-4
+    assert mesh[1].metrics["points_off_surface_share"] < 0.01
+
+
+def test_the_opening_stays_open_and_is_the_only_one(mesh):
+    loops = boundary_loops(mesh[0])
+    assert len(loops) == 1
+    rim = mesh[0].vertices[loops[0]]
+    assert_allclose(rim[:, 1], 0.12, rtol=0, atol=0.02)  # a chance gap of the points at the rim
+    assert_allclose(rim[:, 1].mean(), 0.12, rtol=0, atol=0.004)  # the points are 4.5 mm apart
+    ring = np.linalg.norm(np.roll(rim, 1, axis=0) - rim, axis=1).sum()
+    assert 0.95 < ring / (2 * np.pi * 0.16) < 1.6  # a cut along triangles is longer than the circle
+
+
+def test_normals_point_out(mesh):
+    centers = mesh[0].vertices[mesh[0].faces].mean(1)
+    assert ((face_normals(mesh[0]) * centers).sum(1) > 0).mean() > 0.99
+
+
+def test_order_and_repetition_of_points_do_not_matter(mesh):
+    points = bowl(20_000, 2e-4)
+    shuffled = np.random.default_rng(7).permutation(np.concatenate([points, points[:50]]))
+    again = reconstruct_cloud(PointCloud(shuffled), SurfaceConfig(), Job())
+    assert again.vertices.tobytes() == mesh[0].vertices.tobytes()
+    assert again.faces.tobytes() == mesh[0].faces.tobytes()
+
+
+def test_given_normals_are_used():
+    points = bowl(6_000, 0.0)
+    normals = -points / np.linalg.norm(points, axis=1, keepdims=True)  # on purpose inwards
+    mesh = reconstruct_cloud(PointCloud(points, normals), SurfaceConfig(), Job())
+    centers = mesh.vertices[mesh.faces].mean(1)
+    assert ((face_normals(mesh) * centers).sum(1) < 0).mean() > 0.99
+
+
+def test_outliers_are_left_out(mesh):
+    random = np.random.default_rng(3)
+    points = np.concatenate([bowl(20_000, 2e-4), random.uniform(-0.5, 0.5, (60, 3))])
+    job = Job()
+    found = reconstruct_cloud(PointCloud(points), SurfaceConfig(), job)
+    assert np.percentile(np.abs(np.linalg.norm(found.vertices, axis=1) - 0.2), 99) < 2e-3
+    assert any("lonely" in text for text in job.notes)
+
+
+def test_three_points_are_refused():
+    with pytest.raises(InputError, match="3 distinct points; at least 100"):
+        reconstruct_cloud(PointCloud(np.eye(3)), SurfaceConfig(), Job())
+
+
+def test_one_point_many_times_is_refused():
+    with pytest.raises(InputError, match="1 distinct points"):
+        reconstruct_cloud(PointCloud(np.ones((500, 3))), SurfaceConfig(), Job())
+
+
+def test_line_is_refused():
+    with pytest.raises(InputError, match="one line"):
+        reconstruct_cloud(PointCloud(np.outer(np.linspace(0, 1, 500), [1.0, 2.0, 3.0])), SurfaceConfig(), Job())
+
+
+def test_plane_is_refused():
+    random = np.random.default_rng(5)
+    flat = np.column_stack([random.uniform(0, 0.3, (5000, 2)), np.zeros(5000)])
+    with pytest.raises(InputError, match="one plane"):
+        reconstruct_cloud(PointCloud(flat), SurfaceConfig(), Job())

@@ -1,0 +1,1 @@
+"""From photos, depth frames and clouds to a surface in metres."""

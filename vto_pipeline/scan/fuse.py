@@ -1,0 +1,137 @@
+"""One surface from many depth maps: a truncated signed distance field on sparse voxels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from vto_pipeline.errors import ScanError
+from vto_pipeline.io.depth import read_depth
+from vto_pipeline.io.images import read_image
+from vto_pipeline.model.arrays import ByteArray, FloatArray
+from vto_pipeline.model.frames import DepthFrameSet, DepthMaps, PhotoSet
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.settings import Config
+from vto_pipeline.scan.canonical import canonical_mesh, drop_crumbs, drop_vertices
+from vto_pipeline.scan.consistency import views_on_surface
+from vto_pipeline.scan.depth_mask import clean_depth
+
+GREY = 200
+"""Colour of a surface without photos."""
+
+
+SEEN_STRIDE = 4
+"""Open3D opens blocks of voxels for every fourth pixel, and fails when none of those has a reading."""
+
+
+class FuseConfig(Config):
+    """Settings of the fusion."""
+
+    voxel_mm: float | None = Field(None, gt=0.1, le=100, description="Side of a voxel; default from pixels [mm].")
+    voxel_pixels: float = Field(1.5, gt=0.2, le=10, description="The default voxel, in pixels seen on the surface.")
+    truncation_voxels: float = Field(4.0, ge=2, le=16, description="Reach of the distance field, in voxels.")
+    min_views: int = Field(2, ge=1, le=100, description="Depth maps that must lie on the surface at a vertex.")
+    support_voxels: float = Field(1.5, gt=0, le=16, description="How near a depth map must be to lie on it, in voxels.")
+    min_piece: float = Field(0.01, ge=0, le=1, description="Smallest piece kept, as a share of the largest's area.")
+
+
+def fuse_depth_maps(photos: PhotoSet, maps: DepthMaps, config: FuseConfig, job: Job) -> TriangleMesh:
+    """Fuse the depth maps of photos into a surface with the photos' colours.
+
+    Args:
+        photos: The photos, for their colours.
+        maps: Their depth.
+        config: Settings.
+        job: Told view by view.
+
+    Returns:
+        Surface [m], open where nothing was seen.
+
+    Raises:
+        ScanError: no surface came out.
+    """
+    paths = {path.name: path for path in photos.paths}
+    return _fuse(maps, lambda index: read_image(paths[maps.names[index]]), config, job)
+
+
+def fuse_depth_frames(frames: DepthFrameSet, world_from_cam: FloatArray, config: FuseConfig, job: Job) -> TriangleMesh:
+    """Fuse the frames of a depth camera into a surface.
+
+    Args:
+        frames: Depth, and colour if there is any.
+        world_from_cam: Poses [m], shape (N, 4, 4).
+        config: Settings.
+        job: Told frame by frame.
+
+    Returns:
+        Surface [m], open where nothing was seen.
+
+    Raises:
+        ScanError: no surface came out.
+    """
+    camera, count = frames.intrinsics, len(frames.depth_paths)
+    depth = np.stack([clean_depth(read_depth(path, frames.depth_scale), camera) for path in frames.depth_paths])
+    maps = DepthMaps(tuple(path.name for path in frames.depth_paths), (camera,) * count, world_from_cam, depth)
+    plain = np.full((camera.height, camera.width, 3), GREY, np.uint8)
+    return _fuse(
+        maps, lambda index: read_image(frames.color_paths[index]) if frames.color_paths else plain, config, job
+    )
+
+
+def _fuse(maps: DepthMaps, color_of: Callable[[int], ByteArray], config: FuseConfig, job: Job) -> TriangleMesh:
+    """Extract the surface, and keep what the depth maps lie on.
+
+    A sheet of cloth seen from both sides leaves false sheets a truncation away on either side, where one side's free
+    space meets the other's unknown; no depth map lies on those.
+    """
+    readings = maps.depth > 0
+    if not readings.any():
+        raise ScanError(f"none of {len(maps.names)} depth maps holds a reading", hint="is depth_scale right?")
+    voxel = config.voxel_mm / 1000 if config.voxel_mm else config.voxel_pixels * _pixel_on_surface(maps)
+    mesh = _level_set(maps, color_of, voxel, config, job)
+    views = views_on_surface(mesh.vertices, maps, config.support_voxels * voxel)
+    mesh = drop_crumbs(drop_vertices(mesh, views < config.min_views), config.min_piece, job)
+    job.measure(voxel_mm=round(1000 * voxel, 3), points=len(mesh.vertices), triangles=len(mesh.faces))
+    return mesh
+
+
+def _pixel_on_surface(maps: DepthMaps) -> float:
+    """Side of a pixel on the surface [m], the median over all maps."""
+    sizes = [np.median(d[d > 0]) / c.fx for d, c in zip(maps.depth, maps.intrinsics, strict=True) if d.any()]
+    return float(np.median(sizes))
+
+
+def _level_set(
+    maps: DepthMaps, color_of: Callable[[int], ByteArray], voxel: float, config: FuseConfig, job: Job
+) -> TriangleMesh:
+    """Integrate all maps (Curless and Levoy 1996) and extract the zero level set."""
+    import cv2
+    import open3d as o3d
+
+    core: Any = o3d.core  # its stubs know no NumPy array
+    reach, scale = config.truncation_voxels, 1.0
+    names, channels = ("tsdf", "weight", "color"), tuple(map(core.SizeVector, ([1], [1], [3])))
+    grid = o3d.t.geometry.VoxelBlockGrid(names, (core.float32,) * 3, channels, voxel, 16, 20_000, core.Device("CPU:0"))
+    for index, (camera, pose) in enumerate(zip(maps.intrinsics, maps.world_from_cam, strict=True)):
+        values = np.ascontiguousarray(maps.depth[index, : camera.height, : camera.width])
+        if not values[::SEEN_STRIDE, ::SEEN_STRIDE].any():
+            job.note(f"{maps.names[index]}: {np.count_nonzero(values)} readings are too few to fuse")
+        else:
+            size = (camera.width, camera.height)
+            picture = cv2.resize(color_of(index), size, interpolation=cv2.INTER_AREA).astype(np.float32) / 255
+            depth, color = o3d.t.geometry.Image(core.Tensor(values)), o3d.t.geometry.Image(core.Tensor(picture))
+            matrix, inverse = core.Tensor(camera.matrix), core.Tensor(np.linalg.inv(pose))
+            limit = float(values.max()) + voxel
+            blocks = grid.compute_unique_block_coordinates(depth, matrix, inverse, scale, limit, reach)
+            grid.integrate(blocks, depth, color, matrix, inverse, scale, limit, reach)
+        job.progress(0.8 * (index + 1) / len(maps.names), f"fusing view {index + 1} of {len(maps.names)}")
+    surface = grid.extract_triangle_mesh(float(config.min_views))
+    if "indices" not in surface.triangle or len(surface.triangle.indices) == 0:
+        hint = "are the poses right? lower min_views, or take more overlapping views"
+        raise ScanError(f"no surface was seen by {config.min_views} of {len(maps.names)} views", hint=hint)
+    colors = np.clip(np.round(255 * surface.vertex.colors.numpy()), 0, 255).astype(np.uint8)
+    return canonical_mesh(surface.vertex.positions.numpy().astype(float), surface.triangle.indices.numpy(), colors)

@@ -1,0 +1,76 @@
+"""How a depth camera moved between two frames, however far, from matched SIFT features that have depth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vto_pipeline.model.arrays import ByteArray, FloatArray
+from vto_pipeline.model.camera import Intrinsics
+
+RATIO, MAX_ERROR_PX, MIN_MATCHES = 0.8, 2.0, 25
+"""Lowe's ratio, the reprojection error of an inlier, and how few inliers may be chance."""
+
+
+@dataclass(frozen=True)
+class Features:
+    """SIFT features of one frame.
+
+    Args:
+        pixels: Shape (K, 2).
+        points: The same in the camera's frame [m], shape (K, 3); z = 0 where there is no reading.
+        descriptors: Shape (K, 128), float32.
+    """
+
+    pixels: FloatArray
+    points: FloatArray
+    descriptors: NDArray[np.float32]
+
+
+def find_features(color: ByteArray | None, depth: NDArray[np.float32], camera: Intrinsics) -> Features:
+    """Detect features (Lowe 2004) and look up their depth; without colour there are none."""
+    import cv2
+
+    none = Features(np.empty((0, 2)), np.empty((0, 3)), np.empty((0, 128), np.float32))
+    if color is None:
+        return none
+    found, descriptors = cv2.SIFT.create(2000).detectAndCompute(cv2.cvtColor(color, cv2.COLOR_RGB2GRAY), None)
+    if descriptors is None:
+        return none
+    pixels = np.array([key.pt for key in found], dtype=float)
+    column, row = np.round(pixels).astype(int).T
+    z = depth[np.clip(row, 0, depth.shape[0] - 1), np.clip(column, 0, depth.shape[1] - 1)].astype(float)
+    flat = (pixels - [camera.cx, camera.cy]) / [camera.fx, camera.fy]
+    return Features(
+        pixels, np.column_stack([flat, np.ones(len(flat))]) * z[:, None], np.asarray(descriptors, np.float32)
+    )
+
+
+def guess_motion(source: Features, target: Features, camera: Intrinsics) -> FloatArray | None:
+    """Estimate target_from_source by perspective-n-point with RANSAC.
+
+    Returns:
+        Rigid transform, shape (4, 4), or None where too few features agree on one.
+    """
+    import cv2
+
+    if min(len(source.pixels), len(target.pixels)) < MIN_MATCHES:
+        return None
+    matches = cv2.BFMatcher(cv2.NORM_L2).knnMatch(source.descriptors, target.descriptors, k=2)
+    pairs = [(m.queryIdx, m.trainIdx) for m, second in matches if m.distance < RATIO * second.distance]
+    a, b = np.array(pairs, dtype=int).reshape(-1, 2).T
+    near = source.points[a, 2] > 0
+    if near.sum() < MIN_MATCHES:
+        return None
+    cv2.setRNGSeed(0)
+    found, turn, shift, inliers = cv2.solvePnPRansac(
+        source.points[a][near], target.pixels[b][near], camera.matrix, None,
+        iterationsCount=500, reprojectionError=MAX_ERROR_PX, confidence=0.999, flags=cv2.SOLVEPNP_SQPNP,
+    )  # fmt: skip
+    if not found or inliers is None or len(inliers) < MIN_MATCHES:
+        return None
+    transform = np.eye(4)
+    transform[:3, :3], transform[:3, 3] = cv2.Rodrigues(turn)[0], shift.ravel()
+    return transform
