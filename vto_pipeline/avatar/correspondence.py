@@ -1,0 +1,108 @@
+"""Which point of the model belongs to which of the scan: closest points in both directions, with robust weights."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vto_pipeline.geometry.sampling import sample_surface
+from vto_pipeline.geometry.topology import face_normals, vertex_normals
+from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.mesh import TriangleMesh
+
+_AGREE = 0.5
+_NO_WEIGHT = 1e-6
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Points of the model and the tangent planes of the scan they should lie on.
+
+    Args:
+        corners: The model's vertices, shape (N, 3).
+        shares: Barycentric, shape (N, 3).
+        targets: Points on the scan [m], shape (N, 3).
+        normals: Unit normals, shape (N, 3).
+        weights: Shape (N,).
+    """
+
+    corners: NDArray[np.int64]
+    shares: FloatArray
+    targets: FloatArray
+    normals: FloatArray
+    weights: FloatArray
+
+    def counting(self) -> Pairs:
+        """Return only the pairs that have a weight."""
+        kept = self.weights > _NO_WEIGHT
+        return Pairs(self.corners[kept], self.shares[kept], self.targets[kept], self.normals[kept], self.weights[kept])
+
+
+class Target:
+    """A scan prepared for closest points."""
+
+    def __init__(self, scan: TriangleMesh, probes: int, seed: int) -> None:
+        self.vertices, self.faces = scan.vertices, scan.faces
+        self.face_normals = face_normals(scan)
+        self.probes, self.probe_normals, _ = sample_surface(scan, probes, seed)
+        halves = np.sort(np.concatenate([scan.faces[:, [0, 1]], scan.faces[:, [1, 2]], scan.faces[:, [2, 0]]]), axis=1)
+        edges, times = np.unique(halves, axis=0, return_counts=True)
+        rim = np.zeros(len(scan.vertices), dtype=bool)
+        rim[edges[times == 1].ravel()] = True
+        self._rim_face: NDArray[np.bool_] = np.any(rim[scan.faces], axis=1)
+
+    def onto_scan(
+        self, points: FloatArray, normals: FloatArray, reach: float
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return closest scan points, their normals, and weights: 0 beyond reach, across the surface, or at a rim."""
+        face, closest, distance = closest_points(points, self.vertices, self.faces)
+        agree = (normals * self.face_normals[face]).sum(axis=1) > _AGREE
+        weight = robust(distance, reach) * (agree & ~self._rim_face[face] & (distance < 3 * reach))
+        return closest, self.face_normals[face], weight
+
+    def pairs(self, vertices: FloatArray, faces: IntArray, chosen: NDArray[np.int64], reach: float) -> Pairs:
+        """Match probes of the scan with the model, and chosen vertices of the model with the scan."""
+        corners = vertices[faces]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True) + 1e-30
+        face, closest, distance = closest_points(self.probes, vertices, faces)
+        agree = (normal[face] * self.probe_normals).sum(axis=1) > _AGREE
+        weight = robust(distance, reach) * (agree & (distance < 3 * reach))
+        shares = barycentric(closest, corners[face])
+        at, ahead, pull = self.onto_scan(vertices[chosen], vertex_normals(TriangleMesh(vertices, faces))[chosen], reach)
+        return Pairs(
+            np.concatenate([faces[face], np.repeat(chosen[:, None], 3, axis=1)]).astype(np.int64),
+            np.concatenate([shares, np.tile([1.0, 0.0, 0.0], (len(chosen), 1))]),
+            np.concatenate([self.probes, at]),
+            np.concatenate([normal[face], ahead]),
+            np.concatenate([weight, pull]),
+        )
+
+
+def closest_points(
+    points: FloatArray, vertices: FloatArray, faces: IntArray
+) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
+    """Return face, closest point and distance [m] for each point."""
+    import igl
+
+    squared, face, closest = igl.point_mesh_squared_distance(
+        np.ascontiguousarray(points), np.ascontiguousarray(vertices), np.ascontiguousarray(faces, dtype=np.int64)
+    )
+    return np.asarray(face).astype(np.int64), np.asarray(closest), np.sqrt(np.asarray(squared))
+
+
+def robust(distance: FloatArray, scale: float) -> FloatArray:
+    """Geman-McClure weights (Geman & McClure 1987)."""
+    return 1 / (1 + (distance / scale) ** 2) ** 2
+
+
+def barycentric(points: FloatArray, corners: FloatArray) -> FloatArray:
+    """Return the shares of a triangle's corners in a point of it, shape (N, 3) (Ericson 2004, 3.4)."""
+    a, b, p = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], points - corners[:, 0]
+    aa, ab, bb = (a * a).sum(1), (a * b).sum(1), (b * b).sum(1)
+    pa, pb = (p * a).sum(1), (p * b).sum(1)
+    scale = aa * bb - ab * ab + 1e-30
+    v, w = (bb * pa - ab * pb) / scale, (aa * pb - ab * pa) / scale
+    return np.stack([1 - v - w, v, w], axis=1)

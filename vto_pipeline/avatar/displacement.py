@@ -1,0 +1,133 @@
+"""The last millimetres: push the posed body along its normals onto the scan, smoothly where the scan says nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csr_matrix, diags
+from scipy.sparse.linalg import splu
+
+from vto_pipeline.avatar.correspondence import Target, barycentric, closest_points, robust
+from vto_pipeline.geometry.intersections import self_intersections
+from vto_pipeline.geometry.topology import vertex_normals
+from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.mesh import TriangleMesh
+
+_FIRST_REACH_M, _LAST_REACH_M = 0.03, 0.008
+_MAX_MOVE_M = 0.01
+_HOLD = 1e-4
+_UNTANGLE_ROUNDS, _SMOOTH_ONLY = 40, 10
+_GIVE_BACK = 0.8
+
+
+def displace(
+    target: Target, vertices: FloatArray, faces: IntArray, trust: FloatArray, stiffness: tuple[float, ...], rounds: int
+) -> FloatArray:
+    """Return the vertices moved onto the scan, shape (V, 3).
+
+    Minimises the distances along the normals, in both directions, plus stiffness times the squared Laplacian of the
+    whole displacement. Moving along normals only keeps the vertices from sliding over each other.
+
+    Args:
+        target: The scan.
+        vertices: The posed body [m].
+        faces: Its faces.
+        trust: How much a vertex may follow the scan, 0 to 1, shape (V,): our hands are mittens and follow no fingers.
+        stiffness: Weights of the Laplacian, falling.
+        rounds: Solves at each.
+    """
+    start, count = vertices, len(vertices)
+    laplace = _laplacian(faces, count)
+    bend = (laplace.T @ laplace).tocsr()
+    hold = diags(np.full(count, _HOLD))
+    reach = _FIRST_REACH_M
+    for weight in np.repeat(stiffness, rounds):
+        facing = vertex_normals(TriangleMesh(vertices, faces))
+        normals = _smooth_normals(facing, laplace)
+        at, toward, pull = target.onto_scan(vertices, facing, reach)
+        along = (normals * toward).sum(axis=1)
+        pull = pull * trust
+        back, missing = _from_probes(target, vertices, faces, normals, trust, reach)
+        moved = vertices - start
+        spread = [diags(normals[:, axis]) for axis in range(3)]
+        stiff = spread[0] @ bend @ spread[0] + spread[1] @ bend @ spread[1] + spread[2] @ bend @ spread[2]
+        drag = (normals * (bend @ moved)).sum(axis=1)
+        system = diags(pull * along**2) + back.T @ back + weight * stiff + hold
+        right = pull * along * ((at - vertices) * toward).sum(axis=1) + back.T @ missing - weight * drag
+        height = splu(system.tocsc()).solve(right - _HOLD * (moved * normals).sum(axis=1))
+        vertices = vertices + np.clip(height, -_MAX_MOVE_M, _MAX_MOVE_M)[:, None] * normals
+        reach = max(0.9 * reach, _LAST_REACH_M)
+    return vertices
+
+
+def untangle(start: FloatArray, vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, int]:
+    """Smooth the displacement where faces turned over or pass through each other, then take it back there.
+
+    Args:
+        start: Before the displacement [m], shape (V, 3).
+        vertices: After it.
+        faces: Shape (F, 3).
+
+    Returns:
+        The mended vertices, and how many faces are still bad.
+    """
+    laplace = _laplacian(faces, len(vertices))
+    near = (abs(laplace) > 0).astype(float)
+    moved = vertices - start
+    before = _face_normals(start, faces)
+    for turn in range(_UNTANGLE_ROUNDS):
+        bad = ((_face_normals(start + moved, faces) * before).sum(axis=1) < 0).nonzero()[0]
+        bad = np.union1d(bad, self_intersections(TriangleMesh(start + moved, faces)).ravel())
+        if len(bad) == 0:
+            break
+        touched = np.zeros(len(vertices))
+        touched[faces[bad].ravel()] = 1.0
+        for _ in range(2 + turn // _SMOOTH_ONLY):
+            touched = np.sign(near @ touched)
+        inside = touched > 0
+        for _ in range(5):
+            moved[inside] -= 0.5 * (laplace @ moved)[inside]
+        if turn >= _SMOOTH_ONLY:  # smooth already: go back towards the start
+            moved[inside] *= _GIVE_BACK
+    return start + moved, len(bad)
+
+
+def _face_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    return np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]])
+
+
+def _smooth_normals(normals: FloatArray, laplace: csr_matrix) -> FloatArray:
+    for _ in range(3):
+        normals = normals - 0.3 * (laplace @ normals)
+        normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals
+
+
+def _from_probes(
+    target: Target, vertices: FloatArray, faces: IntArray, normals: FloatArray, trust: FloatArray, reach: float
+) -> tuple[csr_matrix, FloatArray]:
+    """Rows that pull the model's faces to the scan's points, so that no bump is skipped."""
+    face, closest, distance = closest_points(target.probes, vertices, faces)
+    corners = faces[face]
+    shares = barycentric(closest, vertices[corners])
+    facing = target.probe_normals
+    agree = (np.einsum("nk,nkd->nd", shares, normals[corners]) * facing).sum(axis=1) > 0.5
+    weight = np.sqrt(
+        robust(distance, reach)
+        * trust[corners].mean(axis=1)
+        * (agree & (distance < 3 * reach))
+        * len(vertices)
+        / len(face)
+    )
+    along = np.einsum("nkd,nd->nk", normals[corners], facing) * shares * weight[:, None]
+    row = np.repeat(np.arange(len(face)), 3)
+    back = csr_matrix((along.ravel(), (row, corners.ravel())), (len(face), len(vertices)))
+    return back, weight * ((target.probes - closest) * facing).sum(axis=1)
+
+
+def _laplacian(faces: IntArray, count: int) -> csr_matrix:
+    """Vertex minus mean of its neighbours."""
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    joined = csr_matrix((np.ones(2 * len(start)), (np.r_[start, end], np.r_[end, start])), (count, count))
+    joined.data[:] = 1.0
+    mean = diags(1 / np.asarray(joined.sum(axis=1)).ravel()) @ joined
+    return (diags(np.ones(count)) - mean).tocsr()

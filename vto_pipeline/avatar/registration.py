@@ -1,0 +1,150 @@
+"""Pose and shape of the template that explain a scan: Gauss-Newton on closest points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from vto_pipeline.avatar.correspondence import Pairs
+from vto_pipeline.avatar.pose import joint_transforms, skin
+from vto_pipeline.avatar.scan_start import Start
+from vto_pipeline.avatar.shape import ShapeSpace
+from vto_pipeline.model.arrays import FloatArray, IntArray
+
+_POSE_SIGMA_RAD = {
+    "spine": 0.12,
+    "chest": 0.12,
+    "neck": 0.08,
+    "head": 0.08,
+    "clavicle": 0.12,
+    "shoulder": 0.50,
+    "elbow": 0.35,
+    "wrist": 0.10,
+    "hip": 0.25,
+    "knee": 0.15,
+    "ankle": 0.15,
+}
+_INDEPENDENT = 400.0
+_MAX_TURN_RAD = 0.4
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Where the registration stands.
+
+    Args:
+        parameters: Of the shape space, shape (P,).
+        pose: Rotation vectors, shape (J, 3).
+        translation: Shape (3,).
+    """
+
+    parameters: FloatArray
+    pose: FloatArray
+    translation: FloatArray
+
+
+def first_fit(space: ShapeSpace, start: Start, pose: FloatArray) -> Fit:
+    """Turn a first guess into parameters: the size stretches every segment alike."""
+    parameters = np.zeros(len(space.names))
+    for k, name in enumerate(space.names):
+        if name.endswith(("_height", "_length", "_breadth", "_depth", "_girth", "_scale")) and not name.startswith(
+            "foot_breadth"
+        ):
+            parameters[k] = start.scale - 1
+    pose = pose.copy()
+    pose[0] = [0.0, start.yaw, 0.0]
+    pelvis = space.joints(parameters)[0]
+    turn = Rotation.from_rotvec(pose[0]).as_matrix()
+    # the guess turns about the origin, the skeleton about the pelvis
+    return Fit(parameters, pose, start.translation + turn @ pelvis - pelvis)
+
+
+def model(space: ShapeSpace, fit: Fit) -> FloatArray:
+    """Return the posed vertices, shape (V, 3)."""
+    rotation, offset = joint_transforms(space.joints(fit.parameters), space.base.parents, fit.pose)
+    return skin(space.vertices(fit.parameters), space.base.weights, rotation, offset) + fit.translation
+
+
+def refine(space: ShapeSpace, fit: Fit, pairs: Pairs, noise: float) -> Fit:
+    """Take one Gauss-Newton step.
+
+    Args:
+        space: The shape space.
+        fit: Where to step from.
+        pairs: Point-to-plane correspondences.
+        noise: Spread of the distances [m]: how much the pairs count against the prior.
+    """
+    pairs = pairs.counting()
+    vertices = model(space, fit)
+    points = np.einsum("nk,nkd->nd", pairs.shares, vertices[pairs.corners])
+    wrong = ((points - pairs.targets) * pairs.normals).sum(axis=1)
+    joints = len(space.base.joints)
+    count = len(space.names)
+    # neighbouring points err together: all of them count as a few hundred independent ones
+    weight = np.sqrt(pairs.weights * _INDEPENDENT / max(len(wrong), 1)) / noise
+    sigma = np.array([_POSE_SIGMA_RAD.get(name.rpartition("_")[2], 10.0) for name in space.base.joint_names])
+    prior = np.zeros((count + 3 * joints, count + 3 * joints + 3))
+    prior[:count, :count] = space.whitener
+    prior[count:, count : count + 3 * joints] = np.diag(np.repeat(1 / sigma, 3))
+    rotation, _ = joint_transforms(space.joints(fit.parameters), space.base.parents, fit.pose)
+    above = np.stack([np.eye(3) if parent < 0 else rotation[parent] for parent in space.base.parents])
+    # the joints turn in world axes: so must the pose that is drawn to zero
+    bent = np.einsum("jab,jb->ja", above, fit.pose)
+    straight = np.concatenate([space.whitener @ fit.parameters, (bent / sigma[:, None]).ravel()])
+    slope = _slope(space, fit, pairs) * weight[:, None]
+    normal = slope.T @ slope + prior.T @ prior
+    right = -slope.T @ (wrong * weight) - prior.T @ straight
+    move = np.linalg.solve(normal + 1e-9 * np.eye(len(normal)), right)
+    turn = move[count : count + 3 * joints].reshape(-1, 3)
+    turn *= min(1.0, _MAX_TURN_RAD / max(np.abs(turn).max(), 1e-12))
+    pose = np.empty_like(fit.pose)
+    for j in range(joints):
+        local = above[j].T @ Rotation.from_rotvec(turn[j]).as_matrix() @ above[j]
+        pose[j] = (Rotation.from_matrix(local) * Rotation.from_rotvec(fit.pose[j])).as_rotvec()
+    return replace(fit, parameters=fit.parameters + move[:count], pose=pose, translation=fit.translation + move[-3:])
+
+
+def _slope(space: ShapeSpace, fit: Fit, pairs: Pairs) -> FloatArray:
+    """Derivative of each pair's distance by shape, joint turns in world axes, translation: (N, P + 3 J + 3)."""
+    base = space.base
+    joints = space.joints(fit.parameters)
+    rotation, offset = joint_transforms(joints, base.parents, fit.pose)
+    used, where = np.unique(pairs.corners, return_inverse=True)
+    where = where.reshape(pairs.corners.shape)
+    weights, bind = base.weights[used], space.vertices(fit.parameters)[used]
+    blended = (weights @ rotation.reshape(len(rotation), 9)).reshape(-1, 3, 3)
+    # shape: the bind pose moves, and the joints about which it is turned
+    moved = np.zeros_like(space.joint_fields)
+    for j, parent in enumerate(base.parents):
+        own = space.joint_fields[:, j]
+        moved[:, j] = (
+            own if parent < 0 else moved[:, parent] + (own - space.joint_fields[:, parent]) @ rotation[parent].T
+        )
+    carried = moved - np.einsum("jab,pjb->pja", rotation, space.joint_fields)
+    fields = np.ascontiguousarray(space.fields[:, used].transpose(1, 2, 0))
+    by_shape = blended @ fields + np.tensordot(weights, carried, axes=(1, 1)).swapaxes(1, 2)
+    # pose: everything beyond a joint turns about the joint's place
+    each = np.einsum("jab,vb->vja", rotation, bind) + offset
+    place = np.einsum("jab,jb->ja", rotation, joints) + offset
+    beyond = _descendants(base.parents)
+    weighted = np.tensordot(weights[:, :, None] * each, beyond, axes=(1, 0)).swapaxes(1, 2)
+    lever = weighted - (weights @ beyond)[:, :, None] * place
+    out = np.zeros((len(pairs.weights), len(space.names) + 3 * len(joints) + 3))
+    for corner in range(3):
+        share, row = pairs.shares[:, corner, None], where[:, corner]
+        out[:, : len(space.names)] += share * (pairs.normals[:, None] @ by_shape[row])[:, 0]
+        out[:, len(space.names) : -3] += share * np.cross(lever[row], pairs.normals[:, None]).reshape(len(row), -1)
+    out[:, -3:] = pairs.normals
+    return out
+
+
+def _descendants(parents: IntArray) -> FloatArray:
+    """1 where joint j lies at or beyond joint k, shape (J, J)."""
+    beyond = np.eye(len(parents))
+    for j, parent in enumerate(parents):
+        if parent >= 0:
+            beyond[j] = np.maximum(beyond[j], beyond[parent])
+            beyond[j, j] = 1.0
+    return beyond

@@ -1,0 +1,75 @@
+"""How well a registered body explains its scan, and whether it is a body at all."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vto_pipeline.avatar.correspondence import closest_points
+from vto_pipeline.avatar.shape import ShapeSpace
+from vto_pipeline.errors import AvatarError
+from vto_pipeline.geometry.sampling import sample_surface
+from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+
+EXPLAINED_M = 0.010
+"""Farther scan points are something else: a stand, a floor, hair."""
+CORE = 0.3
+"""A vertex belongs to trunk and limbs when it belongs less than this to head, hands and feet."""
+_TRUNK = 0.8
+_MIN_TRUNK = 0.3
+_POINTS = 5000
+
+
+def check(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray, max_mean_mm: float) -> None:
+    """Refuse what is no body.
+
+    Raises:
+        AvatarError: the scan lies too far from any body, or shows too little of the trunk.
+    """
+    points, _, _ = sample_surface(scan, _POINTS, 0)
+    mean = float(closest_points(points, vertices, space.base.faces)[2].mean()) * 1e3
+    share = _trunk_covered(scan, space, vertices)
+    if mean > max_mean_mm or share < _MIN_TRUNK:
+        raise AvatarError(
+            f"this is not a body, or too little of one: mean distance {mean:.1f} mm (at most {max_mean_mm}), "
+            f"{share:.0%} of the trunk found (at least {_MIN_TRUNK:.0%})",
+            hint="the scan must show the trunk from all sides, in metres, +Y up",
+        )
+
+
+def report(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray, job: Job) -> None:
+    """Measure how far the scan lies from the body, at points that the fit has not seen."""
+    faces = space.base.faces
+    points, _, _ = sample_surface(scan, _POINTS, job.seed + 1)
+    face, _, distance = closest_points(points, vertices, faces)
+    core = ends(space)[faces].mean(axis=1)[face] < CORE
+    explained = distance < EXPLAINED_M
+    for kind, which in (("", slice(None)), ("core_", core), ("explained_", explained)):
+        part = distance[which] * 1e3
+        if len(part):
+            job.measure(
+                **{
+                    f"{kind}mean_mm": round(float(part.mean()), 3),
+                    f"{kind}rms_mm": round(float(np.sqrt((part**2).mean())), 3),
+                    f"{kind}p95_mm": round(float(np.quantile(part, 0.95)), 3),
+                }
+            )
+    job.measure(explained_share=round(float(explained.mean()), 3))
+    job.measure(trunk_covered=round(_trunk_covered(scan, space, vertices), 3))
+
+
+def ends(space: ShapeSpace) -> FloatArray:
+    """Return how much each vertex belongs to head, hands and feet, 0 to 1, shape (V,)."""
+    joints = [
+        k for k, name in enumerate(space.base.joint_names) if name.rpartition("_")[2] in ("head", "wrist", "ankle")
+    ]
+    share: FloatArray = space.base.weights[:, joints].sum(axis=1)
+    return share
+
+
+def _trunk_covered(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray) -> float:
+    names = space.base.joint_names
+    trunk = space.base.weights[:, [names.index(n) for n in ("pelvis", "spine", "chest")]].sum(axis=1) > _TRUNK
+    seen = closest_points(vertices[trunk], scan.vertices, scan.faces)[2]
+    return float((seen < EXPLAINED_M).mean())

@@ -1,0 +1,256 @@
+"""Shape parameters: smooth fields that stretch segments, scale sections and push out bust, belly and seat.
+
+A body is template + sum of parameter x field. Every field is a closed formula of a vertex's place on the template
+(level along the trunk, the leg or the arm, and how much it belongs to arm and leg): the same formula moves the joints.
+Heights change by functions of height alone, breadths by functions of height times breadth: they do not disturb each
+other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from vto_pipeline.avatar.body_plan import FEMALE, MALE
+from vto_pipeline.avatar.implicit import arm_axis
+from vto_pipeline.avatar.pose import pose_avatar
+from vto_pipeline.avatar.template import membership, template
+from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.body import Avatar
+
+SEX_SHARE = {"female": 0.0, "neutral": 0.5, "male": 1.0}
+"""What people call a body -> its place between the two templates."""
+
+_TRUNK_KNOTS = ("hip", "high_hip", "waist", "underbust", "chest", "shoulder")
+_LEG_KNOTS = ("ankle", "calf", "knee", "midthigh", "thigh")
+_NEIGHBOUR_CORRELATION = 0.8
+_ARM_KNOTS = ("armpit", "upper_arm", "elbow", "forearm", "wrist", "hand")
+
+
+@dataclass(frozen=True)
+class ShapeSpace:
+    """All fields of one sex's template.
+
+    Args:
+        base: The template.
+        names: P parameter names.
+        sigmas: Spread of each parameter among people, rough; shape (P,).
+        whitener: Takes parameters to independent unit normals; neighbours vary together; shape (P, P).
+        fields: Displacement per unit of each parameter [m], shape (P, V, 3).
+        joint_fields: The same for the joints, shape (P, J, 3).
+    """
+
+    base: Avatar
+    names: tuple[str, ...]
+    sigmas: FloatArray
+    whitener: FloatArray
+    fields: FloatArray
+    joint_fields: FloatArray
+
+    def vertices(self, parameters: FloatArray) -> FloatArray:
+        """Return the body in the bind pose, shape (V, 3)."""
+        return self.base.bind_vertices + np.tensordot(parameters, self.fields, 1)
+
+    def joints(self, parameters: FloatArray) -> FloatArray:
+        """Return the joints in the bind pose, shape (J, 3)."""
+        return self.base.joints + np.tensordot(parameters, self.joint_fields, 1)
+
+    def avatar(self, parameters: FloatArray) -> Avatar:
+        """Return the body in the bind pose, standing on the floor."""
+        vertices, joints = self.vertices(parameters), self.joints(parameters)
+        floor = np.array([0.0, vertices[:, 1].min(), 0.0])
+        body = replace(
+            self.base,
+            bind_vertices=vertices - floor,
+            joints=joints - floor,
+            parameters=dict(zip(self.names, parameters.tolist(), strict=True)),
+        )
+        return pose_avatar(body, np.zeros_like(joints), np.zeros(3))
+
+
+@lru_cache(maxsize=4)
+def shape_space(sex: float) -> ShapeSpace:
+    """Return the shape space about the mean body of a sex (0 female ... 1 male)."""
+    base = template(sex)
+    arm, leg = membership("arm"), membership("leg")
+    on_arm = np.array(
+        [name.rpartition("_")[2] in ("shoulder", "elbow", "wrist") for name in base.joint_names], dtype=float
+    )
+    on_leg = np.array([name.rpartition("_")[2] in ("hip", "knee", "ankle") for name in base.joint_names], dtype=float)
+    skin = _fields(sex, base.bind_vertices, arm, leg)
+    bone = _fields(sex, base.joints, on_arm, on_leg)
+    names = tuple(skin)
+    sigmas = np.array([skin[name][0] for name in names])
+    return ShapeSpace(
+        base,
+        names,
+        sigmas,
+        np.linalg.inv(np.linalg.cholesky(_covariance(names, sigmas))),
+        np.stack([skin[name][1] for name in names]),
+        np.stack([bone[name][1] for name in names]),
+    )
+
+
+def _covariance(names: tuple[str, ...], sigmas: FloatArray) -> FloatArray:
+    chains = [[f"{knot}_{what}" for knot in _TRUNK_KNOTS] for what in ("breadth", "depth", "shift", "fullness")]
+    chains += [[f"{knot}_girth" for knot in _LEG_KNOTS], [f"{knot}_scale" for knot in _ARM_KNOTS]]
+    likeness = np.eye(len(names))
+    for chain in chains:
+        place = np.array([names.index(name) for name in chain])
+        likeness[np.ix_(place, place)] = _NEIGHBOUR_CORRELATION ** np.abs(
+            np.subtract.outer(range(len(chain)), range(len(chain)))
+        )
+    return likeness * np.outer(sigmas, sigmas)
+
+
+def _fields(sex: float, points: FloatArray, arm: FloatArray, leg: FloatArray) -> dict[str, tuple[float, FloatArray]]:
+    """Return name -> (spread, field at the points)."""
+    level = {name: _blend(sex, FEMALE.levels[name], MALE.levels[name]) for name in MALE.levels}
+    shoulder = _blend(sex, FEMALE.shoulder, MALE.shoulder)
+    neck_base = _blend(sex, FEMALE.side_neck[1], MALE.side_neck[1])
+    crown = _blend(sex, FEMALE.head[-1, 0], MALE.head[-1, 0])
+    side = np.sign(points[:, 0])
+    x, y, z = np.abs(points[:, 0]), points[:, 1], points[:, 2]
+    trunk = 1 - arm
+    out: dict[str, tuple[float, FloatArray]] = {}
+
+    def add(
+        name: str,
+        sigma: float,
+        dx: FloatArray | float = 0.0,
+        dy: FloatArray | float = 0.0,
+        dz: FloatArray | float = 0.0,
+    ) -> None:
+        out[name] = (sigma, np.stack([side * dx, np.broadcast_to(dy, y.shape), np.broadcast_to(dz, y.shape)], axis=1))
+
+    def carried(of_place: FloatArray, at_shoulder: float) -> FloatArray:
+        """A trunk's field, by which arms are carried along as the shoulder joint is."""
+        return trunk * of_place + arm * at_shoulder
+
+    stops = [
+        0.0,
+        level["ankle"],
+        level["knee"],
+        level["crotch"],
+        level["waist"],
+        neck_base,
+        level["neck"] + 0.02,
+        crown,
+    ]
+    for name, low, high in zip(
+        ("foot", "shank", "thigh", "pelvis", "thorax", "neck", "head"), stops, stops[1:], strict=False
+    ):
+        add(
+            f"{name}_height",
+            0.06,
+            dy=carried(np.clip(y, low, high) - low, float(np.clip(shoulder[1], low, high) - low)),
+        )
+
+    _add_trunk(add, carried, level, shoulder, neck_base, x, y, z)
+    _add_legs(add, sex, level, leg, x, y, z)
+    _add_arms(add, sex, arm, np.stack([x, y, z], axis=1) - shoulder)
+    tall = level["neck"] + 0.01
+    head = _ramp(y, tall, tall + 0.06) * trunk
+    add("head_breadth", 0.05, dx=x * head)
+    add("head_depth", 0.05, dz=z * head)
+    ahead = _ramp(y, level["chest"], crown) ** 1.5
+    add("head_forward", 0.02, dz=carried(ahead, float(_ramp(np.array(shoulder[1]), level["chest"], crown) ** 1.5)))
+    return out
+
+
+def _add_trunk(  # type: ignore[no-untyped-def]
+    add,
+    carried,
+    level: dict[str, float],
+    shoulder: FloatArray,
+    neck_base: float,
+    x: FloatArray,
+    y: FloatArray,
+    z: FloatArray,
+) -> None:
+    heights = [level[name] for name in _TRUNK_KNOTS[:-1]] + [shoulder[1]]
+    middle = np.interp(y, [*heights, neck_base], [-0.02, 0.0, 0.008, 0.004, 0.0, -0.025, -0.02])
+    knots = np.array([level["thigh"] - 0.04, *heights, level["neck"]])
+    up = _ramp(y, level["chest"], shoulder[1])
+    outward = _ramp(x, 0.05, shoulder[0])
+    rings, at_shoulder = _cardinal(knots, y), _cardinal(knots, shoulder[1:2])[0]
+    for k, name in enumerate(_TRUNK_KNOTS, start=1):
+        ring, there = rings[:, k], float(at_shoulder[k])
+        # broad chests have broad shoulders: the arms make room
+        along = 0.6 * shoulder[0] if name == "chest" else 0.0
+        add(f"{name}_breadth", 0.10, dx=carried(x * ring + along * outward * up, shoulder[0] * there + along))
+        add(f"{name}_depth", 0.12, dz=carried((z - middle) * ring, 0.0))
+        add(f"{name}_shift", 0.010, dz=carried(ring, there))
+        corner = ring * (2 * x * (z - middle) / (x**2 + (z - middle) ** 2 + 1e-6)) ** 2
+        add(f"{name}_fullness", 0.04, dx=carried(x * corner, 0.0), dz=carried((z - middle) * corner, 0.0))
+    neck = _cardinal(np.array([shoulder[1] - 0.01, neck_base, level["neck"], level["neck"] + 0.08]), y)
+    for name, ring in (("neck_base", neck[:, 1]), ("neck", neck[:, 2])):
+        add(f"{name}_girth", 0.08, dx=carried(x * ring, 0.0), dz=carried((z + 0.01) * ring, 0.0))
+    front, back = _ramp(z, -0.02, 0.06), _ramp(-z, -0.02, 0.06)
+    bust = _bell(x, 0.080, 0.055) * _bell(y, level["chest"], 0.055) * front
+    add("bust", 0.012, dx=carried(0.15 * bust, 0.0), dz=carried(bust, 0.0))
+    add("belly", 0.020, dz=carried(_bell(x, 0.0, 0.11) * _bell(y, level["navel"] - 0.03, 0.09) * front, 0.0))
+    add("seat", 0.012, dz=carried(-_bell(x, 0.085, 0.075) * _bell(y, level["hip"], 0.07) * back, 0.0))
+    add("shoulder_width", 0.012, dx=carried(outward * up, 1.0))
+    add("shoulder_slope", 0.012, dy=carried(-outward * up, -1.0))
+
+
+def _add_legs(  # type: ignore[no-untyped-def]
+    add, sex: float, level: dict[str, float], leg: FloatArray, x: FloatArray, y: FloatArray, z: FloatArray
+) -> None:
+    axis = _blend(sex, FEMALE.leg, MALE.leg)[::-1]
+    center, radius = np.interp(y, axis[:, 0], axis[:, 1]), np.interp(y, axis[:, 0], axis[:, 2])
+    depth = np.interp(y, axis[:, 0], (axis[:, 3] + axis[:, 4]) / 2)
+    apart = _ramp(x, 0.0, 0.05)
+    heights = [level["ankle"], level["calf"], level["knee"], (level["knee"] + level["thigh"]) / 2, level["thigh"]]
+    rings = _cardinal(np.array([0.3 * level["ankle"], *heights, level["hip"] + 0.02]), y) * leg[:, None]
+    for k, name in enumerate(_LEG_KNOTS, start=1):
+        ring = rings[:, k]
+        # the gap between the thighs stays: they grow outwards
+        outwards = radius * ring if name in ("midthigh", "thigh") else 0.0
+        add(f"{name}_girth", 0.09, dx=((x - center) * ring + outwards) * apart, dz=(z - depth) * ring)
+    low = level["crotch"] - 0.02
+    add("crotch", 0.015, dy=_bell(x, 0.0, 0.05) * _bell(y, low, 0.06))
+    add("stance", 0.02, dx=(1 - _ramp(y, level["ankle"], level["hip"])) * leg)
+    foot = _ramp(-y, -level["ankle"], -0.4 * level["ankle"])
+    add("foot_length", 0.05, dz=(z + 0.03) * foot)
+    add("foot_breadth", 0.05, dx=(x - center) * foot)
+
+
+def _add_arms(add, sex: float, arm: FloatArray, from_shoulder: FloatArray) -> None:  # type: ignore[no-untyped-def]
+    elbow, wrist, tip = (
+        _blend(sex, getattr(FEMALE, name), getattr(MALE, name)) for name in ("elbow", "wrist", "fingertip")
+    )
+    axis = arm_axis()
+    along = from_shoulder @ axis
+    radial = from_shoulder - along[:, None] * axis
+    for name, low, high in (("upper_arm", 0.09, elbow), ("forearm", elbow, wrist), ("hand", wrist, tip)):
+        stretch = (np.clip(along, low, high) - low) * arm
+        add(f"{name}_length", 0.06, dx=stretch * axis[0], dy=stretch * axis[1])
+    knots = np.array([-0.05, 0.05, 0.16, elbow, elbow + 0.06, wrist, (wrist + tip) / 2, tip + 0.10])
+    rings = _cardinal(knots, along) * arm[:, None]
+    for k, name in enumerate(_ARM_KNOTS, start=1):
+        dx, dy, dz = (radial * rings[:, k, None]).T
+        add(f"{name}_scale", 0.10, dx=dx, dy=dy, dz=dz)
+
+
+def _blend(sex, female, male):  # type: ignore[no-untyped-def]
+    return (1 - sex) * female + sex * male
+
+
+def _ramp(value: FloatArray, low: float, high: float) -> FloatArray:
+    """0 below, 1 above, smooth between."""
+    t = np.clip((value - low) / (high - low), 0.0, 1.0)
+    return t * t * (3 - 2 * t)
+
+
+def _cardinal(knots: FloatArray, value: FloatArray) -> FloatArray:
+    """Cubic splines, each 1 at its own knot and 0 at the others, flat at both ends, shape (N, K)."""
+    return CubicSpline(knots, np.eye(len(knots)), bc_type="clamped")(np.clip(value, knots[0], knots[-1]))
+
+
+def _bell(value: FloatArray, center: float, width: float) -> FloatArray:
+    return np.exp(-(((value - center) / width) ** 2))

@@ -1,0 +1,185 @@
+"""The tape: each measurement as a function of the vertices, with its derivative.
+
+A taut tape spans hollows, so a girth is the perimeter of the convex hull of a plane section through the right part of
+the body.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
+
+from vto_pipeline.avatar.definitions import Definition
+from vto_pipeline.avatar.template import columns, membership
+from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.body import Avatar
+
+DENSITY_KG_M3 = 985.0
+"""Of a living body with air in its lungs; between 960 (fat) and 1070 (lean)."""
+_ARM_ROWS = ("upper_arm", "elbow", "forearm", "wrist")
+_LEG_ROWS = ("thigh", "knee", "calf", "ankle")
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A measured value and how it follows the vertices.
+
+    Args:
+        value: [m], or kg for the mass.
+        vertices: Which vertices it depends on, shape (N,).
+        gradient: Derivative by their positions, shape (N, 3).
+    """
+
+    value: float
+    vertices: NDArray[np.int64]
+    gradient: FloatArray
+
+
+class Tape:
+    """Reads measurements off any body of our topology, in the bind pose."""
+
+    def __init__(self, body: Avatar) -> None:
+        self._body = body
+        self._columns = columns()
+
+    def read(self, what: Definition, vertices: FloatArray, side: str = "left") -> Reading:
+        """Read one measurement.
+
+        Args:
+            what: Its definition.
+            vertices: The body in the bind pose [m], shape (V, 3).
+            side: "left" or "right", where the measurement lies on a limb.
+        """
+        if what.kind == "mass":
+            return _mass(vertices, self._body.faces)
+        if what.kind == "path":
+            column, _, end = what.place.partition(":")
+            return _path(vertices, self._column(column, end, side))
+        if what.kind == "span":
+            return _path(vertices, np.array([self._landmark(name, side) for name in what.place.split()]))
+        if what.kind == "loop":
+            row = self._row(what.place, side)
+            return _path(vertices, np.append(row, row[0]))
+        if what.kind == "height":
+            return self._height(what.place, vertices, side)
+        if what.kind == "drop":
+            ends = np.array([self._landmark(name, side) for name in what.place.split()], dtype=np.int64)
+            return Reading(
+                float(vertices[ends[0], 1] - vertices[ends[1], 1]), ends, np.array([[0, 1.0, 0], [0, -1.0, 0]])
+            )
+        points = self._section(what.place, vertices, side)
+        return points.hull() if what.kind == "girth" else points.extent(0 if what.kind == "breadth" else 2)
+
+    def _row(self, name: str, side: str) -> IntArray:
+        loops = self._body.loops
+        return loops[name] if name in loops else loops[f"{side}_{name}"]
+
+    def _landmark(self, name: str, side: str) -> int:
+        landmarks = self._body.landmarks
+        return landmarks[name] if name in landmarks else landmarks[f"{side}_{name}"]
+
+    def _column(self, name: str, end: str, side: str) -> IntArray:
+        column = self._columns[name if name in self._columns else f"{side}_{name}"]
+        if not end:
+            return column
+        stop = np.flatnonzero(np.isin(column, self._body.loops[end]))[0]
+        return column[stop:]
+
+    def _height(self, place: str, vertices: FloatArray, side: str) -> Reading:
+        landmarks = self._body.landmarks
+        single = place in landmarks or f"{side}_{place}" in landmarks
+        top = np.array([self._landmark(place, side)]) if single else self._row(place, side)
+        sole = int(np.argmin(vertices[:, 1]))
+        gradient = np.zeros((len(top) + 1, 3))
+        gradient[:-1, 1], gradient[-1, 1] = 1 / len(top), -1.0
+        value = float(vertices[top, 1].mean() - vertices[sole, 1])
+        return Reading(value, np.append(top, sole).astype(np.int64), gradient)
+
+    def _section(self, place: str, vertices: FloatArray, side: str) -> Section:
+        row = self._row(place, side)
+        if place in _ARM_ROWS:
+            ends = [vertices[self._row(name, side)].mean(axis=0) for name in ("upper_arm", "wrist")]
+            normal, edges = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0]), self._edges[f"{side}_arm"]
+        elif place in _LEG_ROWS:
+            normal, edges = np.array([0.0, 1.0, 0.0]), self._edges[f"{side}_leg"]
+        else:
+            normal, edges = np.array([0.0, 1.0, 0.0]), self._edges["trunk"]
+        return Section(vertices, row, normal, edges)
+
+    @cached_property
+    def _edges(self) -> dict[str, NDArray[np.int64]]:
+        faces = self._body.faces.astype(np.int64)
+        pairs = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+        edges = np.unique(pairs, axis=0)
+        arm, leg, x = membership("arm"), membership("leg"), self._body.bind_vertices[:, 0]
+        parts = {"trunk": arm < 0.5}
+        for side, sign in (("left", 1), ("right", -1)):
+            parts[f"{side}_arm"] = (arm > 0.5) & (sign * x > 0)
+            parts[f"{side}_leg"] = (leg > 0.2) & (sign * x >= 0)
+        return {name: edges[inside[edges].all(axis=1)] for name, inside in parts.items()}
+
+
+class Section:
+    """The points where a plane through a row's middle cuts the edges of a part."""
+
+    def __init__(self, vertices: FloatArray, row: IntArray, normal: FloatArray, edges: NDArray[np.int64]) -> None:
+        self._normal, self._row, self._level = normal, row, vertices[row].mean(axis=0) @ normal
+        height = vertices @ normal - self._level
+        self._edges = edges[(height[edges[:, 0]] < 0) != (height[edges[:, 1]] < 0)]
+        below, above = height[self._edges].T
+        self._share = (below / (below - above))[:, None]
+        start, end = vertices[self._edges[:, 0]], vertices[self._edges[:, 1]]
+        self._span = end - start
+        self.points = start + self._share * self._span
+
+    def hull(self) -> Reading:
+        """Perimeter of the convex hull."""
+        across = np.linalg.svd(self._normal[None])[2][1:]
+        order = ConvexHull(self.points @ across.T).vertices
+        corner = self.points[order]
+        side = np.roll(corner, -1, axis=0) - corner
+        length = np.linalg.norm(side, axis=1, keepdims=True)
+        pull = np.roll(side / length, 1, axis=0) - side / length
+        return self._reading(float(length.sum()), order, pull)
+
+    def extent(self, axis: int) -> Reading:
+        """Size along a world axis."""
+        low, high = int(np.argmin(self.points[:, axis])), int(np.argmax(self.points[:, axis]))
+        pull = np.zeros((2, 3))
+        pull[0, axis], pull[1, axis] = -1.0, 1.0
+        return self._reading(float(self.points[high, axis] - self.points[low, axis]), np.array([low, high]), pull)
+
+    def _reading(self, value: float, which: NDArray[np.int64], pull: FloatArray) -> Reading:
+        """Chain rule from section points to edge ends, and to the row whose middle carries the plane."""
+        edges, share, span = self._edges[which], self._share[which], self._span[which]
+        # a point slides along its edge as the plane moves against it
+        slide = (pull * span).sum(axis=1, keepdims=True) / (span @ self._normal)[:, None]
+        ends = [(1 - share) * (pull - slide * self._normal), share * (pull - slide * self._normal)]
+        middle = np.tile(slide.sum() * self._normal / len(self._row), (len(self._row), 1))
+        return Reading(
+            value,
+            np.concatenate([edges[:, 0], edges[:, 1], self._row]).astype(np.int64),
+            np.concatenate([*ends, middle]),
+        )
+
+
+def _path(vertices: FloatArray, path: NDArray[np.int64] | IntArray) -> Reading:
+    step = np.diff(vertices[path], axis=0)
+    length = np.linalg.norm(step, axis=1, keepdims=True)
+    gradient = np.zeros((len(path), 3))
+    gradient[1:] += step / length
+    gradient[:-1] -= step / length
+    return Reading(float(length.sum()), path.astype(np.int64), gradient)
+
+
+def _mass(vertices: FloatArray, faces: IntArray) -> Reading:
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    gradient = np.zeros_like(vertices)
+    for corner, slope in zip(faces.T, (np.cross(b, c), np.cross(c, a), np.cross(a, b)), strict=True):
+        np.add.at(gradient, corner, slope / 6)
+    volume = float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
+    return Reading(DENSITY_KG_M3 * volume, np.arange(len(vertices)), DENSITY_KG_M3 * gradient)
