@@ -1,0 +1,45 @@
+"""The render mesh: the garment in full detail, where the drape has taken it."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from vto_pipeline.geometry.decimate import decimate
+from vto_pipeline.geometry.topology import vertex_normals
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.render import GlbPart
+from vto_pipeline.model.settings import Config
+from vto_pipeline.render.transfer import apply, bind
+
+
+class DressConfig(Config):
+    """Settings of the render mesh."""
+
+    max_triangles: int = Field(
+        130_000, ge=1_000, le=5_000_000, description="As many as web viewers take; a finer scan is thinned out."
+    )
+
+
+def dress(
+    garment: TriangleMesh, sim_mesh: TriangleMesh, draped: TriangleMesh, config: DressConfig, job: Job
+) -> list[GlbPart]:
+    """Move the detailed garment as the simulation mesh has moved.
+
+    Args:
+        garment: Detailed mesh as scanned [m].
+        sim_mesh: Simulation mesh as scanned [m].
+        draped: The same mesh on the body [m].
+        config: Settings.
+        job: Takes figures and what was left out.
+
+    Returns:
+        One part, "garment", with normals and the scan's colours.
+    """
+    if len(garment.faces) <= config.max_triangles:
+        job.leave_out("thinning out", f"{len(garment.faces)} triangles, {config.max_triangles} are allowed")
+    detailed = decimate(garment, config.max_triangles)
+    binding = bind(detailed, sim_mesh)
+    mesh = TriangleMesh(apply(binding, draped.vertices), detailed.faces, detailed.colors)
+    job.measure(triangles=len(mesh.faces))
+    return [GlbPart("garment", mesh, normals=vertex_normals(mesh))]

@@ -1,0 +1,80 @@
+"""Which things the page's 3D view can show, from the artifacts of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vto_pipeline.model.arrays import ByteArray
+from vto_pipeline.model.body import Avatar
+from vto_pipeline.model.garment import SurfaceLabels
+from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.render import GlbPart
+from vto_pipeline.report.render_colors import join_parts
+from vto_pipeline.report.scales import CLEARANCE, SCAN, STRETCH, Key, Ramp
+
+_SKIN, _CLOTH, _FORM = "#d6b59c", "#6a8fc0", "#b9b5ad"
+_GROUPS = ("garment", "body", "scan")
+_PLAIN = (  # artifact, name, group, colour where it has none of its own
+    ("render_mesh", "Garment", "garment", _CLOTH),
+    ("draped", "Simulated cloth", "garment", _CLOTH),
+    ("garment", "Garment as scanned", "garment", _CLOTH),
+    ("avatar", "Body", "body", _SKIN),
+    ("mannequin_surface", "Mannequin", "body", _FORM),
+    ("garment_surface", "Garment scan", "scan", _CLOTH),
+    ("body_surface", "Body scan", "scan", _SKIN),
+)
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One thing that can be shown or hidden.
+
+    Args:
+        name: For people.
+        mesh: Its shape.
+        group: One of _GROUPS; of each one layer is shown at a time.
+        paint: Colour of all, as #rrggbb, or of each vertex, shape (V, 3).
+        scale: Explains the colours.
+    """
+
+    name: str
+    mesh: TriangleMesh
+    group: str
+    paint: str | ByteArray
+    scale: Ramp | Key | None = None
+
+
+def list_layers(parts: Mapping[str, Any]) -> list[Layer]:
+    """Return what can be shown; of each group, what is best to show first comes first.
+
+    Args:
+        parts: Artifact -> value; those that have no shape serve as colours or not at all.
+    """
+    layers = []
+    for artifact, name, group, color in _PLAIN:
+        if artifact in parts:
+            mesh = _surface(parts[artifact])
+            layers.append(Layer(name, mesh, group, color if mesh.colors is None else mesh.colors))
+    if "draped" in parts and "fit_maps" in parts:
+        maps, draped = parts["fit_maps"], parts["draped"]
+        layers.append(Layer("Stretch", draped, "garment", STRETCH.paint(100 * (maps["stretch"] - 1)), STRETCH))
+        layers.append(Layer("Clearance", draped, "garment", CLEARANCE.paint(maps["clearance_mm"]), CLEARANCE))
+    if "garment_surface" in parts and "labels" in parts:
+        surface = parts["garment_surface"]
+        layers.append(Layer("Labels", surface, "scan", SCAN.paint(_kinds(parts["labels"])), SCAN))
+    return sorted(layers, key=lambda layer: _GROUPS.index(layer.group))
+
+
+def _surface(value: TriangleMesh | Avatar | Sequence[GlbPart]) -> TriangleMesh:
+    if isinstance(value, TriangleMesh):
+        return value
+    return value.mesh if isinstance(value, Avatar) else join_parts(value)
+
+
+def _kinds(labels: SurfaceLabels) -> np.ndarray:
+    """Index into SCAN for each vertex of the scanned surface."""
+    return np.where(labels.observed, np.where(labels.garment, 0, 1), 2)

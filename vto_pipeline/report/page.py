@@ -1,0 +1,61 @@
+"""The page: everything about a run in one file that needs nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from vto_pipeline.report.chart import log_chart
+from vto_pipeline.report.layers import list_layers
+from vto_pipeline.report.scene import build_scene, script_json
+from vto_pipeline.report.tables import left_out_rows, measurement_rows
+from vto_pipeline.report.verdicts import collect_verdicts
+from vto_pipeline.report.wording import centimetres, duration, figure, label, number
+
+_HERE = Path(__file__).parent
+
+
+def build_page(run_record: Mapping[str, Any], parts: Mapping[str, Any]) -> str:
+    """Return the report of a run as one HTML document without references to anything outside.
+
+    Args:
+        run_record: What run.json holds.
+        parts: Artifact -> value, as far as there are any: meshes and avatar for the 3D view with "fit_maps" and
+            "labels" for its colours, "fit_report", "measurements", "openings", "audit", "trace". Others are ignored.
+    """
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters |= {"cm": centimetres, "duration": duration, "label": label, "number": number}
+    environment.globals |= {"figure": figure}
+    layers = list_layers(parts)
+    trace = parts.get("trace", [])
+    return environment.from_string(_asset("page.html")).render(
+        title=_title(parts),
+        style=_asset("page.css"),
+        viewer=_asset("viewer.js"),
+        scene=script_json(build_scene(layers)) if layers else "",
+        verdicts=collect_verdicts(run_record, parts),
+        fit=parts.get("fit_report"),
+        measurements=measurement_rows(parts.get("measurements"), parts.get("body_measurements")),
+        openings=parts.get("openings", []),
+        audit=parts.get("audit", {}),
+        chart=log_chart([r.seconds for r in trace], [r.error_mm for r in trace], "run time [s]", "error [mm]"),
+        trace_end=trace[-1] if trace else None,
+        run=run_record,
+        stages=[stage for stage in run_record.get("stages", []) if stage["status"] not in ("left_out", "planned")],
+        left_out=left_out_rows(run_record),
+    )
+
+
+def _title(parts: Mapping[str, Any]) -> str:
+    if "draped" in parts or "render_mesh" in parts:
+        return "Garment on a body"
+    if "garment" in parts or "garment_surface" in parts:
+        return "Scanned garment"
+    return "Body" if "avatar" in parts or "body_surface" in parts else "Run"
+
+
+def _asset(name: str) -> str:
+    return (_HERE / name).read_text(encoding="utf-8")

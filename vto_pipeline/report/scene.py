@@ -1,0 +1,51 @@
+"""The 3D view's data: meshes and colours as plain JSON values."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+from vto_pipeline.report.layers import Layer
+from vto_pipeline.report.packing import pack, pack_colors
+
+_TRIANGLES = 60_000  # of one mesh
+_TRIANGLES_ALL = 240_000  # of all meshes; keeps the page under 8 MB
+
+
+def build_scene(layers: Sequence[Layer]) -> dict[str, Any]:
+    """Return geometries, and layers that refer to them by number.
+
+    A mesh that several layers show is packed once. The first layer of each group starts visible, a scan only when there
+    is nothing else: what was made from it lies in the same place.
+    """
+    meshes = {id(layer.mesh): layer.mesh for layer in layers}
+    budget = min(_TRIANGLES, _TRIANGLES_ALL // max(len(meshes), 1))
+    packed = {key: pack(mesh, budget) for key, mesh in meshes.items()}
+    numbers = {key: number for number, key in enumerate(packed)}
+    groups: set[str] = set()
+    described = []
+    for layer in layers:
+        visible = layer.group not in groups and not (layer.group == "scan" and groups)
+        groups.add(layer.group)
+        if isinstance(layer.paint, str):
+            paint = {"color": layer.paint}
+        else:
+            paint = {"colors": pack_colors(layer.paint[packed[id(layer.mesh)].source])}
+        described.append(
+            {
+                "name": layer.name,
+                "group": layer.group,
+                "geometry": numbers[id(layer.mesh)],
+                "visible": visible,
+                "legend": None if layer.scale is None else layer.scale.legend(),
+                **paint,
+            }
+        )
+    return {"geometries": [one.geometry() for one in packed.values()], "layers": described}
+
+
+def script_json(value: Any) -> str:
+    """Return JSON that cannot end the script element it stands in, whatever the strings in it."""
+    text = json.dumps(value, allow_nan=False, separators=(",", ":"), sort_keys=True)
+    return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
