@@ -1,0 +1,1 @@
+"""Sample data with truth, and measuring against it."""
