@@ -1,0 +1,75 @@
+"""The command itself: quick to answer, helpful about its own words."""
+
+from __future__ import annotations
+
+import json
+import statistics
+import subprocess
+import sys
+import time
+from importlib import import_module
+
+import click
+import pytest
+
+from vto_pipeline.cli import main as main_module
+from vto_pipeline.cli.main import COMMANDS
+
+HEAVY = {"numpy", "scipy", "numba", "pydantic", "yaml", "rich", "open3d", "pycolmap", "cv2", "trimesh", "matplotlib"}
+
+
+def test_help_answers_at_once():
+    command = [sys.executable, "-m", "vto_pipeline.cli.main", "--help"]
+    seconds = []
+    for _ in range(5):
+        start = time.perf_counter()
+        subprocess.run(command, check=True, capture_output=True)
+        seconds.append(time.perf_counter() - start)
+    assert statistics.median(seconds) < 0.3  # the contract
+
+
+def test_help_loads_nothing_heavy():
+    source = f"""
+import json, sys
+from vto_pipeline.cli.main import main
+for arguments in [["--help"], *([name, "--help"] for name in {list(COMMANDS)})]:
+    assert main(arguments) == 0
+print(json.dumps(sorted(sys.modules)))
+"""
+    done = subprocess.run([sys.executable, "-c", source], check=True, capture_output=True, text=True)
+    loaded = {name.partition(".")[0] for name in json.loads(done.stdout.splitlines()[-1])}
+    assert "click" in loaded
+    assert not loaded & HEAVY
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_each_command_has_help_and_the_common_options(name, vto):
+    said = vto(name, "--help")
+    assert said.code == 0
+    assert "--json" in said.out
+    assert "--verbose" in said.out
+    command = getattr(import_module(f"vto_pipeline.cli.{name}"), f"{name}_command")
+    assert isinstance(command, click.Command)
+    assert command.name == name
+
+
+def test_words_it_does_not_know(vto):
+    said = vto("darpe")
+    assert (said.code, said.out) == (2, "")
+    assert "no such command: darpe\n  hint: did you mean drape?" in said.err
+    said = vto("plan", "toy.yaml", "--jsn")
+    assert said.code == 2
+    assert "--json" in said.err
+
+
+def test_bad_usage_is_json_where_json_is_asked_for(vto):
+    said = vto("plan", "--json")
+    assert said.code == 2
+    assert said.data["exit_code"] == 2
+    assert "FILE.yaml" in said.data["error"]["problem"]
+
+
+def test_the_table_of_commands_is_the_folder(request):
+    files = {path.stem for path in (request.config.rootpath / "vto_pipeline" / "cli").glob("*.py")}
+    assert set(COMMANDS) <= files
+    assert main_module.vto.list_commands(click.Context(main_module.vto)) == list(COMMANDS)

@@ -1,0 +1,155 @@
+"""vto run, plan, report: what goes to stdout, what to stderr, and with which exit code."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from toy_tables import CALLS, STAGES, TOY
+
+from vto_pipeline.cli import work
+from vto_pipeline.errors import DivergedError, MissingDependencyError
+
+
+def test_run_says_where_things_are(vto):
+    said = vto("run", "toy.yaml")
+    assert said.code == 0
+    assert said.out.splitlines()[0].endswith(" s; stages: 7 ran, 0 from the cache, 1 left out")
+    assert "  squared  runs/toy/out/squared.txt" in said.out.splitlines()
+    assert "warning from add: toy sum" in said.out
+    lines = said.err.splitlines()
+    assert "[1/7] left.double  twice the left" in lines
+    assert "         note: left.txt: read as a decimal number" in lines
+    assert any(line.startswith("[3/7] add  done in ") for line in lines)
+    assert Path("runs/toy/out/squared.txt").read_text() == "196"
+
+
+def test_a_second_run_comes_from_the_cache(vto):
+    vto("run", "toy.yaml", "-o", "there")
+    said = vto("run", "toy.yaml", "-o", "there")
+    assert "stages: 1 ran, 6 from the cache, 1 left out" in said.out
+    assert "[3/7] add  from the cache" in said.err
+
+
+def test_json_is_alone_on_stdout(vto):
+    said = vto("run", "toy.yaml", "--json", "--set", "add.offset=1")
+    assert said.code == 0
+    assert said.data["run"] == "runs/toy"
+    assert said.data | {"run": 0, "seconds": 0} == json.loads(Path("runs/toy/run.json").read_text()) | {
+        "run": 0,
+        "seconds": 0,
+    }
+    assert Path("runs/toy/out/total.txt").read_text() == "15"
+
+
+def test_a_misspelt_setting_is_located(vto):
+    Path("toy.yaml").write_text(Path("toy.yaml").read_text().replace("offset: 0", "ofset: 5000"))
+    said = vto("run", "toy.yaml")
+    assert said.code == 2
+    assert said.out == ""
+    assert said.err == (
+        "error: stages.add.ofset: unknown key (got 5000)\n  in toy.yaml, line 7\n  hint: did you mean offset?\n"
+    )
+    assert not Path("runs").exists()
+
+
+def test_errors_are_json_too_where_json_is_asked_for(vto):
+    said = vto("run", "toy.yaml", "--json", "--set", "add.ofset=1")
+    assert said.code == 2
+    assert said.data == {
+        "error": {
+            "kind": "ConfigError",
+            "problem": "stages.add.ofset: unknown key (got 1)",
+            "where": "--set add.ofset=1",
+            "hint": "did you mean offset?",
+        },
+        "exit_code": 2,
+    }
+
+
+def test_a_missing_document_and_a_missing_input(vto):
+    said = vto("run", "tody.yaml")
+    assert (said.code, "did you mean toy.yaml?" in said.err) == (2, True)
+    Path("left.txt").unlink()
+    said = vto("run", "toy.yaml")
+    assert said.code == 3
+    assert "given.left.number: no such file or folder" in said.err
+    assert "toy.yaml, line 3" in said.err
+    assert not CALLS
+
+
+def test_a_failed_computation_keeps_the_partial_result(vto):
+    said = vto("run", "toy.yaml", "--set", "add.fail=true")
+    assert said.code == 4
+    assert "error: sum diverged" in said.err
+    assert "in stage add" in said.err
+    assert "hint: use smaller numbers; what was reached is in runs/toy/out/partial" in said.err
+    assert Path("runs/toy/out/partial/total.txt").read_text() == "-1"
+
+
+@pytest.mark.parametrize(
+    ("raised", "code", "message"),
+    [
+        (KeyboardInterrupt(), 130, "interrupted; run the same command again to go on"),
+        (ModuleNotFoundError("No module named 'open3d'", name="open3d"), 5, "hint: run `vto doctor`"),
+        (MissingDependencyError("no open3d"), 5, "error: no open3d"),
+        (DivergedError("blew up"), 4, "error: blew up"),
+    ],
+)
+def test_exit_codes(vto, monkeypatch, raised, code, message):
+    def stop(*_):
+        raise raised
+
+    stages = [replace(stage, run=stop) if stage.name == "add" else stage for stage in STAGES]
+    monkeypatch.setattr(work, "catalogue", lambda: replace(TOY, stages=tuple(stages)))
+    said = vto("run", "toy.yaml")
+    assert said.code == code
+    assert message in said.err
+    monkeypatch.setattr(work, "catalogue", lambda: TOY)
+    assert vto("run", "toy.yaml").code == 0
+    assert CALLS == ["add", "square", "parity", "label", "page"]  # what was done before is not done again
+
+
+def test_our_own_bugs_keep_their_traceback(vto, monkeypatch):
+    def stop(*_):
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(work, "catalogue", lambda: replace(TOY, stages=(replace(STAGES[0], run=stop), *STAGES[1:])))
+    with pytest.raises(ZeroDivisionError):
+        vto("run", "toy.yaml")
+
+
+def test_plan_runs_nothing_and_reads_like_a_table(vto):
+    said = vto("plan", "toy.yaml")
+    assert said.code == 0
+    assert not CALLS
+    assert not Path("runs").exists()
+    lines = said.out.splitlines()
+    assert lines[0] == "given: left.number, right.number"
+    assert any(line.split() == ["3", "add", "left_doubled,", "right_doubled", "total"] for line in lines)
+    assert any(line.split() == ["guess", "word", "not", "given"] for line in lines)
+    assert max(map(len, lines)) <= 100
+    data = vto("plan", "toy.yaml", "--json").data
+    assert [stage["name"] for stage in data["stages"]][2] == "add"
+    assert data["stages"][2]["settings"] == {"offset": 0, "fail": False}
+    assert data["left_out"] == [{"name": "guess", "reason": "word not given"}]
+
+
+def test_report_makes_the_page_again(vto):
+    vto("run", "toy.yaml")
+    Path("runs/toy/out/page.json").unlink()
+    said = vto("report", "runs/toy", "--json")
+    assert said.data == {"written": ["runs/toy/out/page.json"]}
+    assert vto("report", ".").code == 3
+
+
+def test_stages_and_schema(vto):
+    assert [stage["name"] for stage in vto("stages", "--json").data] == [stage.name for stage in STAGES]
+    table = vto("stages", "-v").out
+    assert "add.offset" in table
+    assert "added to the sum" in table
+    schema = vto("schema").data
+    assert schema == vto("schema", "--json").data
+    assert "offset" in json.dumps(schema)

@@ -1,0 +1,85 @@
+"""scan, fit and drape only write a document: the right one, or a refusal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from vto_pipeline.cli import work
+
+PLY = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+CLOUD = PLY + "end_header\n0 0 0\n1 0 0\n0 1 0\n"
+MESH = PLY + "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+
+
+@pytest.fixture
+def typed(vto, monkeypatch):
+    """Call `vto`; returns exit code, document, run folder, stderr."""
+    caught = {}
+
+    def note(document, base, output, overrides, force_all, session, tables):
+        caught.update(data=document.data, output=output, overrides=overrides, force_all=force_all)
+
+    monkeypatch.setattr(work, "carry_out", note)
+    Path("cloud.ply").write_text(CLOUD)
+    Path("mesh.ply").write_text(MESH)
+
+    def call(*arguments):
+        caught.clear()
+        said = vto(*arguments)
+        return said.code, caught, said.err
+
+    return call
+
+
+def test_scan_finds_out_what_it_got(typed):
+    code, caught, err = typed("scan", "cloud.ply", "--role", "garment")
+    assert code == 0
+    assert "cloud.ply: cloud, because" in err
+    assert caught["data"]["given"] == {"garment": {"cloud": "cloud.ply"}}
+    assert caught["data"]["want"] == ["garment", "openings", "page"]
+    assert caught["output"] == Path("runs/scan_cloud")
+    _, caught, _ = typed("scan", "mesh.ply", "--role", "garment", "--mannequin", "form.ply", "-o", "x", "--force-all")
+    assert caught["data"]["given"] == {"garment": {"surface": "mesh.ply"}, "mannequin": {"surface": "form.ply"}}
+    assert caught["data"]["want"] == ["garment", "openings", "labels", "page"]
+    assert (caught["output"], caught["force_all"]) == (Path("x"), True)
+    _, caught, _ = typed("scan", "cloud.ply", "--role", "body", "--set", "poisson.depth=7")
+    assert caught["data"]["want"] == ["body_surface", "page"]
+    assert caught["overrides"] == ("poisson.depth=7",)
+
+
+def test_scan_refuses_what_is_no_capture(typed):
+    Path("tape.yaml").write_text("measurements: {chest_girth: 96}\n")
+    assert typed("scan", "tape.yaml", "--role", "body")[0] == 3
+    assert typed("scan", "nothing.ply", "--role", "body")[0] == 3
+    assert typed("scan", "cloud.ply")[0] == 2
+    assert typed("scan", "cloud.ply", "--role", "body", "--mannequin", "mesh.ply")[0] == 2
+
+
+def test_fit_takes_one_way_in(typed):
+    _, caught, _ = typed("fit", "--measurements", "tape.yaml")
+    assert caught["data"]["given"] == {"body": {"measurements": "tape.yaml"}}
+    assert caught["data"]["want"] == ["avatar", "measurements", "landmarks", "page"]
+    _, caught, _ = typed("fit", "--scan", "mesh.ply")
+    assert caught["data"]["given"] == {"body": {"surface": "mesh.ply"}}
+    _, caught, _ = typed("fit", "--front", "a.png", "--side", "b.png", "--stature", "1.7")
+    assert caught["data"]["given"] == {"body": {"silhouettes": {"front": "a.png", "side": "b.png", "stature": 1.7}}}
+    assert typed("fit", "--scan", "mesh.ply", "--sex", "male")[0] == 2  # no toy stage takes it: said, not swallowed
+    for arguments in ([], ["--front", "a.png"], ["--scan", "mesh.ply", "--measurements", "tape.yaml"]):
+        code, caught, err = typed("fit", *arguments)
+        assert (code, caught) == (2, {})
+        assert "give one of" in err or "go together" in err
+
+
+def test_drape_takes_avatars_meshes_and_measurements(typed):
+    _, caught, _ = typed("drape", "--garment", "g.ply", "--body", "a.npz", "--fabric", "denim")
+    assert caught["data"]["given"] == {"garment": {"mesh": "g.ply"}, "body": {"avatar": "a.npz"}, "fabric": "denim"}
+    _, caught, _ = typed("drape", "--garment", "g.ply", "--body", "b.ply", "--source-body", "form.ply")
+    assert caught["data"]["given"]["body"] == {"mesh": "b.ply"}
+    assert caught["data"]["given"]["mannequin"] == {"surface": "form.ply"}
+    assert caught["data"]["given"]["fabric"] == "cotton_poplin"
+    _, caught, _ = typed("drape", "--garment", "g.ply", "--measurements", "tape.yaml")
+    assert caught["data"]["given"]["body"] == {"measurements": "tape.yaml"}
+    assert typed("drape", "--garment", "g.ply")[0] == 2
+    assert typed("drape", "--garment", "g.ply", "--body", "b.ply", "--measurements", "tape.yaml")[0] == 2

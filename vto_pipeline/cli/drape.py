@@ -1,0 +1,57 @@
+"""vto drape"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from vto_pipeline.cli.options import PATH, running
+from vto_pipeline.cli.session import Session, pass_session
+
+_WANT = ("draped", "audit", "trace", "render_mesh", "fit_report", "page")
+
+
+@click.command("drape")
+@click.option("--garment", type=PATH, required=True, metavar="FILE", help="Garment mesh.")
+@click.option("--body", type=PATH, metavar="FILE", help="Avatar (.npz of vto fit), or a mesh taken as it stands.")
+@click.option("--measurements", type=PATH, metavar="FILE", help="Make the body from these, in place of --body.")
+@click.option(
+    "--source-body", type=PATH, metavar="FILE", help="Mesh of what the garment was on; absent: it is left where it is."
+)
+@click.option(
+    "--fabric", default="cotton_poplin", show_default=True, metavar="NAME|FILE", help="Preset or fabric file."
+)
+@running
+@pass_session
+def drape_command(
+    session: Session,
+    garment: Path,
+    body: Path | None,
+    measurements: Path | None,
+    source_body: Path | None,
+    fabric: str,
+    output: Path | None,
+    overrides: tuple[str, ...],
+    force_all: bool,
+) -> None:
+    """Drape a garment on a body.
+
+    \b
+    vto drape --garment shirt.ply --source-body form.ply --measurements customer.yaml --fabric denim
+    vto drape --garment shirt.ply --body customer.ply -o runs/shirt
+    """
+    from vto_pipeline.cli.work import carry_out, catalogue, typed_document
+
+    if (body is None) == (measurements is None):
+        raise click.UsageError("give the body: either --body or --measurements")
+    given = {
+        "garment.mesh": garment,
+        "mannequin.surface": source_body,
+        f"body.{'avatar' if body and body.suffix == '.npz' else 'mesh'}": body,
+        "body.measurements": measurements,
+        "fabric": fabric,
+    }
+    document = typed_document("the command line", given, _WANT, {})
+    name = Path("runs") / f"drape_{garment.resolve().stem}"
+    carry_out(document, Path.cwd(), output or name, overrides, force_all, session, catalogue())

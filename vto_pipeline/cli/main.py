@@ -1,0 +1,104 @@
+"""The command `vto`: one file per command, loaded when it is called, and the one place where errors become messages."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from difflib import get_close_matches
+from importlib import import_module
+
+import click
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy loads: its sums depend on the thread count
+
+from vto_pipeline import __version__
+from vto_pipeline.cli.session import Session
+from vto_pipeline.errors import ConfigError, MissingDependencyError, VtoError
+
+COMMANDS = {
+    "scan": "Photos, depth frames, a cloud or a mesh: to a garment or a body surface.",
+    "fit": "A body scan, measurements, or two photos: to an avatar.",
+    "drape": "A garment and a body: to the garment on the body.",
+    "run": "Run a pipeline document.",
+    "plan": "Show what a document would run, and run nothing.",
+    "report": "Make the page of a run again.",
+    "stages": "List all stages.",
+    "schema": "Print the JSON schema of a pipeline document.",
+    "doctor": "Say what is installed, what is missing, and the command that mends it.",
+}
+"""Name of a command and of its file -> one line of help; kept here so that `vto --help` loads none of them."""
+
+INTERRUPTED = 130
+
+
+class _LazyGroup(click.Group):
+    """Commands that are imported when they are called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = getattr(import_module(f"vto_pipeline.cli.{cmd_name}"), f"{cmd_name}_command")
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            close = get_close_matches(args[0], COMMANDS, n=1)
+            hint = f"did you mean {close[0]}?" if close else f"one of {', '.join(COMMANDS)}"
+            raise click.UsageError(f"no such command: {args[0]}\n  hint: {hint}", ctx)
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+@click.group(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(__version__, prog_name="vto")
+def vto() -> None:
+    """From scans of garments and people to a dressed avatar, with every error and time reported.
+
+    \b
+    vto run configs/demo.yaml                 a shirt from photos, on a customer
+    vto scan photos/ --role garment           a garment from photos
+    vto fit --measurements customer.yaml      an avatar from a tape
+    vto drape --garment shirt.ply --body customer.npz --fabric denim
+    """
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command line.
+
+    Args:
+        arguments: Without the program's name; None: the process's own.
+
+    Returns:
+        The exit code: 0 done, 2 bad usage, config or plan, 3 bad input, 4 failed computation, 5 missing dependency,
+        6 batch with failures, 130 interrupted. Our own bugs (1) are left to Python, with their traceback.
+    """
+    session = Session()
+    try:
+        code = vto.main(args=arguments, prog_name="vto", standalone_mode=False, obj=session)
+        return code if isinstance(code, int) else 0
+    except VtoError as error:
+        return session.fail(error)
+    except click.ClickException as error:
+        error.show(sys.stderr)
+        session.answer_error(ConfigError(error.format_message()))
+        return error.exit_code
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("interrupted; run the same command again to go on", err=True)
+        return INTERRUPTED
+    except ImportError as error:
+        if (error.name or "").startswith("vto_pipeline"):
+            raise
+        return session.fail(MissingDependencyError(f"cannot load a library: {error}", hint="run `vto doctor`"))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,51 @@
+"""Options that several commands share, each defined once."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from vto_pipeline.cli.session import Session
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+PATH = click.Path(path_type=Path)
+"""A path that the engine checks, so that all commands complain in the same words."""
+
+
+def _set_json(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    ctx.ensure_object(Session).json |= value
+
+
+def _set_verbose(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    ctx.ensure_object(Session).verbose |= value
+    logging.basicConfig(level=logging.INFO if value else logging.WARNING, format="%(name)s: %(message)s")
+
+
+json_option = click.option(
+    "--json", is_flag=True, expose_value=False, is_eager=True, callback=_set_json, help="One JSON document on stdout."
+)
+verbose_option = click.option(
+    "-v", "--verbose", is_flag=True, expose_value=False, is_eager=True, callback=_set_verbose, help="Say more."
+)
+set_option = click.option(
+    "--set", "overrides", multiple=True, metavar="STAGE.KEY=VALUE", help="Change one setting; may be repeated."
+)
+output_option = click.option(
+    "-o", "--output", type=PATH, metavar="RUN", help="Folder of the run; made if need be. [default: runs/NAME]"
+)
+force_option = click.option("--force-all", is_flag=True, help="Leave no work out, for comparing.")
+
+
+def speaking(function: Function) -> Function:
+    """--json and -v: what every command has."""
+    return json_option(verbose_option(function))
+
+
+def running(function: Function) -> Function:
+    """Everything that a command which runs a pipeline has."""
+    return output_option(set_option(force_option(speaking(function))))

@@ -1,0 +1,107 @@
+"""How a run is shown while it works: bars on a terminal, plain lines elsewhere; both on stderr."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+
+from vto_pipeline.cli.session import Session
+from vto_pipeline.pipeline.listener import Listener
+from vto_pipeline.pipeline.record import StageRecord
+from vto_pipeline.pipeline.stage import Stage
+
+_SILENCE = 5.0
+"""Least time between two plain lines of one stage [s]."""
+
+
+@contextmanager
+def show_progress(session: Session) -> Iterator[Listener]:
+    """The listener that suits stderr."""
+    if not sys.stderr.isatty():
+        yield Lines(session)
+        return
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=24),
+        TextColumn("{task.percentage:3.0f} %"),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[text]}", style="dim", markup=False),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        yield Bars(session, progress)
+
+
+class Lines(Listener):
+    """One line when a stage starts, one when it ends, and one every few seconds in between."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._head, self._last = "", 0.0
+
+    def started(self, number: int, count: int, stage: Stage) -> None:
+        self._head, self._last = head(number, count, stage.name), time.monotonic()
+        self.say(f"{self._head}  {stage.about}")
+
+    def progress(self, fraction: float, text: str) -> None:
+        if time.monotonic() - self._last >= _SILENCE:
+            self._last = time.monotonic()
+            self.say(f"{self._head}  {100 * fraction:3.0f} %  {text}")
+
+    def ended(self, number: int, count: int, record: StageRecord) -> None:
+        self.say(f"{head(number, count, record.name)}  {end_of(record)}")
+        fresh = record.status == "ran"
+        for text in record.notes if fresh or self._session.verbose else ():
+            self.say(f"         note: {text}")
+        for text in record.warnings:
+            self.say(f"         warning: {text}")
+        for what, reason in record.left_out if self._session.verbose else ():
+            self.say(f"         left out: {what}: {reason}")
+
+    def say(self, text: str) -> None:
+        """One line for the user."""
+        self._session.say(text)
+
+
+class Bars(Lines):
+    """A moving bar for the running stage, lines for those that have ended."""
+
+    def __init__(self, session: Session, progress: Progress) -> None:
+        super().__init__(session)
+        self._progress = progress
+        self._task: TaskID | None = None
+
+    def started(self, number: int, count: int, stage: Stage) -> None:
+        self._task = self._progress.add_task(head(number, count, stage.name), total=1.0, text=stage.about)
+
+    def progress(self, fraction: float, text: str) -> None:
+        if self._task is not None:
+            self._progress.update(self._task, completed=fraction, text=text)
+
+    def ended(self, number: int, count: int, record: StageRecord) -> None:
+        if self._task is not None:
+            self._progress.remove_task(self._task)
+            self._task = None
+        super().ended(number, count, record)
+
+    def say(self, text: str) -> None:
+        self._progress.console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+def head(number: int, count: int, name: str) -> str:
+    """Where in the plan a stage stands: "[ 3/12] garment.stereo"."""
+    return f"[{number:>{len(str(count))}}/{count}] {name}"
+
+
+def end_of(record: StageRecord) -> str:
+    """How a stage ended."""
+    return {
+        "ran": f"done in {record.seconds:.1f} s",
+        "cached": f"from the cache (took {record.seconds:.1f} s when it was made)",
+        "left_out": f"left out: {record.reason}",
+        "failed": f"FAILED after {record.seconds:.1f} s: {record.reason}",
+    }.get(record.status, "stopped")

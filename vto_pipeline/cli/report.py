@@ -1,0 +1,23 @@
+"""vto report"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from vto_pipeline.cli.options import PATH, speaking
+from vto_pipeline.cli.session import Session, pass_session
+
+
+@click.command("report")
+@click.argument("folder", metavar="RUN", type=PATH)
+@speaking
+@pass_session
+def report_command(session: Session, folder: Path) -> None:
+    """Make the page of a run again, from what lies in RUN/out. Works for a failed run too."""
+    from vto_pipeline.cli.work import catalogue
+    from vto_pipeline.pipeline.final import make_finals_again
+
+    written = [str(path) for path in make_finals_again(folder, catalogue())]
+    session.answer({"written": written}, written)

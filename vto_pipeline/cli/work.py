@@ -1,0 +1,113 @@
+"""What run, scan, fit and drape do alike: check the document, plan, run, say what came out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from vto_pipeline.cli.progress import show_progress
+from vto_pipeline.cli.session import Session
+from vto_pipeline.errors import ComputationError, InputError
+from vto_pipeline.io.documents import Document, load_yaml
+from vto_pipeline.io.sniff import find_kind
+from vto_pipeline.pipeline.catalogue import Catalogue
+from vto_pipeline.pipeline.plan import Plan, make_plan
+from vto_pipeline.pipeline.request import Request, read_request
+from vto_pipeline.pipeline.run import run
+
+
+def catalogue() -> Catalogue:
+    """The project's tables."""
+    from vto_pipeline.stages import CATALOGUE  # loads every domain: not for `vto --help`
+
+    return CATALOGUE
+
+
+def planned(path: Path, overrides: Sequence[str], tables: Catalogue) -> tuple[Request, Plan]:
+    """A document's request and plan."""
+    request = read_request(load_yaml(path), path.resolve().parent, tables, overrides)
+    return request, make_plan(request, tables)
+
+
+def captured_kind(path: Path, session: Session) -> str:
+    """What a capture is: "photos", "depth", "cloud" or "surface"; says why.
+
+    Raises:
+        InputError: it is none of these.
+    """
+    kind, reason = find_kind(path)
+    if kind not in ("photos", "depth", "cloud", "surface"):
+        raise InputError(
+            f"this looks like {kind} ({reason}); wanted photos, depth frames, a cloud or a mesh", where=str(path)
+        )
+    session.say(f"{path}: {kind}, because {reason}")
+    return kind
+
+
+def typed_document(command: str, given: Mapping[str, Any], want: Sequence[str], stages: Mapping[str, Any]) -> Document:
+    """The document that a command line stands for; what was not given is dropped.
+
+    Args:
+        command: Stands where a file's name stands in messages.
+        given: Section or "section.kind" -> value or None.
+        want: Artifacts.
+        stages: Settings by section.
+    """
+    sections: dict[str, Any] = {}
+    for key, value in given.items():
+        if value is not None:
+            section, _, kind = key.partition(".")
+            plain = str(value) if isinstance(value, Path) else value
+            if kind:
+                sections.setdefault(section, {})[kind] = plain
+            else:
+                sections[section] = plain
+    data = {"schema": 1, "given": sections, "want": list(want), "stages": dict(stages)}
+    return Document(data, Path(command))
+
+
+def carry_out(
+    document: Document,
+    base: Path,
+    output: Path,
+    overrides: Sequence[str],
+    force_all: bool,
+    session: Session,
+    tables: Catalogue,
+) -> None:
+    """Run a document and put the outcome on stdout.
+
+    Raises:
+        VtoError: of whatever kind; a failed computation is recorded in run.json and its partial result named.
+    """
+    request = read_request(document, base, tables, overrides)
+    plan = make_plan(request, tables)
+    with show_progress(session) as listener:
+        try:
+            record = run(request, plan, tables, output, force_all=force_all, listener=listener)
+        except ComputationError as error:
+            if error.partial:
+                error.hint = "; ".join(
+                    filter(None, [error.hint, f"what was reached is in {output / 'out' / 'partial'}"])
+                )
+            raise
+    session.answer({**record, "run": str(output)}, _outcome(record, output, tables))
+
+
+def _outcome(record: Mapping[str, Any], output: Path, tables: Catalogue) -> Iterator[str]:
+    """The end of a run, for people."""
+    counts = dict.fromkeys(("ran", "cached", "left_out"), 0)
+    for stage in record["stages"]:
+        counts[stage["status"]] += 1
+    yield (
+        f"done in {record['seconds']:.1f} s; stages: {counts['ran']} ran, {counts['cached']} from the cache, "
+        f"{counts['left_out']} left out"
+    )
+    width = max(len(artifact) for artifact in record["wanted"])
+    for artifact in record["wanted"]:
+        path = output / "out" / tables.kind(artifact).filename
+        yield f"  {artifact:<{width}}  {path if path.is_file() else 'as given'}"
+    warnings = [(stage["name"], text) for stage in record["stages"] for text in stage["warnings"]]
+    for name, text in warnings:
+        yield f"  warning from {name}: {text}"

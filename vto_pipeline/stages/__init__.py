@@ -1,0 +1,29 @@
+"""The table: every stage, every artifact, and what may be given."""
+
+from __future__ import annotations
+
+from vto_pipeline.io.artifacts import ARTIFACTS
+from vto_pipeline.pipeline.catalogue import Catalogue
+from vto_pipeline.stages import avatar, cloth, garment, output, scan
+from vto_pipeline.stages.roles import ROLES
+
+_SCANNED = ("photos", "depth", "cloud", "surface")
+
+GIVEN = {
+    **{f"{role}.{kind}": f"{role}_{kind}" for role in ROLES for kind in _SCANNED},
+    "garment.mesh": "garment_mesh",
+    "mannequin.measurements": "mannequin_measurements",
+    "mannequin.avatar": "source_avatar",
+    "body.measurements": "body_measurements",
+    "body.silhouettes": "body_silhouettes",
+    "body.avatar": "fitted_avatar",
+    "body.mesh": "body_mesh",
+    "fabric": "fabric",
+}
+"""Key under `given:` in a document -> artifact."""
+
+CATALOGUE = Catalogue(
+    stages=(*scan.STAGES, *garment.STAGES, *avatar.STAGES, *cloth.STAGES, *output.STAGES),
+    kinds=ARTIFACTS,
+    given=GIVEN,
+)

@@ -1,0 +1,75 @@
+"""The drape: from where the garment was to where it goes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from vto_pipeline.avatar.pose import morph
+from vto_pipeline.cloth.drape import DrapeConfig, drape
+from vto_pipeline.model.body import MovingBody
+from vto_pipeline.model.garment import Garment
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.settings import Config
+from vto_pipeline.pipeline.stage import Stage
+
+Inputs = Mapping[str, Any]
+Outputs = Mapping[str, Any]
+
+
+class MorphConfig(Config):
+    """Settings of the body that the garment is draped on."""
+
+    keyframes: int = Field(21, ge=2, le=500, description="Shapes between the source body and the customer.")
+
+
+def _morph(inputs: Inputs, settings: MorphConfig, job: Job) -> Outputs:
+    avatar = inputs["avatar"]
+    if "source_avatar" not in inputs:
+        job.leave_out("morphing", "the body that the garment was on is not known: the body stands still")
+        return {"collider": MovingBody(avatar.vertices[np.newaxis], avatar.faces)}
+    return {"collider": morph(inputs["source_avatar"], avatar, settings.keyframes)}
+
+
+def _still_body(inputs: Inputs, settings: Config, job: Job) -> Outputs:
+    body = inputs["body_mesh"]
+    job.leave_out("fitting an avatar", "a body mesh was given: the cloth lies on that very mesh")
+    return {"collider": MovingBody(body.vertices[np.newaxis], body.faces)}
+
+
+def _drape(inputs: Inputs, settings: DrapeConfig, job: Job) -> Outputs:
+    garment = Garment(inputs["sim_mesh"], inputs["rest_shape"])
+    draped = drape(garment, inputs["collider"], inputs["fabric"], settings, job)
+    return {"draped": draped.mesh, "audit": dict(draped.audit), "trace": tuple(draped.trace)}
+
+
+STAGES: tuple[Stage, ...] = (
+    Stage(
+        name="morph",
+        about="a body that turns from what the garment was on into the customer",
+        needs=("avatar",),
+        optional=("source_avatar",),
+        makes=("collider",),
+        run=_morph,
+        settings=MorphConfig,
+    ),
+    Stage(
+        name="still_body",
+        about="a body mesh as it is",
+        needs=("body_mesh",),
+        makes=("collider",),
+        run=_still_body,
+    ),
+    Stage(
+        name="drape",
+        about="the garment at rest on the body (small-step XPBD)",
+        needs=("sim_mesh", "rest_shape", "collider", "fabric"),
+        makes=("draped", "audit", "trace"),
+        run=_drape,
+        settings=DrapeConfig,
+        uses=("numba", "libigl"),
+    ),
+)

@@ -1,0 +1,120 @@
+"""From a scanned surface to a garment that can be simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from vto_pipeline.cloth.rest_shape import RestShapeConfig, rest_shape
+from vto_pipeline.garment.align import AlignConfig, align_to_mannequin
+from vto_pipeline.garment.openings import OpeningsConfig, close_scan_holes, list_openings
+from vto_pipeline.garment.simulation_mesh import SimulationMeshConfig, remesh_for_simulation
+from vto_pipeline.garment.subtract import SubtractConfig, extract_garment, label_garment
+from vto_pipeline.geometry.repair import RepairConfig, repair
+from vto_pipeline.geometry.rigid import moved
+from vto_pipeline.model.garment import SurfaceLabels
+from vto_pipeline.model.job import Job
+from vto_pipeline.pipeline.stage import Stage
+
+Inputs = Mapping[str, Any]
+Outputs = Mapping[str, Any]
+
+
+def _align(inputs: Inputs, settings: AlignConfig, job: Job) -> Outputs:
+    placement = align_to_mannequin(inputs["garment_surface"], inputs["mannequin_surface"], settings, job)
+    return {"garment_placement": placement}
+
+
+def _subtract(inputs: Inputs, settings: SubtractConfig, job: Job) -> Outputs:
+    surface = inputs["garment_surface"]
+    if "garment_placement" in inputs:
+        surface = moved(surface, inputs["garment_placement"])
+        labels = label_garment(surface, inputs["mannequin_surface"], settings, job)
+    else:
+        job.leave_out("subtraction", "no mannequin was given: all of the scan is garment")
+        everything = np.ones(len(surface.vertices), dtype=bool)
+        labels = SurfaceLabels(everything, everything, everything.astype(float))
+    return {"labels": labels, "garment_shell": extract_garment(surface, labels, settings, job)}
+
+
+def _openings(inputs: Inputs, settings: OpeningsConfig, job: Job) -> Outputs:
+    garment, openings, observed = close_scan_holes(
+        inputs["garment_shell"], inputs.get("mannequin_surface"), settings, job
+    )
+    return {"garment": garment, "openings": openings, "observed": observed}
+
+
+def _take_mesh(inputs: Inputs, settings: RepairConfig, job: Job) -> Outputs:
+    garment = repair(inputs["garment_mesh"], settings, job)
+    openings = list_openings(garment)
+    job.measure(openings=len(openings), vertices=len(garment.vertices))
+    return {"garment": garment, "openings": openings, "observed": np.ones(len(garment.vertices), dtype=bool)}
+
+
+def _simulation_mesh(inputs: Inputs, settings: SimulationMeshConfig, job: Job) -> Outputs:
+    return {"sim_mesh": remesh_for_simulation(inputs["garment"], settings, job)}
+
+
+def _rest_shape(inputs: Inputs, settings: RestShapeConfig, job: Job) -> Outputs:
+    return {"rest_shape": rest_shape(inputs["sim_mesh"], settings, job)}
+
+
+STAGES: tuple[Stage, ...] = (
+    Stage(
+        name="align",
+        about="where the mannequin stands in the garment's scan (robust ICP on its bare parts)",
+        needs=("garment_surface", "mannequin_surface"),
+        makes=("garment_placement",),
+        run=_align,
+        settings=AlignConfig,
+        uses=("libigl",),
+    ),
+    Stage(
+        name="subtract",
+        about="what is garment and what is mannequin (graph cut)",
+        needs=("garment_surface",),
+        optional=("mannequin_surface", "garment_placement"),
+        makes=("labels", "garment_shell"),
+        run=_subtract,
+        settings=SubtractConfig,
+        uses=("libigl", "scipy"),
+    ),
+    Stage(
+        name="openings",
+        about="scan holes filled, neck, hem and cuffs kept",
+        needs=("garment_shell",),
+        optional=("mannequin_surface",),
+        makes=("garment", "openings", "observed"),
+        run=_openings,
+        settings=OpeningsConfig,
+        uses=("libigl",),
+    ),
+    Stage(
+        name="take_mesh",
+        about="a finished garment mesh, repaired",
+        needs=("garment_mesh",),
+        makes=("garment", "openings", "observed"),
+        run=_take_mesh,
+        settings=RepairConfig,
+        uses=("libigl",),
+    ),
+    Stage(
+        name="simulation_mesh",
+        about="even triangles of the size the simulation wants",
+        needs=("garment",),
+        makes=("sim_mesh",),
+        run=_simulation_mesh,
+        settings=SimulationMeshConfig,
+        uses=("gpytoolbox", "libigl", "pyfqmr"),
+    ),
+    Stage(
+        name="rest_shape",
+        about="what the cloth would be without forces",
+        needs=("sim_mesh",),
+        makes=("rest_shape",),
+        run=_rest_shape,
+        settings=RestShapeConfig,
+    ),
+)

@@ -1,0 +1,107 @@
+"""What people look at: the render mesh, the fit report, the page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from vto_pipeline.assess.fit import FitConfig, assess_fit
+from vto_pipeline.avatar.measure import fit_levels
+from vto_pipeline.avatar.regions import trunk
+from vto_pipeline.geometry.topology import face_area_vectors
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.settings import Config
+from vto_pipeline.pipeline.stage import Stage
+from vto_pipeline.render.dress import DressConfig, dress
+from vto_pipeline.report.page import build_page
+
+Inputs = Mapping[str, Any]
+Outputs = Mapping[str, Any]
+
+
+def _transfer(inputs: Inputs, settings: DressConfig, job: Job) -> Outputs:
+    return {"render_mesh": dress(inputs["garment"], inputs["sim_mesh"], inputs["draped"], settings, job)}
+
+
+def _assess(inputs: Inputs, settings: FitConfig, job: Job) -> Outputs:
+    body: TriangleMesh = inputs["collider"].final
+    avatar = inputs.get("avatar")
+    if avatar is None:
+        job.leave_out("ease at chest, waist and hip", "a bare mesh does not say where these are; fit an avatar to it")
+    report, maps = assess_fit(
+        inputs["draped"],
+        inputs["rest_shape"].positions,
+        body,
+        {} if avatar is None else fit_levels(avatar),
+        inputs["fabric"],
+        settings,
+        job,
+        trunk=None if avatar is None else trunk(avatar),
+        observed_share=_observed_share(inputs),
+    )
+    return {"fit_report": report, "fit_maps": maps}
+
+
+def _observed_share(inputs: Inputs) -> float | None:
+    """Share of the garment's area that a sensor saw."""
+    if "observed" not in inputs or "garment" not in inputs:
+        return None
+    garment: TriangleMesh = inputs["garment"]
+    area = np.linalg.norm(face_area_vectors(garment), axis=1)
+    return float(area[inputs["observed"][garment.faces].all(axis=1)].sum() / area.sum())
+
+
+def _page(inputs: Inputs, settings: Config, job: Job) -> Outputs:
+    parts = {name: value for name, value in inputs.items() if name != "run_record"}
+    return {"page": build_page(inputs["run_record"], parts)}
+
+
+STAGES: tuple[Stage, ...] = (
+    Stage(
+        name="transfer",
+        about="the detailed garment follows the draped simulation mesh",
+        needs=("garment", "sim_mesh", "draped"),
+        makes=("render_mesh",),
+        run=_transfer,
+        settings=DressConfig,
+        uses=("libigl", "pygltflib", "pyfqmr"),
+    ),
+    Stage(
+        name="assess",
+        about="ease, stretch and clearance: does it fit",
+        needs=("draped", "rest_shape", "collider", "fabric"),
+        optional=("avatar", "garment", "observed"),
+        makes=("fit_report", "fit_maps"),
+        run=_assess,
+        settings=FitConfig,
+        uses=("libigl",),
+    ),
+    Stage(
+        name="page",
+        about="everything on one page, with a 3D view",
+        needs=(),
+        optional=(
+            "garment_surface",
+            "body_surface",
+            "mannequin_surface",
+            "labels",
+            "garment",
+            "openings",
+            "avatar",
+            "measurements",
+            "body_measurements",
+            "draped",
+            "audit",
+            "trace",
+            "render_mesh",
+            "fit_report",
+            "fit_maps",
+        ),
+        makes=("page",),
+        run=_page,
+        final=True,
+    ),
+)

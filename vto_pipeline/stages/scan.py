@@ -1,0 +1,116 @@
+"""From raw captures to a surface in metres: the same rows for garment, mannequin and body."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from vto_pipeline.model.job import Job
+from vto_pipeline.pipeline.stage import Stage
+from vto_pipeline.scan.fuse import FuseConfig, fuse_depth_frames, fuse_depth_maps
+from vto_pipeline.scan.odometry import OdometryConfig, estimate_trajectory
+from vto_pipeline.scan.scale import ScaleConfig, apply_board
+from vto_pipeline.scan.sfm import SfmConfig, estimate_cameras
+from vto_pipeline.scan.stereo import StereoConfig, estimate_depth_maps
+from vto_pipeline.scan.surface import SurfaceConfig, reconstruct_cloud
+from vto_pipeline.stages.roles import for_each_role
+
+Inputs = Mapping[str, Any]
+Outputs = Mapping[str, Any]
+
+
+def _sfm(inputs: Inputs, settings: SfmConfig, job: Job) -> Outputs:
+    return {"sparse": estimate_cameras(inputs["photos"], settings, job)}
+
+
+def _scale(inputs: Inputs, settings: ScaleConfig, job: Job) -> Outputs:
+    cameras, points = inputs["sparse"]
+    cameras, points = apply_board(inputs["photos"], cameras, points, settings, job)
+    return {"cameras": cameras, "points": points}
+
+
+def _stereo(inputs: Inputs, settings: StereoConfig, job: Job) -> Outputs:
+    return {"depth_maps": estimate_depth_maps(inputs["photos"], inputs["cameras"], inputs["points"], settings, job)}
+
+
+def _fuse_photos(inputs: Inputs, settings: FuseConfig, job: Job) -> Outputs:
+    return {"surface": fuse_depth_maps(inputs["photos"], inputs["depth_maps"], settings, job)}
+
+
+def _odometry(inputs: Inputs, settings: OdometryConfig, job: Job) -> Outputs:
+    return {"trajectory": estimate_trajectory(inputs["depth"], settings, job)}
+
+
+def _fuse_depth(inputs: Inputs, settings: FuseConfig, job: Job) -> Outputs:
+    return {"surface": fuse_depth_frames(inputs["depth"], inputs["trajectory"], settings, job)}
+
+
+def _poisson(inputs: Inputs, settings: SurfaceConfig, job: Job) -> Outputs:
+    return {"surface": reconstruct_cloud(inputs["cloud"], settings, job)}
+
+
+STAGES: tuple[Stage, ...] = (
+    *for_each_role(
+        "sfm",
+        "where the photos were taken, up to scale (structure from motion)",
+        needs=("photos",),
+        makes=("sparse",),
+        run=_sfm,
+        settings=SfmConfig,
+        uses=("pycolmap", "opencv-python-headless"),
+    ),
+    *for_each_role(
+        "scale",
+        "metres and the floor, from the printed board",
+        needs=("photos", "sparse"),
+        makes=("cameras", "points"),
+        run=_scale,
+        settings=ScaleConfig,
+        uses=("opencv-python-headless",),
+    ),
+    *for_each_role(
+        "stereo",
+        "a depth map per photo that its neighbours agree on",
+        needs=("photos", "cameras", "points"),
+        makes=("depth_maps",),
+        run=_stereo,
+        settings=StereoConfig,
+        uses=("opencv-python-headless",),
+    ),
+    *for_each_role(
+        "fuse_photos",
+        "one surface from the depth maps",
+        needs=("photos", "depth_maps"),
+        makes=("surface",),
+        run=_fuse_photos,
+        settings=FuseConfig,
+        uses=("open3d",),
+    ),
+    *for_each_role(
+        "odometry",
+        "where the depth frames were taken",
+        needs=("depth",),
+        makes=("trajectory",),
+        run=_odometry,
+        settings=OdometryConfig,
+        uses=("open3d", "opencv-python-headless"),
+    ),
+    *for_each_role(
+        "fuse_depth",
+        "one surface from the depth frames",
+        needs=("depth", "trajectory"),
+        makes=("surface",),
+        run=_fuse_depth,
+        settings=FuseConfig,
+        uses=("open3d", "opencv-python-headless"),
+    ),
+    *for_each_role(
+        "poisson",
+        "a surface through a cloud of points, trimmed where there are none",
+        needs=("cloud",),
+        makes=("surface",),
+        run=_poisson,
+        settings=SurfaceConfig,
+        uses=("open3d",),
+    ),
+)
