@@ -1,0 +1,17 @@
+"""A rim that was bridged straight through the body still belongs to the opening that the body passes through."""
+
+import numpy as np
+import trimesh
+
+from vto_pipeline.garment.loop_evidence import encloses
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.model.mesh import TriangleMesh
+
+
+def test_a_quarter_of_the_rim_inside_does_not_close_an_opening() -> None:
+    post = trimesh.creation.cone(radius=0.1, height=0.4, sections=96)  # widens below the rim, as shoulders do
+    body = SurfaceDistance(TriangleMesh(post.vertices[:, [1, 2, 0]], post.faces))
+    angle = np.linspace(0.0, 2.0 * np.pi, 240, endpoint=False)
+    radius = np.where(angle < np.pi / 2.0, 0.035, 0.055)  # the cone is 0.05 m wide at half its height
+    ring = np.column_stack([radius * np.sin(angle), np.full(240, 0.2), radius * np.cos(angle)])
+    assert encloses(ring, body, 0.06) or encloses(ring[::-1], body, 0.06)
