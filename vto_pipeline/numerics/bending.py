@@ -12,7 +12,7 @@ from numba import njit
 from vto_pipeline.numerics.vector import axpy, cross, dot, norm, scale, sub
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def dihedral(x0, x1, x2, x3):
     """Return the signed angle [rad] of the hinge x0 x1 with wings x2 and x3, and its gradient with respect to each
     vertex.

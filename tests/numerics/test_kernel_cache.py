@@ -1,0 +1,95 @@
+"""Where compiled kernels are kept: by their sources, and never where the user said otherwise."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import pytest
+
+from vto_pipeline.numerics import kernel_cache
+
+KERNEL = "from numba import njit\n\n@njit(cache=True)\ndef one():\n    return {}\n"
+CALLER = (
+    "from numba import njit\nfrom toy.numerics.part import one\n\n@njit(cache=True)\ndef two():\n    return 2 * one()\n"
+)
+
+
+@pytest.fixture
+def toy(tmp_path):
+    """A package with this module, one kernel, and one that calls it from another file."""
+    room = tmp_path / "toy" / "numerics"
+    room.mkdir(parents=True)
+    shutil.copy(kernel_cache.__file__, room)
+    (tmp_path / "toy" / "__init__.py").touch()
+    (room / "__init__.py").write_text("from toy.numerics.kernel_cache import use_kernel_cache\n\nuse_kernel_cache()\n")
+    (room / "part.py").write_text(KERNEL.format(1))
+    (room / "whole.py").write_text(CALLER)
+    (room / "notes.py").write_text("TEXT = 1\n")
+    return tmp_path
+
+
+def run(toy, **variables):
+    """Run the outer kernel in a fresh process; return its value and Numba's folder."""
+    code = "from toy.numerics.whole import two; import numba; print(two(), numba.config.CACHE_DIR)"
+    clean = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
+    environment = {**clean, "PYTHONPATH": str(toy), "PYTHONDONTWRITEBYTECODE": "1", **variables}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
+    value, folder = done.stdout.split()
+    return int(value), Path(folder)
+
+
+def kept(toy):
+    return sorted((toy / "toy" / "__pycache__").glob("kernels-*"))
+
+
+def test_a_changed_kernel_is_never_run_as_it_was(toy):
+    value, first = run(toy)
+    assert value == 2
+    assert list(first.rglob("*.nbc"))  # something is kept
+    (toy / "toy" / "numerics" / "part.py").write_text(KERNEL.format(5))
+    value, second = run(toy)
+    assert value == 10  # by Numba's own rule, two() would be as old as its own file
+    assert first != second
+    assert kept(toy) == [second]  # the old one is gone
+
+
+def test_what_is_no_kernel_changes_nothing(toy):
+    _, first = run(toy)
+    stamps = {path: path.stat().st_mtime_ns for path in first.rglob("*.nbc")}
+    (toy / "toy" / "numerics" / "notes.py").write_text("TEXT = 2\n")
+    _, second = run(toy)
+    assert first == second
+    assert stamps == {path: path.stat().st_mtime_ns for path in second.rglob("*.nbc")}  # nor is it compiled again
+
+
+def test_the_users_folder_is_respected(toy, tmp_path):
+    value, folder = run(toy, NUMBA_CACHE_DIR=str(tmp_path / "mine"))
+    assert (value, folder) == (2, tmp_path / "mine")
+    assert list(folder.rglob("*.nbc"))
+    assert not kept(toy)
+
+
+def test_a_name_moved_to_another_file_counts(toy):
+    _, first = run(toy)
+    room = toy / "toy" / "numerics"
+    (room / "part.py").rename(room / "piece.py")
+    (room / "whole.py").write_text(CALLER.replace("part", "piece"))
+    _, second = run(toy)
+    assert first != second
+
+
+def test_a_newer_numba_has_a_folder_of_its_own(monkeypatch, tmp_path):
+    room = tmp_path / "numerics"
+    room.mkdir()
+    (room / "part.py").write_text(KERNEL.format(1))
+    monkeypatch.setattr(kernel_cache, "__file__", str(room / "kernel_cache.py"))
+    found = []
+    for version in ("0.61.0", "0.62.0"):
+        monkeypatch.setattr(numba, "__version__", version)
+        monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+        kernel_cache.use_kernel_cache()
+        found.append(numba.config.CACHE_DIR)
+    assert found[0] != found[1]
