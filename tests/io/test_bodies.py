@@ -59,7 +59,7 @@ def test_measurements_come_back_exactly(tmp_path: Path) -> None:
         ("cm", "inch", "unit: input should be 'm', 'cm', 'mm' or 'in' (got 'inch')", 2, ""),
         ("male", "boy", "sex: input should be 'female', 'male' or 'neutral' (got 'boy')", 1, ""),
         ("178", "-178", "measurements.stature: -1.78 m", 4, ""),
-        ("178", ".nan", "measurements.stature: nan m", 4, ""),
+        ("178", ".nan", "measurements.stature: input should be a finite number (got nan)", 4, ""),
         ("75", "7500", "measurements.mass: 7500 kg is not a body's; wanted 10.0 to 400.0 kg", 7, ""),
         ("sigmas", "sigma", "sigma: unknown key", 8, "did you mean sigmas?"),
         ("{waist_girth", "{waist", "sigmas.waist: unknown measurement", 8, "waist_girth?"),

@@ -3,8 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
+from math import isfinite
 
 from vto_pipeline.errors import InputError
+
+
+@dataclass(frozen=True)
+class StretchCurve:
+    """A tensile test's loading branch, from the origin.
+
+    Args:
+        strain: Strictly increasing from 0.
+        tension: Force per width [N/m], strictly increasing from 0.
+    """
+
+    strain: tuple[float, ...]
+    tension: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.strain) != len(self.tension) or len(self.strain) < 2:
+            found = f"{len(self.strain)} strains and {len(self.tension)} tensions"
+            raise InputError(f"stretch curve: {found}; wanted as many of each, two at least")
+        for name, values in (("strain", self.strain), ("tension", self.tension)):
+            if values[0] != 0.0 or not all(low < high for low, high in pairwise(values)) or not isfinite(values[-1]):
+                raise InputError(f"stretch curve: {name} must increase from 0, each value above the last")
 
 
 @dataclass(frozen=True)
@@ -22,7 +45,14 @@ class Fabric:
         bending_hysteresis: Moment per width lost to internal friction, 2HB [N].
         friction: Coulomb coefficient against skin and itself.
         source: Where the figures come from.
-        assumed: Names of the fields that were not given and were filled in.
+        assumed: Names of the fields that were not measured.
+        curve_warp, curve_weft: Measured stretch, where there is one; `stretch_warp` and `stretch_weft` are then its
+            equivalent for linear models.
+        stretch_hysteresis: Tension lost to internal friction between loading and unloading, at the tension of a
+            garment's own weight [N/m].
+        shear_hysteresis: Shear force per width lost to internal friction, 2HG [N/m].
+        damping: Internal viscous loss in proportion to stiffness, Rayleigh's β [s].
+        derived: How figures were worked out from others, for people.
     """
 
     name: str
@@ -38,12 +68,19 @@ class Fabric:
     friction: float
     source: str = ""
     assumed: tuple[str, ...] = ()
+    curve_warp: StretchCurve | None = None
+    curve_weft: StretchCurve | None = None
+    stretch_hysteresis: float = 0.0
+    shear_hysteresis: float = 0.0
+    damping: float = 0.0
+    derived: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("areal_density", "thickness", "stretch_warp", "stretch_weft", "shear"):
             if not 0 < getattr(self, name) < 1e9:
                 raise InputError(f"fabric {self.name}: {name} is {getattr(self, name)}; wanted a positive number")
-        for name in ("bending_warp", "bending_weft", "bending_hysteresis", "friction"):
+        losses = ("bending_hysteresis", "stretch_hysteresis", "shear_hysteresis", "damping", "friction")
+        for name in ("bending_warp", "bending_weft", *losses):
             if not 0 <= getattr(self, name) < 1e9:
                 raise InputError(f"fabric {self.name}: {name} is {getattr(self, name)}; wanted zero or more")
         if not -0.99 < self.poisson < 0.99:

@@ -6,6 +6,9 @@ from pydantic import BaseModel, ConfigDict
 
 
 class Config(BaseModel):
-    """Settings: frozen, unknown keys refused. Every field has a default, a range, and its unit in the description."""
+    """Settings: frozen, unknown keys and numbers that are not finite refused.
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    Every field has a default, a range, and its unit in the description.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)

@@ -10,6 +10,7 @@ from pydantic import Field
 
 from vto_pipeline.avatar.pose import morph
 from vto_pipeline.cloth.drape import DrapeConfig, drape
+from vto_pipeline.io.fabric_assumed import told
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.garment import Garment
 from vto_pipeline.model.job import Job
@@ -41,6 +42,8 @@ def _still_body(inputs: Inputs, settings: Config, job: Job) -> Outputs:
 
 
 def _drape(inputs: Inputs, settings: DrapeConfig, job: Job) -> Outputs:
+    for text in told(inputs["fabric"]):
+        job.note(text)
     garment = Garment(inputs["sim_mesh"], inputs["rest_shape"])
     draped = drape(garment, inputs["collider"], inputs["fabric"], settings, job)
     return {"draped": draped.mesh, "audit": dict(draped.audit), "trace": tuple(draped.trace)}
