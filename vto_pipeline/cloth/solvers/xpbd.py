@@ -9,16 +9,17 @@ from __future__ import annotations
 from math import exp
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
+from numba.extending import overload
 
 from vto_pipeline.cloth.build import ClothModel, ClothState
 from vto_pipeline.cloth.collision.contacts import Contacts
-from vto_pipeline.cloth.constraints import Multipliers, multipliers, project, reset
-from vto_pipeline.numerics.friction import friction_shift
-from vto_pipeline.numerics.vector import add, axpy, dot, load, norm, scale, store, sub, unit
-
-_SERIAL_BELOW = 2500  # vertices; under it, starting the threads costs more than they save
-_CHUNK = 512  # vertices a thread takes at a time
+from vto_pipeline.cloth.collision.respond import respond
+from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM, multipliers, project
+from vto_pipeline.cloth.losses import own, recall, remember, slip
+from vto_pipeline.cloth.solvers.predict import predict
+from vto_pipeline.cloth.solvers.press import press
+from vto_pipeline.model.arrays import FloatArray
 
 
 class Xpbd:
@@ -29,17 +30,30 @@ class Xpbd:
         sweeps: Gauss-Seidel sweeps a substep.
         damping: Rate at which velocities fade [1/s].
         max_speed: No vertex moves faster [m/s].
+
+    Attributes:
+        forgets: Whether λ is forgotten before each sweep; see `pbd_soft`.
     """
 
+    forgets = False
+
+    rests_exactly = False  # one sweep a step leaves a share of h² of each constraint's error
+
     def __init__(self, model: ClothModel, *, sweeps: int = 1, damping: float = 0.0, max_speed: float = np.inf) -> None:
-        self._model = model
+        self._model = own(model)
         self._sweeps = sweeps
         self._damping = damping
         self._max_speed = max_speed
-        self._lambdas: Multipliers = multipliers(model.constraints)
+        self._lambdas = multipliers(model.constraints)
+
+    @property
+    def multipliers(self) -> tuple[FloatArray, ...]:
+        """Return λ of each kind of constraint at the end of the last step, shape (N, B) each."""
+        return self._lambdas
 
     def advance(self, state: ClothState, contacts: Contacts, h: float, substeps: int) -> ClothState:
         """Return the state after `substeps` steps of h [s]. The contacts hold for their whole span."""
+        recall(self._model, state.sliders)
         x, v = state.positions.copy(), state.velocities.copy()
         _advance(
             x,
@@ -54,78 +68,53 @@ class Xpbd:
             self._sweeps,
             exp(-self._damping * h),
             self._max_speed * h,
-            len(x) >= _SERIAL_BELOW,
+            self.forgets,
+            len(x) >= PARALLEL_FROM,
         )
-        return ClothState(x, v, state.time + substeps * h)
+        return ClothState(x, v, state.time + substeps * h, remember(self._model))
 
 
 @njit(cache=True, error_model="numpy")
-def _advance(x, v, inverse_mass, constraints, lambdas, contacts, gravity, h, substeps, sweeps, keep, longest, threaded):
-    start = np.empty_like(x)
+def _advance(
+    x, v, inverse_mass, constraints, lambdas, contacts, gravity, h, substeps, sweeps, keep, longest, forgets, threaded
+):
+    start, pressed = np.empty_like(x), np.empty((len(contacts.friction), len(x), 3))
     fall = (h * gravity[0], h * gravity[1], h * gravity[2])
     for step in range(substeps):
-        if threaded:
-            _predict_parallel(x, v, start, inverse_mass, fall, h, keep)
-        else:
-            _predict(x, v, start, inverse_mass, fall, h, keep, 0, len(x))
-        reset(lambdas)
-        for sweep in range(sweeps):
-            project(x, inverse_mass, constraints, lambdas, h * h, threaded)
-            last = sweep == sweeps - 1
-            if threaded:
-                _touch_parallel(x, v, start, inverse_mass, contacts, step, substeps, h, longest, last)
-            else:
-                _touch(x, v, start, inverse_mass, contacts, step, substeps, h, longest, last, 0, len(x))
-
-
-@njit(cache=True, error_model="numpy", parallel=True)
-def _predict_parallel(x, v, start, inverse_mass, fall, h, keep):
-    for chunk in prange((len(x) + _CHUNK - 1) // _CHUNK):
-        _predict(x, v, start, inverse_mass, fall, h, keep, _CHUNK * chunk, min(len(x), _CHUNK * chunk + _CHUNK))
+        t0, t1 = step / substeps, (step + 1) / substeps
+        predict(x, v, start, inverse_mass, fall, h, keep, threaded)
+        _reset(lambdas)
+        pressed[:] = 0.0
+        for _ in range(sweeps):
+            if forgets:
+                _reset(lambdas)
+            sweep_once(x, start, inverse_mass, constraints, lambdas, contacts, pressed, t0, t1, h, threaded)
+        respond(x, v, start, inverse_mass, contacts, t0, t1, h, longest, True, threaded)
+        slip(x, constraints)
 
 
 @njit(cache=True, error_model="numpy")
-def _predict(x, v, start, inverse_mass, fall, h, keep, first, last):
-    """Let vertices first..last move freely for one step."""
-    for i in range(first, last):
-        store(start, i, load(x, i))
-        if inverse_mass[i] > 0.0:
-            store(x, i, axpy(h, scale(keep, add(load(v, i), fall)), load(x, i)))
+def sweep_once(x, start, inverse_mass, constraints, lambdas, contacts, pressed, t0, t1, h, threaded):
+    """Do one sweep of Gauss-Seidel over constraints and contacts on x, λ and pushes, in place.
+
+    See `constraints.sweep.project` and `press.press`.
+    """
+    project(x, start, inverse_mass, constraints, lambdas, h, threaded)
+    if len(contacts.friction) > 0:
+        press(x, start, inverse_mass, contacts, t0, t1, pressed)
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
-def _touch_parallel(x, v, start, inverse_mass, contacts, step, substeps, h, longest, finish):
-    for chunk in prange((len(x) + _CHUNK - 1) // _CHUNK):
-        first, last = _CHUNK * chunk, min(len(x), _CHUNK * chunk + _CHUNK)
-        _touch(x, v, start, inverse_mass, contacts, step, substeps, h, longest, finish, first, last)
+def _reset(lambdas):
+    raise NotImplementedError
 
 
-@njit(cache=True, error_model="numpy")
-def _touch(x, v, start, inverse_mass, contacts, step, substeps, h, longest, finish, first, last):
-    """Put vertices first..last in front of their contact planes, with friction; to finish a step, take their speed."""
-    t0, t1 = step / substeps, (step + 1) / substeps
-    for i in range(first, last):
-        if inverse_mass[i] == 0.0:
-            continue
-        begin, here = load(start, i), load(x, i)
-        for s in range(len(contacts.friction)):
-            if not contacts.active[s, i]:
-                continue
-            p0, p1 = load(contacts.point[s, i], 0), load(contacts.point[s, i], 1)
-            n0, n1 = load(contacts.normal[s, i], 0), load(contacts.normal[s, i], 1)
-            away = sub(p1, p0)
-            normal = unit(axpy(t1, sub(n1, n0), n0))
-            offset = contacts.offset[s, i, 0] + t1 * (contacts.offset[s, i, 1] - contacts.offset[s, i, 0])
-            push = offset - dot(normal, sub(here, axpy(t1, away, p0)))
-            if push > 0.0:
-                here = axpy(push, normal, here)
-                slip = sub(sub(here, begin), scale(t1 - t0, away))
-                here = add(here, friction_shift(slip, normal, push, contacts.friction[s]))
-        if finish:
-            move = sub(here, begin)
-            length = norm(move)
-            if length > longest:
-                here = axpy(longest / length, move, begin)
-                move = sub(here, begin)
-            store(v, i, scale(1.0 / h, move))
-        store(x, i, here)
+@overload(_reset)
+def _reset_compiled(lambdas):
+    if len(lambdas) == 0:
+        return lambda lambdas: None
+
+    def unrolled(lambdas):
+        lambdas[0][:] = 0.0
+        _reset(lambdas[1:])
+
+    return unrolled

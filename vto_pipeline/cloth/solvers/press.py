@@ -1,0 +1,55 @@
+"""Contact inside an iteration: what a plane has pushed so far is remembered, and taken back where it was too much."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from numba import njit, prange
+
+from vto_pipeline.numerics.vector import add, axpy, dot, load, scale, store, sub, unit
+
+_CHUNK = 512  # vertices a thread takes at a time
+
+
+@njit(cache=True, error_model="numpy", parallel=True)
+def press(x, start, weights, contacts, t0, t1, pressed):
+    """Do one sweep of projected Gauss-Seidel over the contacts, in place.
+
+    `respond` can only push. Iterated with other constraints it would keep what the first guess needed, and end in a
+    point that depends on the way there; here the sum of the pushes, not each of them, is kept above zero, and
+    friction inside the cone of that sum (Jean & Moreau 1992; Erleben 2007, section 4).
+
+    Args:
+        x: Positions [m], shape (V, 3), changed in place.
+        start: Positions at the begin of the step [m], shape (V, 3).
+        weights: How far a push moves a vertex [1/kg], shape (V,); zero holds it.
+        contacts: Planes.
+        t0, t1: Begin and end of the step, as shares of the span of the contacts.
+        pressed: Push of each plane on each vertex in this step [kg m], shape (S, V, 3), changed in place.
+    """
+    for chunk in prange((len(x) + _CHUNK - 1) // _CHUNK):
+        for i in range(_CHUNK * chunk, min(len(x), _CHUNK * chunk + _CHUNK)):
+            for s in range(len(contacts.friction)):
+                if weights[i] > 0.0 and contacts.active[s, i]:
+                    _press_one(i, s, x, start, weights[i], contacts, t0, t1, pressed)
+
+
+@njit(cache=True, error_model="numpy")
+def _press_one(i, s, x, start, weight, contacts, t0, t1, pressed):
+    here, before = load(x, i), load(pressed[s], i)
+    p0, p1 = load(contacts.point[s, i], 0), load(contacts.point[s, i], 1)
+    n0, n1 = load(contacts.normal[s, i], 0), load(contacts.normal[s, i], 1)
+    away = sub(p1, p0)
+    normal = unit(axpy(t1, sub(n1, n0), n0))
+    offset = contacts.offset[s, i, 0] + t1 * (contacts.offset[s, i, 1] - contacts.offset[s, i, 0])
+    lack = offset - dot(normal, sub(here, axpy(t1, away, p0)))
+    pushed = dot(before, normal)
+    push = max(0.0, pushed + lack / weight)
+    here = axpy(weight * (push - pushed), normal, here)
+    slip = sub(sub(here, load(start, i)), scale(t1 - t0, away))
+    rubbed = axpy(-pushed, normal, before)
+    wanted = axpy(-1.0 / weight, axpy(-dot(slip, normal), normal, slip), rubbed)
+    length, most = sqrt(dot(wanted, wanted)), contacts.friction[s] * push
+    rub = scale(most / length, wanted) if length > most else wanted
+    store(x, i, axpy(weight, sub(rub, rubbed), here))
+    store(pressed[s], i, add(scale(push, normal), rub))
