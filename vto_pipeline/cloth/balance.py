@@ -7,7 +7,7 @@ from numba import njit
 
 from vto_pipeline.cloth.build import ClothModel
 from vto_pipeline.cloth.collision.contacts import Contacts
-from vto_pipeline.cloth.constraints import add_forces
+from vto_pipeline.cloth.constraints.sweep import add_forces
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.numerics.vector import axpy, dot, load, norm, scale, store, sub
 from vto_pipeline.units import GRAVITY

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vto_pipeline.cloth.constraints import Constraints
-from vto_pipeline.cloth.constraints.bend import bend
-from vto_pipeline.cloth.constraints.stretch import stretch
+from vto_pipeline.cloth.materials import Materials, fabric_constraints
+from vto_pipeline.cloth.settings import checked
 from vto_pipeline.errors import InputError
-from vto_pipeline.geometry.topology import hinges
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import RestShape
@@ -30,7 +30,7 @@ class ClothModel:
         faces: Shape (F, 3).
         mass: [kg], shape (V,).
         inverse_mass: [1/kg], zero for held vertices, shape (V,).
-        constraints: What resists deformation.
+        constraints: What resists deformation: the data of each kind of `constraints.KINDS` that it has.
         edge_length: Median rest length of the edges [m].
         gravity: [m/s²], shape (3,).
     """
@@ -38,18 +38,26 @@ class ClothModel:
     faces: IntArray
     mass: FloatArray
     inverse_mass: FloatArray
-    constraints: Constraints
+    constraints: tuple[Any, ...]
     edge_length: float
     gravity: FloatArray
 
 
 @dataclass(frozen=True)
 class ClothState:
-    """What varies: positions [m] and velocities [m/s], shape (V, 3) each, and the time [s]."""
+    """What varies.
+
+    Args:
+        positions: [m], shape (V, 3).
+        velocities: [m/s], shape (V, 3).
+        time: [s].
+        sliders: Where internal friction and plasticity stand; see `losses`. None before the first step.
+    """
 
     positions: FloatArray
     velocities: FloatArray
     time: float = 0.0
+    sliders: tuple[FloatArray, ...] = ()
 
 
 def at_rest(positions: FloatArray) -> ClothState:
@@ -64,6 +72,7 @@ def build(
     *,
     pinned: NDArray[np.int64] | tuple[int, ...] = (),
     gravity: tuple[float, float, float] = (0.0, -GRAVITY, 0.0),
+    materials: Materials | None = None,
     job: Job | None = None,
 ) -> ClothModel:
     """Return the model of a cloth.
@@ -74,13 +83,13 @@ def build(
         fabric: Its mass and stiffnesses.
         pinned: Vertices held where they are.
         gravity: [m/s²].
+        materials: How the fabric is modelled.
         job: For what was left out.
 
     Raises:
         InputError: rest shape and mesh differ in size, a pinned vertex does not exist, no triangle has an area, an
             edge has more than two faces, or the fabric is not a stable material.
     """
-    job = job or Job()
     positions = rest.positions
     count = len(mesh.vertices)
     if len(positions) != count:
@@ -98,22 +107,45 @@ def build(
     mass = np.where(used, np.maximum(mass, _LEAST_MASS * np.median(mass[used])), 0.0)
     inverse_mass = np.divide(1.0, mass, out=np.zeros(count), where=mass > 0.0)
     inverse_mass[held] = 0.0
-    bends = fabric.bending_warp > 0.0 or fabric.bending_weft > 0.0
-    if bends or job.force_all:
-        found = hinges(mesh)
-    else:
-        job.leave_out("hinges", "the fabric does not resist bending")
-        found = np.empty((0, 4), np.int32)
     edges = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     return ClothModel(
         faces=mesh.faces,
         mass=mass,
         inverse_mass=inverse_mass,
-        constraints=Constraints(
-            stretch(mesh.faces, positions, fabric), bend(found, positions, rest.rest_angles, fabric)
-        ),
+        constraints=fabric_constraints(mesh, rest, fabric, checked(Materials, materials), job or Job(), held),
         edge_length=float(np.median(edges)),
         gravity=np.array(gravity, dtype=np.float64),
+    )
+
+
+def model_of(
+    constraints: tuple[Any, ...],
+    mass: FloatArray,
+    *,
+    pinned: Sequence[int] = (),
+    gravity: tuple[float, float, float] = (0.0, -GRAVITY, 0.0),
+    faces: IntArray | None = None,
+    edge_length: float = 0.01,
+) -> ClothModel:
+    """Return a model made by hand: a spring, a strand, a chain.
+
+    Args:
+        constraints: The data of each kind.
+        mass: [kg], shape (V,).
+        pinned: Vertices held where they are.
+        gravity: [m/s²].
+        faces: Triangles, if there are any, shape (F, 3).
+        edge_length: What the default skin is measured by [m].
+    """
+    inverse_mass = 1.0 / np.asarray(mass, dtype=np.float64)
+    inverse_mass[list(pinned)] = 0.0
+    return ClothModel(
+        np.empty((0, 3), np.int32) if faces is None else faces,
+        np.array(mass, dtype=np.float64),
+        inverse_mass,
+        constraints,
+        edge_length,
+        np.array(gravity, dtype=np.float64),
     )
 
 

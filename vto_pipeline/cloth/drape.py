@@ -14,6 +14,7 @@ from vto_pipeline.cloth.build import ClothModel, ClothState, at_rest, build, wit
 from vto_pipeline.cloth.clear import clear_of_body
 from vto_pipeline.cloth.collision.body import BodyCollider
 from vto_pipeline.cloth.grow import growing
+from vto_pipeline.cloth.materials import Materials
 from vto_pipeline.cloth.place import PlaceConfig, place
 from vto_pipeline.cloth.settings import checked
 from vto_pipeline.cloth.settle import SettleLimits, Settling, settle
@@ -34,7 +35,7 @@ _CALM = 20.0  # 1/s: velocities fade this fast while the body grows, where the w
 _SHOWN = 5  # places named in a message
 
 
-class DrapeConfig(StepConfig, PlaceConfig):
+class DrapeConfig(StepConfig, PlaceConfig, Materials):
     """How a garment is draped."""
 
     skin_mm: float | None = Field(
@@ -101,13 +102,15 @@ def drape(
 
     start = TriangleMesh(body.keyframes[0], body.faces)
     mesh = garment.mesh if len(body.keyframes) > 1 else place(garment.mesh, start, config, job)
-    model = build(mesh, garment.rest, fabric, job=job)
+    model = build(mesh, garment.rest, fabric, materials=config, job=job)
     work = _Work(model, fabric, config, job)
     state = at_rest(mesh.vertices)
     try:
         state = work.grow(state, mesh, start)
         collider, seconds = work.collider(body)
         stepper = work.stepper(model, collider, config.damping)
+        stepper.prepare(state.positions)
+        job.note(f"{stepper.choice.method}, {stepper.substeps} steps per 1/60 s: {stepper.choice.reason}")
         state = work.ride(state, stepper, seconds)
         settling = work.settle(state, stepper, deadline)
         job.progress(0.9, "clearing the body")

@@ -63,11 +63,11 @@ def settle(
     limits: SettleLimits,
     watch: Callable[[float, float], None] = lambda done, error: None,
 ) -> Settling:
-    """Run until rest, with steps halved each time rest is reached, until halving changes no more than the bound.
+    """Run until rest; where that depends on the steps, halve them until halving changes no more than the bound.
 
-    The moves d of successive windows shrink by q, so d q / (1 - q) is still to come. One sweep of Gauss-Seidel a step
-    leaves an error of order h² in the state of rest, so halving h shows three quarters of it (Richardson) and a third
-    of that is left.
+    The moves d of successive windows shrink by q, so d q / (1 - q) is still to come. A method that solves each step
+    only in part, as one sweep of Gauss-Seidel does, leaves an error of order h² in the state of rest, so halving h
+    shows three quarters of it (Richardson) and a third of that is left.
 
     Args:
         stepper: The cloth among its colliders; its steps are refined.
@@ -80,16 +80,21 @@ def settle(
     moves: list[float] = []
     coarse: FloatArray | None = None
     quiet = 0
+    stepper.prepare(state.positions)
+    exact = stepper.rests_exactly
     while result.state.time - state.time < limits.seconds and time.perf_counter() < limits.deadline:
         before = result.state.positions
         result.state = stepper.run(result.state, _WINDOW)
         moves.append(_rms(result.state.positions - before))
         to_come = _still_to_come(moves)
-        result.error = to_come + (np.inf if coarse is None else _rms(result.state.positions - coarse) / 3.0)
+        result.error = to_come
+        if not exact:
+            result.error += np.inf if coarse is None else _rms(result.state.positions - coarse) / 3.0
         result.residual = stepper.residual(result.state)
         result.trace.append(TraceRow(time.perf_counter() - began, stepper.steps, 1e3 * result.error, result.residual))
         watch((result.state.time - state.time) / limits.seconds, result.error)
-        bound = _COARSE * limits.error if coarse is None else 0.5 * limits.error
+        first = coarse is None and not exact
+        bound = _COARSE * limits.error if first else (1.0 if exact else 0.5) * limits.error
         quiet = quiet + 1 if to_come < bound or result.residual < limits.residual else 0
         if quiet < _QUIET:
             continue

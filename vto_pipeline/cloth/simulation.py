@@ -15,9 +15,13 @@ from vto_pipeline.cloth.build import at_rest, build
 from vto_pipeline.cloth.collision.body import BodyCollider
 from vto_pipeline.cloth.collision.contacts import Collider
 from vto_pipeline.cloth.collision.shapes import Capsule, MeshCollider, Plane, Sphere
+from vto_pipeline.cloth.materials import Materials
+from vto_pipeline.cloth.refine import refine
 from vto_pipeline.cloth.settings import checked
 from vto_pipeline.cloth.settle import SettleLimits, settle
 from vto_pipeline.cloth.stepper import StepConfig, Stepper
+from vto_pipeline.cloth.untie import untie
+from vto_pipeline.errors import InputError
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.cloth import TraceRow
@@ -27,21 +31,29 @@ from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.numerics.threads import limited_threads
 from vto_pipeline.units import GRAVITY
 
+_REST_MM = 0.1  # error at rest that is asked for when nobody says
+
 AnyCollider = Sphere | Capsule | Plane | MeshCollider
 
 
-class SimulateConfig(StepConfig):
+class SimulateConfig(StepConfig, Materials):
     """Settings of `simulate`."""
 
     until: str = Field(
         "time", pattern="^(time|rest)$", description='"time": run all `seconds`; "rest": stop at equilibrium'
     )
-    target_error_mm: float = Field(
-        0.1, gt=0, le=100, description="Predicted motion at which the cloth is at rest, rms [mm]"
+    target_error_mm: float | None = Field(
+        None,
+        gt=0,
+        le=100,
+        description="Error to reach, rms [mm]: with rest the motion still to come, by default 0.1; with time the "
+        "change when steps are halved, by default not asked for",
     )
-    time_budget_s: float | None = Field(None, gt=0, description="Wall time after which to stop [s]; none by default")
+    time_budget_s: float | None = Field(
+        None, gt=0, description="Wall time to use [s]: steps are halved as long as it lasts; none by default"
+    )
     threads: int | None = Field(None, ge=1, le=1024, description="Threads; all cores by default")
-    finest: int = Field(320, ge=1, le=100000, description="Steps per 1/60 s that are not refined further, with rest")
+    finest: int = Field(320, ge=1, le=100000, description="Steps per 1/60 s that are not refined further")
     damping: float = Field(0.0, ge=0, le=1000, description="Rate at which velocities fade [1/s]")
     skin_mm: float | None = Field(
         None, gt=0, le=100, description="Distance kept from colliders [mm]; by default a quarter edge, 1 to 3 mm"
@@ -56,9 +68,9 @@ class Trajectory:
     Args:
         positions: [m], shape (V, 3).
         velocities: [m/s], shape (V, 3).
-        report: seconds (wall), steps, contact_rounds, simulated_s, energy_j, residual, and with "rest" settled and
-            error_mm.
-        trace: Error against run time, with "rest".
+        report: seconds (wall), prepare_s (what the method made before), method, reason, substeps, steps,
+            contact_rounds, simulated_s, energy_j, residual; with "rest" settled; and error_mm where it is known.
+        trace: Error against run time, where it is known.
     """
 
     positions: FloatArray
@@ -90,40 +102,49 @@ def simulate(
 
     Raises:
         ConfigError: an unknown setting or a value out of range.
-        InputError: sizes that do not match, or an impossible fabric.
+        InputError: sizes that do not match, an impossible fabric, or no length of time.
         DivergedError: positions are no longer finite.
     """
     config = checked(SimulateConfig, settings)
+    if not 0.0 <= seconds < np.inf:
+        raise InputError(f"seconds is {seconds}; wanted a time of zero or more")
     shape = RestShape(mesh.vertices if rest is None else np.asarray(rest, dtype=np.float64))
-    model = build(mesh, shape, fabric, pinned=tuple(pinned), gravity=config.gravity)
+    model = build(mesh, shape, fabric, pinned=tuple(pinned), gravity=config.gravity, materials=config)
     skin = default_skin(model.edge_length) if config.skin_mm is None else 1e-3 * config.skin_mm
-    stepper = Stepper(
-        model,
-        [_collider(one) for one in colliders],
-        np.full(len(mesh.vertices), skin),
-        config,
-        damping=config.damping,
-    )
-    state = at_rest(mesh.vertices)
-    began = time.perf_counter()
+    shapes = [_collider(one) for one in colliders]
+    skins = np.full(len(mesh.vertices), skin)
+    state = at_rest(untie(mesh.vertices, shape.positions, mesh.faces, pinned))
+
+    def make(substeps: float | None) -> Stepper:
+        finer = config if substeps is None else config.model_copy(update={"substeps": substeps})
+        return Stepper(model, shapes, skins, finer, damping=config.damping)
+
     report: dict[str, object] = {}
     trace: Sequence[TraceRow] = ()
     with limited_threads(config.threads):
+        preparing = time.perf_counter()
+        stepper = make(None)
+        stepper.prepare(state.positions)
+        began = time.perf_counter()
+        deadline = np.inf if config.time_budget_s is None else began + config.time_budget_s
         if config.until == "rest":
-            limits = SettleLimits(
-                error=1e-3 * config.target_error_mm,
-                residual=0.0,
-                seconds=seconds,
-                finest=config.finest,
-                deadline=np.inf if config.time_budget_s is None else began + config.time_budget_s,
-            )
-            settling = settle(stepper, state, limits)
+            error = 1e-3 * (_REST_MM if config.target_error_mm is None else config.target_error_mm)
+            settling = settle(stepper, state, SettleLimits(error, 0.0, seconds, config.finest, deadline))
             state, trace = settling.state, settling.trace
             report.update(settled=settling.settled, error_mm=1e3 * settling.error)
-        else:
+        elif config.target_error_mm is None and config.time_budget_s is None:
             state = stepper.run(state, seconds)
+        else:
+            error = 0.0 if config.target_error_mm is None else 1e-3 * config.target_error_mm
+            refined = refine(make, state, seconds, error=error, finest=config.finest, deadline=deadline)
+            state, stepper, trace = refined.state, refined.stepper, refined.trace
+            report.update(error_mm=1e3 * refined.error)
     report.update(
         seconds=time.perf_counter() - began,
+        prepare_s=began - preparing,
+        method=stepper.choice.method,
+        reason=stepper.choice.reason,
+        substeps=stepper.substeps,
         steps=stepper.steps,
         contact_rounds=stepper.rounds,
         simulated_s=state.time,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import ceil
 
 import numpy as np
 from pydantic import Field
@@ -10,21 +11,22 @@ from pydantic import Field
 from vto_pipeline.cloth.balance import out_of_balance
 from vto_pipeline.cloth.build import ClothModel, ClothState
 from vto_pipeline.cloth.collision.contacts import Collider, Round, gather, nothing
-from vto_pipeline.cloth.solvers import SOLVERS
-from vto_pipeline.errors import ConfigError, DivergedError
+from vto_pipeline.cloth.methods import FRAME, METHODS, Choice, Method, choose
+from vto_pipeline.errors import DivergedError
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.settings import Config
 
-FRAME = 1.0 / 60.0
-"""Longest round, and the unit in which substeps are counted [s]."""
+_WHOLE = 1e-6  # steps: what rounding may add to a whole number of them
 
 
 class StepConfig(Config):
     """How finely time is cut."""
 
-    solver: str = Field("xpbd", description="One of cloth.solvers.SOLVERS")
-    substeps: int = Field(20, ge=1, le=10000, description="Steps per 1/60 s")
-    sweeps: int = Field(1, ge=1, le=1000, description="Gauss-Seidel sweeps a step")
+    solver: str | None = Field(None, description="One of cloth.methods.METHODS; by default chosen by the scene")
+    substeps: float | None = Field(
+        None, ge=0.1, le=10000, description="Steps per 1/60 s, under 1 for longer ones; by default the method's own"
+    )
+    sweeps: int | None = Field(None, ge=1, le=100000, description="Iterations a step; by default the method's own")
     travel_mm: float = Field(
         5.0, gt=0, le=100, description="How far cloth may move before contacts are found anew [mm]"
     )
@@ -35,14 +37,15 @@ class Stepper:
     """A cloth, its colliders and a solver.
 
     Attributes:
+        choice: The method taken, and why; after `prepare`.
         skin: Distance each vertex keeps from surfaces [m], shape (V,); may be raised between runs.
-        substeps: Steps per 1/60 s; may be changed between runs.
+        substeps: Steps per 1/60 s; after `prepare`, and may be changed between runs.
         steps: Steps taken so far.
         rounds: Times contacts were found.
-
-    Raises:
-        ConfigError: no such solver.
     """
+
+    choice: Choice
+    substeps: float
 
     def __init__(
         self,
@@ -54,17 +57,31 @@ class Stepper:
         damping: float = 0.0,
         max_speed: float = np.inf,
     ) -> None:
-        if config.solver not in SOLVERS:
-            raise ConfigError(f"solver is {config.solver!r}; allowed: {', '.join(SOLVERS)}")
         self.skin = skin
-        self.substeps = config.substeps
         self.steps = 0
         self.rounds = 0
         self._model = model
         self._colliders = colliders
         self._config = config
-        self._solver = SOLVERS[config.solver](model, sweeps=config.sweeps, damping=damping, max_speed=max_speed)
+        self._damping = damping
+        self._max_speed = max_speed
+        self._method: Method | None = None
         self._contacts = nothing(len(skin))
+
+    def prepare(self, positions: FloatArray) -> None:
+        """Choose the method, and let it make what it needs, for a cloth that starts here [m], shape (V, 3). Once.
+
+        Raises:
+            ConfigError: no such method.
+        """
+        if self._method is not None:
+            return
+        config = self._config
+        self.choice = choose(self._model, positions, config.solver, config.substeps, config.sweeps)
+        self.substeps = self.choice.substeps
+        self._method = METHODS[self.choice.method](
+            self._model, sweeps=self.choice.sweeps, damping=self._damping, max_speed=self._max_speed
+        )
 
     def run(self, state: ClothState, seconds: float) -> ClothState:
         """Return the state after so much simulated time [s].
@@ -72,8 +89,11 @@ class Stepper:
         Raises:
             DivergedError: a position is no longer finite.
         """
+        self.prepare(state.positions)
         h = FRAME / self.substeps
-        left = max(1, round(seconds / h))
+        left = ceil(seconds / h - _WHOLE)
+        if abs(left * h - seconds) > _WHOLE * h:  # not a whole number of steps: they are a little shorter
+            h = seconds / left
         while left > 0:
             count = min(left, self._round_length(state, h))
             state = self._round(state, h, count)
@@ -84,21 +104,28 @@ class Stepper:
         """Return the out-of-balance force; see `balance.out_of_balance`."""
         return out_of_balance(self._model, state.positions, self._contacts)
 
+    @property
+    def rests_exactly(self) -> bool:
+        """Whether the state of rest does not depend on the length of steps; after `prepare`."""
+        return getattr(self._method, "rests_exactly", True)
+
     def _speed(self, state: ClothState) -> float:
         return float(np.sqrt((state.velocities**2).sum(axis=1).max()))
 
     def _round_length(self, state: ClothState, h: float) -> int:
         """Return how many steps no vertex travels farther than the contacts are good for."""
+        most = max(1, round(self.substeps))
         if not self._colliders:
-            return self.substeps
-        speed = self._speed(state) + float(np.linalg.norm(self._model.gravity)) * h * self.substeps
-        return int(np.clip(self._config.travel_mm * 1e-3 / max(speed * h, 1e-12), 1, self.substeps))
+            return most
+        speed = self._speed(state) + float(np.linalg.norm(self._model.gravity)) * h * most
+        return int(np.clip(self._config.travel_mm * 1e-3 / max(speed * h, 1e-12), 1, most))
 
     def _round(self, state: ClothState, h: float, count: int) -> ClothState:
         travel = max(self._config.travel_mm * 1e-3, 2.0 * self._speed(state) * h)
         span = Round(state.time, state.time + count * h, travel, self.skin, self._config.recovery_speed)
         self._contacts = gather(self._colliders, state.positions, span)
-        after = self._solver.advance(state, self._contacts, h, count)
+        assert self._method is not None  # `run` prepared it
+        after = self._method.advance(state, self._contacts, h, count)
         self.steps += count
         self.rounds += 1
         if not np.isfinite(after.positions.sum()):

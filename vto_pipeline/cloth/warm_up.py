@@ -8,7 +8,8 @@ import numpy as np
 
 from vto_pipeline.cloth.build import at_rest, build
 from vto_pipeline.cloth.collision.body import BodyCollider
-from vto_pipeline.cloth.stepper import FRAME, StepConfig, Stepper
+from vto_pipeline.cloth.methods import FRAME
+from vto_pipeline.cloth.stepper import StepConfig, Stepper
 from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.fabric import Fabric
@@ -22,12 +23,12 @@ def warm_up() -> float:
     """Run one step of a small cloth over a moving triangle; return how long it took [s]."""
     began = time.perf_counter()
     cloth = _sheet(_SIDE)
-    fabric = Fabric("any", 0.1, 1e-3, 1.0, 1.0, 1.0, 0.0, 1e-6, 1e-6, 0.0, 0.3)
+    fabric = Fabric("any", 0.1, 1e-3, 1.0, 1.0, 1.0, 0.0, 1e-6, 1e-6, 0.0, 0.3, damping=1e-3)
     model = build(cloth, RestShape(cloth.vertices), fabric)
     below = TriangleMesh(np.array([[0, -0.1, 0], [0, -0.1, 1], [1, -0.1, 0]]), np.array([[0, 1, 2]], np.int32))
     body = MovingBody(np.stack([below.vertices, below.vertices + 0.01]), below.faces)
     collider = BodyCollider(body, FRAME, 0.3)
-    config = StepConfig.model_validate({"substeps": 1})
+    config = StepConfig.model_validate({"substeps": 1, "sweeps": 2})
     stepper = Stepper(model, [collider], np.full(len(cloth.vertices), 1e-3), config)
     stepper.residual(stepper.run(at_rest(cloth.vertices), FRAME))
     intersecting_faces(cloth, below)

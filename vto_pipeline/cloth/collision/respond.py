@@ -1,0 +1,68 @@
+"""What contacts do to a step that any solver has made."""
+
+from __future__ import annotations
+
+from numba import njit, prange
+
+from vto_pipeline.numerics.friction import friction_shift
+from vto_pipeline.numerics.vector import add, axpy, dot, load, norm, scale, store, sub, unit
+
+_CHUNK = 512  # vertices a thread takes at a time
+
+
+@njit(cache=True, error_model="numpy")
+def respond(x, v, start, inverse_mass, contacts, t0, t1, h, longest, finish, threaded):
+    """Put all vertices in front of their contact planes, with friction; to finish a step, take their speed.
+
+    Args:
+        x: Positions [m], shape (V, 3), changed in place.
+        v: Velocities [m/s], shape (V, 3); written when the step is finished.
+        start: Positions at the begin of the step [m], shape (V, 3).
+        inverse_mass: [1/kg], shape (V,); zero holds a vertex.
+        contacts: Planes.
+        t0, t1: Begin and end of the step, as shares of the span of the contacts.
+        h: Step [s].
+        longest: No vertex moves farther [m].
+        finish: Whether this ends the step.
+        threaded: Whether to use threads.
+    """
+    if threaded:
+        _respond_parallel(x, v, start, inverse_mass, contacts, t0, t1, h, longest, finish)
+    else:
+        _respond(x, v, start, inverse_mass, contacts, t0, t1, h, longest, finish, 0, len(x))
+
+
+@njit(cache=True, error_model="numpy", parallel=True)
+def _respond_parallel(x, v, start, inverse_mass, contacts, t0, t1, h, longest, finish):
+    for chunk in prange((len(x) + _CHUNK - 1) // _CHUNK):
+        first, last = _CHUNK * chunk, min(len(x), _CHUNK * chunk + _CHUNK)
+        _respond(x, v, start, inverse_mass, contacts, t0, t1, h, longest, finish, first, last)
+
+
+@njit(cache=True, error_model="numpy")
+def _respond(x, v, start, inverse_mass, contacts, t0, t1, h, longest, finish, first, last):
+    for i in range(first, last):
+        if inverse_mass[i] == 0.0:
+            continue
+        begin, here = load(start, i), load(x, i)
+        for s in range(len(contacts.friction)):
+            if not contacts.active[s, i]:
+                continue
+            p0, p1 = load(contacts.point[s, i], 0), load(contacts.point[s, i], 1)
+            n0, n1 = load(contacts.normal[s, i], 0), load(contacts.normal[s, i], 1)
+            away = sub(p1, p0)
+            normal = unit(axpy(t1, sub(n1, n0), n0))
+            offset = contacts.offset[s, i, 0] + t1 * (contacts.offset[s, i, 1] - contacts.offset[s, i, 0])
+            push = offset - dot(normal, sub(here, axpy(t1, away, p0)))
+            if push > 0.0:
+                here = axpy(push, normal, here)
+                slip = sub(sub(here, begin), scale(t1 - t0, away))
+                here = add(here, friction_shift(slip, normal, push, contacts.friction[s]))
+        if finish:
+            move = sub(here, begin)
+            length = norm(move)
+            if length > longest:
+                here = axpy(longest / length, move, begin)
+                move = sub(here, begin)
+            store(v, i, scale(1.0 / h, move))
+        store(x, i, here)

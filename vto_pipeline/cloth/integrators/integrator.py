@@ -1,0 +1,90 @@
+"""A time integrator of forces as a method that moves a cloth."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+from vto_pipeline.cloth.build import ClothModel, ClothState
+from vto_pipeline.cloth.collision.contacts import Contacts
+from vto_pipeline.cloth.collision.respond import respond
+from vto_pipeline.cloth.constraints.rigid import refuse_rigid
+from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM
+from vto_pipeline.cloth.integrators.air import AirDrag
+from vto_pipeline.cloth.integrators.system import ForceSystem
+from vto_pipeline.cloth.losses import own, recall, remember, slip
+from vto_pipeline.model.arrays import FloatArray
+
+
+class Integrator(ABC):
+    """What all integrators share; each adds its `step`.
+
+    Args:
+        model: The cloth.
+        sweeps: Not used: a step of an integrator is a step.
+        damping: Rayleigh's mass term α, rate at which velocities fade [1/s].
+        max_speed: No vertex moves faster [m/s].
+        air: Drag of the air; none by default.
+        tolerance: How nearly implicit equations are solved, as a share of an edge's length.
+
+    Attributes:
+        system: The forces.
+        tolerance: [m].
+    """
+
+    def __init__(
+        self,
+        model: ClothModel,
+        *,
+        sweeps: int = 1,
+        damping: float = 0.0,
+        max_speed: float = np.inf,
+        air: AirDrag | None = None,
+        tolerance: float = 1e-5,
+    ) -> None:
+        self.tolerance = tolerance * model.edge_length
+        self._model = own(model)
+        self.system = ForceSystem(self._model, damping, air)
+        self._max_speed = max_speed
+        self._h = 0.0
+        self._last: ClothState | None = None
+
+    @abstractmethod
+    def step(self, system: ForceSystem, x: FloatArray, v: FloatArray, h: float) -> tuple[FloatArray, FloatArray]:
+        """Return positions [m] and velocities [m/s] after one step of h [s], shape (V, 3) each; x and v are kept."""
+
+    def restart(self) -> None:  # noqa: B027  # methods without memory have nothing to forget
+        """Forget earlier steps: the next one continues another motion, or has another length."""
+
+    def advance(self, state: ClothState, contacts: Contacts, h: float, substeps: int) -> ClothState:
+        """Return the state after `substeps` steps of h [s]. The contacts hold for their whole span.
+
+        Raises:
+            ConfigError: a constraint is rigid.
+        """
+        if self._last is None:
+            refuse_rigid(self._model.constraints, state.positions, type(self).__name__)
+        if state is not self._last or h != self._h:
+            self.restart()
+        recall(self._model, state.sliders)
+        x, v = state.positions, self.system.free * state.velocities
+        with np.errstate(over="ignore", invalid="ignore"):  # beyond its limit of stability a method grows until inf
+            for step in range(substeps):
+                new_x, new_v = self.step(self.system, x, v, h)
+                x, v = self._respond(x, new_x, new_v, contacts, step / substeps, (step + 1) / substeps, h)
+                slip(x, self._model.constraints)
+        self._h, self._last = h, ClothState(x, v, state.time + substeps * h, remember(self._model))
+        return self._last
+
+    def _respond(
+        self, start: FloatArray, x: FloatArray, v: FloatArray, contacts: Contacts, t0: float, t1: float, h: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return x and v in front of the contacts: what moved a vertex by d changed its speed by d/h."""
+        if not len(contacts.friction) and self._max_speed == np.inf:
+            return x, v
+        moved, speed = x.copy(), np.zeros_like(v)
+        threaded = len(x) >= PARALLEL_FROM
+        longest = self._max_speed * h
+        respond(moved, speed, start, self._model.inverse_mass, contacts, t0, t1, h, longest, True, threaded)
+        return moved, v + (moved - x) / h

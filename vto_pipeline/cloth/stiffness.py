@@ -1,0 +1,103 @@
+"""The matrix of an implicit step, m M + s K: its pattern once for a cloth, its values at each position."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+
+from vto_pipeline.cloth.build import ClothModel
+from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM, stiffness_one, stiffness_scratch
+from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.numerics.block_matrix import BlockMatrix, pattern
+
+
+class Stiffness:
+    """The stiffness K = Σ ∇Cᵀ α⁻¹ ∇C + what stress adds, both positive semidefinite, of a cloth.
+
+    Args:
+        model: The cloth. Held vertices have an identity row and column.
+    """
+
+    def __init__(self, model: ClothModel) -> None:
+        rows, columns = [np.empty(0, np.int32)], [np.empty(0, np.int32)]
+        for data in model.constraints:
+            corners = data.vertices.shape[1]
+            rows.append(np.repeat(data.vertices, corners, axis=1).reshape(-1))
+            columns.append(np.tile(data.vertices, (1, corners)).reshape(-1))
+        self._matrix, places = pattern(np.concatenate(rows), np.concatenate(columns), len(model.mass))
+        self._model = model
+        self._places = []
+        first = 0
+        for data in model.constraints:
+            count, corners = data.vertices.shape
+            last = first + count * corners * corners
+            self._places.append(places[first:last].reshape(count, corners, corners))
+            first = last
+        self._held = model.inverse_mass == 0.0
+
+    @property
+    def matrix(self) -> BlockMatrix:
+        """The matrix that `assemble` writes."""
+        return self._matrix
+
+    def write_to(self, blocks: FloatArray) -> None:
+        """Let `assemble` write its blocks here from now on, shape (B, 3, 3)."""
+        self._matrix = self._matrix._replace(blocks=blocks)
+
+    def assemble(
+        self, x: FloatArray, mass_factor: float = 0.0, stiffness_factor: float = 1.0, damping_factor: float = 0.0
+    ) -> BlockMatrix:
+        """Return m M + s K + d Σ β ∇Cᵀ α⁻¹ ∇C at positions x [m], shape (V, 3).
+
+        The matrix is overwritten by the next call.
+        """
+        matrix = self._matrix
+        _clear(matrix, self._held, mass_factor * self._model.mass)
+        for data, places in zip(self._model.constraints, self._places, strict=True):
+            material = stiffness_factor + damping_factor * data.damping
+            _assemble(x, data, places, self._held, material, stiffness_factor, matrix.blocks)
+        return matrix
+
+
+@njit(cache=True, error_model="numpy")
+def _clear(matrix, held, mass):
+    matrix.blocks[:] = 0.0
+    for i in range(len(held)):
+        for k in range(3):
+            matrix.blocks[matrix.diagonal[i], k, k] = 1.0 if held[i] else mass[i]
+
+
+@njit(cache=True, error_model="numpy")
+def _assemble(x, data, places, held, material, stress, blocks):
+    for colour in range(len(data.colours) - 1):
+        first, last = data.colours[colour], data.colours[colour + 1]
+        if len(x) >= PARALLEL_FROM and last - first > 1:
+            _assemble_colour(x, data, places, held, material, stress, blocks, first, last)
+        else:
+            for block in range(first, last):
+                _assemble_block(x, data, places, held, material, stress, blocks, block)
+
+
+@njit(cache=True, error_model="numpy", parallel=True)
+def _assemble_colour(x, data, places, held, material, stress, blocks, first, last):
+    for block in prange(first, last):
+        _assemble_block(x, data, places, held, material, stress, blocks, block)
+
+
+@njit(cache=True, error_model="numpy")
+def _assemble_block(x, data, places, held, material, stress, blocks, block):
+    corners = data.vertices.shape[1]
+    local = np.empty((corners, corners, 3, 3))
+    scratch = stiffness_scratch(data)
+    for i in range(data.starts[block], data.starts[block + 1]):
+        stiffness_one(i, x, data, material, stress, local, scratch)
+        for a in range(corners):
+            if held[data.vertices[i, a]]:
+                continue
+            for b in range(corners):
+                if held[data.vertices[i, b]]:
+                    continue
+                place = places[i, a, b]
+                for k in range(3):
+                    for m in range(3):
+                        blocks[place, k, m] += local[a, b, k, m]
