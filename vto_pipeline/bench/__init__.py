@@ -1,1 +1,55 @@
-"""Sample data with truth, and measuring against it."""
+"""Sample data with truth, measuring against it, and the benches of `vto bench`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from vto_pipeline.bench.bench import Bench
+from vto_pipeline.report.plots import Curves, draw_curves
+from vto_pipeline.report.scaling_plot import draw_scaling
+from vto_pipeline.report.verdict_table import draw_verdicts
+
+
+def _draw_solvers(bench: Mapping[str, Any]) -> bytes:
+    errors = Curves(figures=("rms_stretch", "distance_mm", "residual"))
+    return draw_curves(bench, errors, Curves("iterations", "iterations", ("imbalance_mm", "from_solution_mm")))
+
+
+def _draw_integrators(bench: Mapping[str, Any]) -> bytes:
+    return draw_curves(
+        bench,
+        Curves("h_omega", "step times frequency", ("energy_ratio",)),
+        Curves("h_omega", "step times frequency", ("phase_error_deg",), slopes=True),
+        Curves("h", "step [s]", ("spin_error",), slopes=True),
+        Curves("h", "step [s]", ("energy_drift", "distance_mm"), slopes=True),
+        Curves(figures=("energy_drift", "distance_mm")),
+    )
+
+
+def _draw_physics(bench: Mapping[str, Any]) -> bytes:
+    errors = ("profile_share", "critical_share", "mode_1_share")
+    by_mesh = Curves("edges", "edges along the strip", errors, slopes=True, finer_right=True, split="mesh")
+    return draw_curves(bench, by_mesh)
+
+
+BENCHES = {
+    "solvers": Bench(
+        "every method on hanging, falling and worn cloth: error against run time",
+        "vto_pipeline.bench.solvers",
+        _draw_solvers,
+    ),
+    "integrators": Bench(
+        "energy, phase and momentum against closed forms", "vto_pipeline.bench.integrators", _draw_integrators
+    ),
+    "stability": Bench(
+        "stiff, distorted and extreme cases: what survives", "vto_pipeline.bench.stability.table", draw_verdicts
+    ),
+    "physics": Bench(
+        "elastica, buckling, drape: error against references", "vto_pipeline.bench.physics", _draw_physics
+    ),
+    "scaling": Bench(
+        "run time at equal error from 1k vertices up, kernels, threads", "vto_pipeline.bench.scaling", draw_scaling
+    ),
+}
+"""Name -> bench. To add one: its file, with `rows(quick, watch)`, and a line here."""

@@ -31,6 +31,7 @@ _MODULES = {
     "open3d": "open3d",
     "opencv-python-headless": "cv2",
     "pillow": "PIL",
+    "pyamg": "pyamg",
     "pycolmap": "pycolmap",
     "pydantic": "pydantic",
     "pyfqmr": "pyfqmr",

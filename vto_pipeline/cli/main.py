@@ -22,6 +22,7 @@ COMMANDS = {
     "drape": "A garment and a body: to the garment on the body.",
     "run": "Run a pipeline document.",
     "plan": "Show what a document would run, and run nothing.",
+    "bench": "Measure error against run time, and draw it.",
     "report": "Make the page of a run again.",
     "stages": "List all stages.",
     "schema": "Print the JSON schema of a pipeline document.",

@@ -1,0 +1,72 @@
+"""Growth, roofs and kernels against what they must be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import linregress
+
+from vto_pipeline.bench.bench import Watch
+from vto_pipeline.bench.overhead import _spinning
+from vto_pipeline.bench.roofline import bandwidth
+from vto_pipeline.bench.scaling import growth
+from vto_pipeline.bench.throughput import _KERNELS, kernel_rows
+from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM
+
+
+def test_exponent_of_an_exact_power():
+    vertices = np.array([1e3, 4e3, 1.6e4, 6.4e4])
+    found = growth(vertices, 3e-6 * vertices**1.15)
+    assert found.exponent == pytest.approx(1.15, rel=1e-12)
+    assert found.uncertainty == pytest.approx(0.0, abs=1e-12)
+
+
+def test_exponent_and_uncertainty_are_those_of_regression():
+    rng = np.random.default_rng(5)
+    vertices = np.geomspace(1e3, 1e6, 7)
+    seconds = vertices**1.3 * np.exp(0.2 * rng.standard_normal(7))
+    truth = linregress(np.log(vertices), np.log(seconds))
+    found = growth(vertices, seconds)
+    assert found.exponent == pytest.approx(truth.slope, rel=1e-12)
+    assert found.uncertainty == pytest.approx(truth.stderr, rel=1e-9)
+
+
+def test_two_sizes_have_no_uncertainty():
+    assert np.isnan(growth([1.0, 2.0], [1.0, 2.0]).uncertainty)
+
+
+def test_cache_is_faster_than_memory_and_both_are_possible():
+    near, far = bandwidth(400_000, 1), bandwidth(400_000_000, 1)
+    assert 1e9 < far < 1e12
+    assert 0.5 * far < near < 1e13  # a loaded machine blurs the difference, so only the order is asked for
+
+
+def test_the_multiply_counts_its_blocks():
+    kernel = _KERNELS["block multiply"](10, False)
+    # 100 vertices, 81 · 2 faces: blocks of the diagonal, both ways along each edge, and across each hinge
+    edges, hinges = 2 * 9 * 10 + 81, 2 * 9 * 8 + 81
+    diagonals_across = kernel.operations / 18 - 100 - 2 * edges
+    assert 0 < diagonals_across <= 2 * hinges
+    assert kernel.moved > 72 * kernel.operations / 18
+
+
+@pytest.mark.slow
+def test_no_kernel_beats_the_machine():
+    for row in kernel_rows(64, 1, Watch()):
+        assert PARALLEL_FROM <= 64**2
+        assert 0.0 < row.errors["roofline_share"] < 1.3, row.method  # 1 and the noise of two timings
+        assert row.seconds > 0.0
+
+
+@pytest.mark.slow
+def test_compiled_arithmetic_is_counted():
+    sweep, force = _KERNELS["projection sweep"](6, False), _KERNELS["forces"](6, False)
+    stencils = 50  # triangles; a triangle's strain alone takes two vectors of three products and two sums each
+    assert 50 * stencils < force.operations < sweep.operations < 5000 * stencils
+
+
+def test_the_busy_neighbour_ends_with_the_block():
+    with _spinning(1):
+        pass
+    with pytest.raises(KeyError), _spinning(1):
+        raise KeyError

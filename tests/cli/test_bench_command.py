@@ -1,0 +1,70 @@
+"""vto bench."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+import pytest
+
+import vto_pipeline.bench as benches
+from vto_pipeline.bench.bench import Bench, Row, Watch
+from vto_pipeline.bench.timing import Timing
+
+
+def toy_rows(quick: bool, watch: Watch) -> Iterator[Row]:
+    for k in range(1, 3):
+        yield watch.row("hang 32", "reference" if k == 2 else "toy", {"substeps": k}, 1024, lambda k=k: _toy(k))
+
+
+def _toy(k: int) -> tuple[Timing, dict]:
+    return Timing(0.5 * k), {"rms_stretch": 10.0**-k, "mean_height_m": 0.5}
+
+
+@pytest.fixture
+def toy_bench(monkeypatch):
+    monkeypatch.setattr(Bench, "rows", lambda self, quick, watch: toy_rows(quick, watch))
+
+
+def test_unknown_name_lists_the_benches(vto):
+    said = vto("bench", "solver")
+    assert said.code == 2
+    assert "solver" in said.err
+    assert all(name in said.err for name in benches.BENCHES)
+
+
+def test_a_name_is_needed(vto):
+    assert vto("bench").code == 2
+
+
+@pytest.mark.usefixtures("toy_bench")
+def test_writes_both_files_and_speaks_on_stderr(vto, tmp_path):
+    said = vto("bench", "solvers", "--out", tmp_path / "figures", "--json")
+    assert said.code == 0
+    (document,) = said.data["benches"]
+    assert document["bench"] == "solvers"
+    written = json.loads((tmp_path / "figures" / "solvers.json").read_text())
+    assert written["rows"] == document["rows"]
+    assert (tmp_path / "figures" / "solvers.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    assert "hang 32 toy substeps=1" in said.err
+
+
+@pytest.mark.usefixtures("toy_bench")
+def test_a_second_run_measures_nothing(vto, tmp_path):
+    vto("bench", "solvers", "--out", tmp_path)
+    again = vto("bench", "solvers", "--out", tmp_path)
+    assert again.code == 0
+    assert "substeps=1" not in again.err
+    assert "substeps=1" in vto("bench", "solvers", "--out", tmp_path, "--force").err
+
+
+@pytest.mark.usefixtures("toy_bench")
+def test_against_other_programs(vto, tmp_path):
+    peer = {"scene": "hang", "N": 32, "peer": "other", "params": {}, "seconds": 2.0, "rms_stretch": 0.2, "com_z": 0.5}
+    (tmp_path / "peers.jsonl").write_text(json.dumps(peer))
+    said = vto("bench", "solvers", "--out", tmp_path, "--against", tmp_path / "peers.jsonl")
+    assert said.code == 0
+    assert "other" in said.out
+    assert "0.250" in said.out
+    assert vto("bench", "scaling", "--out", tmp_path, "--against", tmp_path / "peers.jsonl").code == 2
+    assert vto("bench", "solvers", "--out", tmp_path, "--against", tmp_path / "absent.jsonl").code == 3

@@ -1,0 +1,65 @@
+"""Run time as it is reported everywhere: after compilation, the median of at least three runs."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numba
+
+import vto_pipeline.numerics  # noqa: F401  # finds the thread pool, before Numba looks for one
+
+Result = TypeVar("Result")
+
+RUNS = 3
+BUDGET = 60.0
+"""A run longer than this is not repeated [s]; `Timing.runs` says so."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """How long something takes.
+
+    Args:
+        seconds: Median wall time [s].
+        runs: Of how many runs.
+        compile_s: What the first call took [s]; zero when there was none.
+    """
+
+    seconds: float
+    runs: int = 1
+    compile_s: float = 0.0
+
+
+def timed(
+    run: Callable[[], Result], *, warm: Callable[[], object] | None = None, runs: int = RUNS, budget: float = BUDGET
+) -> tuple[Result, Timing]:
+    """Return what the last run returned, and the timing.
+
+    Args:
+        run: What is timed; each call must do the same work.
+        warm: A short piece of the same work, run first so that nothing is compiled on the clock.
+        runs: How often, if time allows.
+        budget: Wall time after which no further run begins [s].
+    """
+    compile_s = _clock(warm)[1] if warm is not None else 0.0
+    result, seconds = _clock(run)
+    walls = [seconds]
+    while len(walls) < runs and sum(walls) + walls[-1] <= runs * budget and walls[-1] <= budget:
+        result, seconds = _clock(run)
+        walls.append(seconds)
+    return result, Timing(statistics.median(walls), len(walls), compile_s)
+
+
+def threads_now() -> int:
+    """Return how many threads the kernels can use now."""
+    return int(numba.get_num_threads())
+
+
+def _clock(run: Callable[[], Result]) -> tuple[Result, float]:
+    began = time.perf_counter()
+    result = run()
+    return result, time.perf_counter() - began
