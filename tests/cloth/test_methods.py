@@ -12,8 +12,9 @@ from vto_pipeline.cloth.collision.shapes import Sphere
 from vto_pipeline.cloth.constraints.spring import springs
 from vto_pipeline.cloth.materials import Materials
 from vto_pipeline.cloth.methods import FRAME, METHODS, choose, highest_frequency
+from vto_pipeline.cloth.simulation import simulate
 from vto_pipeline.cloth.stiffness import Stiffness
-from vto_pipeline.errors import ConfigError
+from vto_pipeline.errors import ConfigError, DivergedError
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.numerics.block_matrix import to_scipy
 from vto_pipeline.numerics.threads import limited_threads
@@ -147,3 +148,16 @@ def test_the_same_bits_with_one_thread_and_two(name):
     assert np.isfinite(ends[0].positions).all()
     away = np.linalg.norm(ends[0].positions - ball.center, axis=1)
     assert 0.1 < away.min() < 0.103  # it has arrived
+
+
+@pytest.mark.parametrize("method", ["explicit_euler", "predictor_corrector", "rk4"])
+def test_a_cloth_that_leaves_all_bounds_among_colliders_is_reported(method):
+    mesh = sheet(6, 6, 0.3, 0.3, upright=False)
+    with pytest.raises(DivergedError, match="not finite"):
+        simulate(
+            mesh,
+            fabric(stretch=1e6, shear=1e6),
+            colliders=[Sphere((0.1, -0.1, 0.1), 0.08)],
+            seconds=30.0,
+            settings={"solver": method, "substeps": 1},
+        )

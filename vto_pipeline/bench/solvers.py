@@ -61,7 +61,7 @@ class Case:
 
 
 _SPENT = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0), 20.0, 60.0, 64
-_QUICKLY_SPENT = (0.25, 1.0), 0.2, 0.8, 16
+_QUICKLY_SPENT = (0.25, 1.0), 0.2, 0.4, 16
 _TRIED = 3  # single steps, of which the fastest tells how long a run would take
 
 
