@@ -1,13 +1,16 @@
-"""Nearest points against libigl, which shares nothing with the tree."""
+"""Nearest points against libigl, which shares nothing with the tree; overlapping boxes against brute force."""
 
 import igl
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from vto_pipeline.numerics import bvh
+from vto_pipeline.numerics import bvh, spatial_hash
+from vto_pipeline.numerics.bvh_pairs import cross_pairs, self_pairs
 from vto_pipeline.numerics.distance import EDGE, FACE, VERTEX, closest_on_triangle
 from vto_pipeline.numerics.morton import morton_order
+from vto_pipeline.numerics.spatial_hash import hashed
+from vto_pipeline.numerics.threads import limited_threads
 
 
 @pytest.fixture
@@ -86,3 +89,88 @@ def test_morton_order_keeps_neighbours_together():
     assert_array_equal(np.sort(order), np.arange(4000))
     step = np.linalg.norm(np.diff(points[order], axis=0), axis=1).mean()
     assert 0.02 < step < 0.12  # in random order it would be 0.66
+
+
+def swept_tree(start, end, faces, radius):
+    tree = bvh.build(start, faces)
+    bvh.refit_swept(tree, start, end, faces, radius)
+    return tree
+
+
+def moving_soup(count, seed, size=0.1):
+    """Triangles on their way, with a radius at each corner."""
+    rng = np.random.default_rng(seed)
+    start = (rng.uniform(-1, 1, (count, 1, 3)) + rng.normal(0, size, (count, 3, 3))).reshape(-1, 3)
+    faces = np.arange(3 * count, dtype=np.int32).reshape(-1, 3)
+    return start, start + rng.normal(0, size, start.shape), faces, rng.uniform(0, size, 3 * count)
+
+
+def overlapping(one, other):
+    """The pairs of triangles whose swept boxes overlap, by brute force."""
+    corners = []
+    for start, end, faces, radius in (one, other):
+        low, high = np.minimum(start, end) - radius[:, None], np.maximum(start, end) + radius[:, None]
+        corners += [low[faces].min(axis=1), high[faces].max(axis=1)]
+    low, high, other_low, other_high = corners
+    return np.argwhere(((low[:, None] <= other_high) & (other_low <= high[:, None])).all(axis=2))
+
+
+def in_order(pairs):
+    return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 300, 3000])  # one leaf, two, and more and fewer than the serial limits
+@pytest.mark.parametrize("broad", ["tree", "hash"])
+def test_pairs_of_one_surface(count, broad):
+    soup = moving_soup(count, 4)
+    found = self_pairs(swept_tree(*soup)) if broad == "tree" else spatial_hash.self_pairs(hashed(*soup))
+    every = overlapping(soup, soup)
+    assert_array_equal(in_order(np.sort(found, axis=1)), every[every[:, 0] < every[:, 1]])
+
+
+@pytest.mark.parametrize("broad", ["tree", "hash"])
+@pytest.mark.parametrize("sizes", [(0.1, 0.1), (0.01, 0.5)])  # alike, and small triangles among large ones
+def test_pairs_of_two_surfaces(sizes, broad):
+    one, other = moving_soup(700, 5, sizes[0]), moving_soup(400, 6, sizes[1])
+    if broad == "tree":
+        found = cross_pairs(swept_tree(*one), swept_tree(*other))
+    else:
+        found = spatial_hash.cross_pairs(hashed(*one), hashed(*other))
+    assert_array_equal(in_order(found), overlapping(one, other))
+    assert len(found) > 1000
+
+
+def test_a_hub_gets_more_room_than_expected():
+    start, end, faces, radius = moving_soup(600, 7, 0.01)
+    start[:6] = end[:6] = np.tile([[-9.0, -9.0, -9.0], [9.0, 9.0, 9.0], [9.0, -9.0, 9.0]], (2, 1))  # hold all others
+    soup = start, end, faces, radius
+    every = overlapping(soup, soup)
+    every = every[every[:, 0] < every[:, 1]]
+    assert (every[:, 0] <= 1).sum() > 600
+    assert_array_equal(in_order(np.sort(self_pairs(swept_tree(*soup)), axis=1)), every)
+    assert_array_equal(in_order(np.sort(spatial_hash.self_pairs(hashed(*soup)), axis=1)), every)
+
+
+def test_the_boxes_are_the_same_for_any_number_of_threads():
+    start, end, faces, radius = moving_soup(17_000, 8)
+    tree = bvh.build(start, faces)
+    nodes = []
+    for threads in (1, 2):
+        with limited_threads(threads):
+            bvh.refit_swept(tree, start, end, faces, radius)
+            nodes.append(tree.nodes.copy())
+    assert_array_equal(nodes[0], nodes[1])
+    low, high = np.minimum(start, end) - radius[:, None], np.maximum(start, end) + radius[:, None]
+    assert_array_equal(nodes[0][0], np.concatenate([low.min(axis=0), high.max(axis=0)]))  # the root holds all
+
+
+def test_a_tree_is_worn_only_when_triangles_leave_their_neighbours(soup):
+    vertices, faces = soup
+    tree = bvh.build(vertices, faces)
+    turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
+    bvh.refit_swept(tree, vertices, vertices + 5.0, faces, np.full(len(vertices), 0.3))
+    assert not bvh.degraded(tree, vertices, faces)  # a long way of all is no wear
+    assert not bvh.degraded(tree, 3.0 * vertices @ turn.T + 1.0, faces)
+    shuffled = vertices.reshape(-1, 3, 3)[np.random.default_rng(1).permutation(len(faces))].reshape(-1, 3)
+    assert bvh.degraded(tree, shuffled, faces)
+    assert not bvh.degraded(bvh.build(shuffled, faces), shuffled, faces)

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from stiff_sheets import grid_edges, interpolation, level_matrix, levels_of
 
-from vto_pipeline.numerics.multigrid import cycle, invert, update
+from vto_pipeline.numerics.multigrid import cycle, invert, invert_dense, update
 from vto_pipeline.numerics.threads import limited_threads
 
 
@@ -120,3 +120,14 @@ def test_three_by_three_inverse():
     matrix, found = root @ root.T + 0.1 * np.eye(3), np.empty((3, 3))
     invert(matrix, found)
     assert_allclose(found @ matrix, np.eye(3), rtol=0, atol=1e-12)  # condition number about 100
+
+
+@pytest.mark.parametrize("condition", [1e2, 1e8])
+def test_dense_inverse(condition):
+    random = np.random.default_rng(6)
+    vectors = np.linalg.qr(random.normal(size=(72, 72)))[0]
+    matrix = vectors @ np.diag(np.geomspace(1.0, condition, 72)) @ vectors.T
+    found = 0.5 * (matrix + matrix.T)
+    expected = np.linalg.inv(found)
+    invert_dense(found)
+    assert_allclose(found, expected, rtol=0, atol=1e-14 * condition)  # rounding times the condition

@@ -31,6 +31,19 @@ class BlockMatrix(NamedTuple):
     diagonal: NDArray[np.int32]
 
 
+class Sparse(NamedTuple):
+    """Scalars by rows.
+
+    Args:
+        starts: First entry of each row, and their number.
+        columns, weights: Of each entry.
+    """
+
+    starts: NDArray[np.int32]
+    columns: NDArray[np.int32]
+    weights: NDArray[np.float64]
+
+
 def pattern(rows: NDArray[np.int32], columns: NDArray[np.int32], count: int) -> tuple[BlockMatrix, NDArray[np.int32]]:
     """Return a zero matrix with room for these blocks and for its diagonal, and the place of each given block.
 

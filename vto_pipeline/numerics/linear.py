@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit, prange
 
 from vto_pipeline.numerics.block_matrix import CHUNK, PARALLEL_FROM, row_times
+from vto_pipeline.numerics.links import pull, pull_back
 from vto_pipeline.numerics.multigrid import cycle
 from vto_pipeline.numerics.vector import dot, load
 
@@ -34,10 +35,10 @@ def pcg(levels, right, x, reference, tolerance, iterations, multigrid):
     """
     parts = np.empty((4, (len(x) + CHUNK - 1) // CHUNK))
     r, q, p, z = np.empty_like(x), np.empty_like(x), np.zeros_like(x), levels.guess
-    matrix, inverse = levels.matrix, levels.inverse
+    matrix, links, inverse = levels.matrix, levels.links, levels.inverse
     threaded = len(x) >= PARALLEL_FROM
     whole, size, soft_whole, soft_size = _run(
-        _BEGIN, matrix, inverse, reference, right, x, r, q, p, 0.0, parts, threaded
+        _BEGIN, matrix, links, inverse, reference, right, x, r, q, p, 0.0, parts, threaded
     )
     done = 0
     before = 1.0
@@ -47,13 +48,15 @@ def pcg(levels, right, x, reference, tolerance, iterations, multigrid):
             levels.right[: len(x)] = r
             cycle(levels)
         else:
-            _run(_JACOBI, matrix, inverse, z, right, x, r, q, p, 0.0, parts, threaded)
-        rho, _, _, _ = _run(_INNER, matrix, inverse, z, right, x, r, q, p, 0.0, parts, threaded)
-        _run(_TURN, matrix, inverse, z, right, x, r, q, p, rho / before if done > 0 else 0.0, parts, threaded)
-        curvature, _, _, _ = _run(_MULTIPLY, matrix, inverse, z, right, x, r, q, p, 0.0, parts, threaded)
+            _run(_JACOBI, matrix, links, inverse, z, right, x, r, q, p, 0.0, parts, threaded)
+        rho, _, _, _ = _run(_INNER, matrix, links, inverse, z, right, x, r, q, p, 0.0, parts, threaded)
+        _run(_TURN, matrix, links, inverse, z, right, x, r, q, p, rho / before if done > 0 else 0.0, parts, threaded)
+        curvature, _, _, _ = _run(_MULTIPLY, matrix, links, inverse, z, right, x, r, q, p, 0.0, parts, threaded)
         if not curvature > 0.0:
             break
-        size, soft_size, _, _ = _run(_STEP, matrix, inverse, z, right, x, r, q, p, rho / curvature, parts, threaded)
+        size, soft_size, _, _ = _run(
+            _STEP, matrix, links, inverse, z, right, x, r, q, p, rho / curvature, parts, threaded
+        )
         before = rho
         done += 1
     return done, sqrt(size / whole) if whole > 0.0 else 0.0
@@ -63,13 +66,17 @@ _BEGIN, _JACOBI, _INNER, _TURN, _MULTIPLY, _STEP = range(6)
 
 
 @njit(cache=True, error_model="numpy")
-def _run(what, matrix, inverse, z, right, x, r, q, p, factor, parts, threaded):
+def _run(what, matrix, links, inverse, z, right, x, r, q, p, factor, parts, threaded):
     """Do one part of an iteration for all rows; return four sums over the rows."""
+    if what == _BEGIN:
+        pull(links, 0, x)
+    elif what == _MULTIPLY:
+        pull(links, 0, p)
     if threaded:
-        _run_parallel(what, matrix, inverse, z, right, x, r, q, p, factor, parts)
+        _run_parallel(what, matrix, links, inverse, z, right, x, r, q, p, factor, parts)
     else:
         for chunk in range(parts.shape[1]):
-            _run_chunk(what, matrix, inverse, z, right, x, r, q, p, factor, parts, chunk)
+            _run_chunk(what, matrix, links, inverse, z, right, x, r, q, p, factor, parts, chunk)
     a = b = c = d = 0.0
     for chunk in range(parts.shape[1]):
         a += parts[0, chunk]
@@ -80,18 +87,19 @@ def _run(what, matrix, inverse, z, right, x, r, q, p, factor, parts, threaded):
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
-def _run_parallel(what, matrix, inverse, z, right, x, r, q, p, factor, parts):
+def _run_parallel(what, matrix, links, inverse, z, right, x, r, q, p, factor, parts):
     for chunk in prange(parts.shape[1]):
-        _run_chunk(what, matrix, inverse, z, right, x, r, q, p, factor, parts, chunk)
+        _run_chunk(what, matrix, links, inverse, z, right, x, r, q, p, factor, parts, chunk)
 
 
 @njit(cache=True, error_model="numpy")
-def _run_chunk(what, matrix, inverse, z, right, x, r, q, p, factor, parts, chunk):
+def _run_chunk(what, matrix, links, inverse, z, right, x, r, q, p, factor, parts, chunk):
     one = other = soft = soft_other = 0.0
     for i in range(CHUNK * chunk, min(len(x), CHUNK * chunk + CHUNK)):
         if what == _BEGIN:
             a, b, c = row_times(matrix, i, x)
-            r[i, 0], r[i, 1], r[i, 2] = right[i, 0] - a, right[i, 1] - b, right[i, 2] - c
+            d, e, f = pull_back(links, i)
+            r[i, 0], r[i, 1], r[i, 2] = right[i, 0] - a - d, right[i, 1] - b - e, right[i, 2] - c - f
             one += dot(load(z, i), load(z, i))
             other += dot(load(r, i), load(r, i))
             soft += _size(inverse, i, z)
@@ -106,6 +114,8 @@ def _run_chunk(what, matrix, inverse, z, right, x, r, q, p, factor, parts, chunk
                 p[i, k] = z[i, k] + factor * p[i, k]
         elif what == _MULTIPLY:
             a, b, c = row_times(matrix, i, p)
+            d, e, f = pull_back(links, i)
+            a, b, c = a + d, b + e, c + f
             q[i, 0], q[i, 1], q[i, 2] = a, b, c
             one += p[i, 0] * a + p[i, 1] * b + p[i, 2] * c
         else:

@@ -2,7 +2,8 @@
 
 Vaněk, Mandel & Brezina 1996; for cloth Tamstorf, Jones & McCormick 2015. The interpolation comes from the graph of the
 mesh alone (each direction of space by itself), so it is made once for a mesh; only the coarse matrices Pᵀ A P follow
-the cloth. All levels live in one matrix, one after the other, the finest first.
+the cloth. All levels live in one matrix, one after the other, the finest first. Links (`numerics.links`) add what a
+contact couples across the mesh to every level.
 """
 
 from __future__ import annotations
@@ -13,23 +14,11 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from vto_pipeline.numerics.block_matrix import CHUNK, PARALLEL_FROM, BlockMatrix, row_times
+from vto_pipeline.numerics.block_matrix import CHUNK, PARALLEL_FROM, BlockMatrix, Sparse, row_times
+from vto_pipeline.numerics.links import Links, add_to_dense, no_links, pull, pull_back, spread_block
 
 _COARSEST = 24  # rows solved directly
 _DAMPING = 0.6  # of block Jacobi; stable while the largest eigenvalue of D⁻¹A, some 2, stays under 3.3
-
-
-class Sparse(NamedTuple):
-    """Scalars by rows.
-
-    Args:
-        starts: First entry of each row, and their number.
-        columns, weights: Of each entry.
-    """
-
-    starts: NDArray[np.int32]
-    columns: NDArray[np.int32]
-    weights: NDArray[np.float64]
 
 
 class Hierarchy(NamedTuple):
@@ -44,6 +33,7 @@ class Hierarchy(NamedTuple):
         up: Interpolation: a row's weights on the rows of the next level.
         down: Its transpose.
         galerkin: For each coarse block, the finer blocks that it sums, with weights.
+        links: What is coupled beside the pattern; none unless replaced.
         right, guess, rest: Working vectors, shape (rows, 3).
     """
 
@@ -55,6 +45,7 @@ class Hierarchy(NamedTuple):
     up: Sparse
     down: Sparse
     galerkin: Sparse
+    links: Links
     right: NDArray[np.float64]
     guess: NDArray[np.float64]
     rest: NDArray[np.float64]
@@ -89,6 +80,7 @@ def hierarchy(fine: BlockMatrix, held: NDArray[np.bool_]) -> Hierarchy:
         _stack_sparse([sparse.csr_array(up) for up in ups], rows[1:], sizes[-1]),
         _stack_sparse([sparse.csr_array(up.T) for up in ups], rows[:-1], 0),
         _stack_sums(sums, slots),
+        no_links(total),
         np.zeros((total, 3)),
         np.zeros((total, 3)),
         np.zeros((total, 3)),
@@ -207,16 +199,17 @@ def update(levels):
             if block[0, 0] == 0.0:  # all that it stands for is held
                 block[0, 0] = block[1, 1] = block[2, 2] = 1.0
     if levels.rows[last + 1] >= PARALLEL_FROM:
-        _invert_parallel(matrix, levels.inverse)
+        _invert_parallel(matrix, levels.links, levels.inverse)
     else:
-        _invert_rows(matrix, levels.inverse, 0, levels.rows[last + 1])
+        _invert_rows(matrix, levels.links, levels.inverse, 0, levels.rows[last + 1])
     first = levels.rows[last]
     levels.coarsest[:] = 0.0
     for row in range(first, levels.rows[last + 1]):
         for k in range(matrix.starts[row], matrix.starts[row + 1]):
             i, j = 3 * (row - first), 3 * (matrix.columns[k] - first)
             levels.coarsest[i : i + 3, j : j + 3] = matrix.blocks[k]
-    levels.coarsest[:] = np.linalg.inv(levels.coarsest)
+    add_to_dense(levels.links, last, first, levels.coarsest)
+    invert_dense(levels.coarsest)
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
@@ -247,16 +240,19 @@ def _sum_blocks(matrix, terms, fine, first, end):
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
-def _invert_parallel(matrix, inverse):
+def _invert_parallel(matrix, links, inverse):
     total = len(inverse)
     for chunk in prange((total + CHUNK - 1) // CHUNK):
-        _invert_rows(matrix, inverse, CHUNK * chunk, min(total, CHUNK * chunk + CHUNK))
+        _invert_rows(matrix, links, inverse, CHUNK * chunk, min(total, CHUNK * chunk + CHUNK))
 
 
 @njit(cache=True, error_model="numpy")
-def _invert_rows(matrix, inverse, first, end):
+def _invert_rows(matrix, links, inverse, first, end):
+    block = np.empty((3, 3))
     for i in range(first, end):
-        invert(matrix.blocks[matrix.diagonal[i]], inverse[i])
+        block[:] = matrix.blocks[matrix.diagonal[i]]
+        spread_block(links, i, block)
+        invert(block, inverse[i])
 
 
 @njit(cache=True, error_model="numpy")
@@ -272,6 +268,27 @@ def invert(d, out):
     out[1, 2] = (d[0, 2] * d[1, 0] - d[0, 0] * d[1, 2]) / det
     out[2, 1] = out[1, 2]
     out[2, 2] = (d[0, 0] * d[1, 1] - d[0, 1] * d[1, 0]) / det
+
+
+@njit(cache=True, error_model="numpy")
+def invert_dense(matrix):
+    """Invert a symmetric positive definite matrix in place, by Gauss and Jordan; it needs no pivots.
+
+    LAPACK would bring its own threads, which for a matrix this small wait longer than they work.
+    """
+    size = len(matrix)
+    for k in range(size):
+        pivot = 1.0 / matrix[k, k]
+        matrix[k, k] = 1.0
+        for j in range(size):
+            matrix[k, j] *= pivot
+        for i in range(size):
+            if i == k:
+                continue
+            factor = matrix[i, k]
+            matrix[i, k] = 0.0
+            for j in range(size):
+                matrix[i, j] -= factor * matrix[k, j]
 
 
 @njit(cache=True, error_model="numpy")
@@ -298,12 +315,15 @@ _DOWN_SMOOTH, _DOWN_RESIDUAL, _DOWN_RESTRICT, _UP_ADD, _UP_RESIDUAL = range(5)
 def _each(what, levels, level):
     of = level + 1 if what == _DOWN_RESTRICT else level
     first, end = levels.rows[of], levels.rows[of + 1]
+    links = levels.links
+    if what in (_DOWN_RESIDUAL, _UP_RESIDUAL):
+        pull(links, level, levels.guess)
     matrix, inverse, up, down = levels.matrix, levels.inverse, levels.up, levels.down
     right, guess, rest = levels.right, levels.guess, levels.rest
     if end - first >= PARALLEL_FROM:
-        _each_parallel(what, matrix, inverse, up, down, right, guess, rest, levels.rows[1], first, end)
+        _each_parallel(what, matrix, links, inverse, up, down, right, guess, rest, levels.rows[1], first, end)
     else:
-        _each_row(what, matrix, inverse, up, down, right, guess, rest, levels.rows[1], first, end)
+        _each_row(what, matrix, links, inverse, up, down, right, guess, rest, levels.rows[1], first, end)
     if what == _UP_RESIDUAL:  # Jacobi: the guess changes after all residuals are known
         for i in range(first, end):
             for k in range(3):
@@ -311,14 +331,14 @@ def _each(what, levels, level):
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
-def _each_parallel(what, matrix, inverse, up, down, right, guess, rest, fine, first, end):
+def _each_parallel(what, matrix, links, inverse, up, down, right, guess, rest, fine, first, end):
     for chunk in prange((end - first + CHUNK - 1) // CHUNK):
         begin = first + CHUNK * chunk
-        _each_row(what, matrix, inverse, up, down, right, guess, rest, fine, begin, min(end, begin + CHUNK))
+        _each_row(what, matrix, links, inverse, up, down, right, guess, rest, fine, begin, min(end, begin + CHUNK))
 
 
 @njit(cache=True, error_model="numpy")
-def _each_row(what, matrix, inverse, up, down, right, guess, rest, fine, first, end):
+def _each_row(what, matrix, links, inverse, up, down, right, guess, rest, fine, first, end):
     for i in range(first, end):
         if what == _DOWN_SMOOTH:
             r0, r1, r2 = right[i, 0], right[i, 1], right[i, 2]
@@ -326,7 +346,8 @@ def _each_row(what, matrix, inverse, up, down, right, guess, rest, fine, first, 
                 guess[i, k] = _DAMPING * (inverse[i, k, 0] * r0 + inverse[i, k, 1] * r1 + inverse[i, k, 2] * r2)
         elif what == _DOWN_RESIDUAL:
             a, b, c = row_times(matrix, i, guess)
-            rest[i, 0], rest[i, 1], rest[i, 2] = right[i, 0] - a, right[i, 1] - b, right[i, 2] - c
+            d, e, f = pull_back(links, i)
+            rest[i, 0], rest[i, 1], rest[i, 2] = right[i, 0] - a - d, right[i, 1] - b - e, right[i, 2] - c - f
         elif what == _DOWN_RESTRICT:
             a = b = c = 0.0
             for k in range(down.starts[i - fine], down.starts[i - fine + 1]):
@@ -343,7 +364,8 @@ def _each_row(what, matrix, inverse, up, down, right, guess, rest, fine, first, 
                 guess[i, 2] += w * guess[j, 2]
         else:
             a, b, c = row_times(matrix, i, guess)
-            a, b, c = right[i, 0] - a, right[i, 1] - b, right[i, 2] - c
+            d, e, f = pull_back(links, i)
+            a, b, c = right[i, 0] - a - d, right[i, 1] - b - e, right[i, 2] - c - f
             for k in range(3):
                 rest[i, k] = _DAMPING * (inverse[i, k, 0] * a + inverse[i, k, 1] * b + inverse[i, k, 2] * c)
 

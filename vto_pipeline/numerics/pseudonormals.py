@@ -58,23 +58,38 @@ def update(normals, vertices, faces):
     """Recompute the normals for moved vertices, in place."""
     normals.edges[:] = 0.0
     normals.vertices[:] = 0.0
+    slivers = 0
     for f in range(len(faces)):
-        corner = (load(vertices, faces[f, 0]), load(vertices, faces[f, 1]), load(vertices, faces[f, 2]))
-        n = unit(cross(sub(corner[1], corner[0]), sub(corner[2], corner[0])))
-        store(normals.faces, f, n)
-        for k in range(3):
-            e, v = normals.face_edges[f, k], faces[f, k]
-            store(normals.edges, e, add(load(normals.edges, e), n))
-            out = unit(sub(corner[(k + 1) % 3], corner[k]))
-            back = unit(sub(corner[(k + 2) % 3], corner[k]))
-            angle = acos(min(1.0, max(-1.0, dot(out, back))))
-            store(normals.vertices, v, add(load(normals.vertices, v), scale(angle, n)))
+        a, b, c = load(vertices, faces[f, 0]), load(vertices, faces[f, 1]), load(vertices, faces[f, 2])
+        n = unit(cross(sub(b, a), sub(c, a)))
+        slivers += n == (0.0, 0.0, 0.0)
+        _spread(normals, vertices, faces, f, n)
+    if slivers > 0:
+        for f in range(len(faces)):
+            if load(normals.faces, f) == (0.0, 0.0, 0.0):  # where others meet in a line it is the seam: as they face
+                around = (0.0, 0.0, 0.0)
+                for k in range(3):
+                    around = add(around, load(normals.edges, normals.face_edges[f, k]))
+                _spread(normals, vertices, faces, f, unit(around))
     for e in range(len(normals.edges)):
         if normals.rim_edges[e]:
             store(normals.edges, e, (0.0, 0.0, 0.0))
     for v in range(len(normals.vertices)):
         if normals.rim_vertices[v]:
             store(normals.vertices, v, (0.0, 0.0, 0.0))
+
+
+@njit(cache=True)
+def _spread(normals, vertices, faces, f, n):
+    """Note the normal of a face, and add it to those of its edges and, by their angles, of its vertices."""
+    store(normals.faces, f, n)
+    for k in range(3):
+        e, v = normals.face_edges[f, k], faces[f, k]
+        store(normals.edges, e, add(load(normals.edges, e), n))
+        out = unit(sub(load(vertices, faces[f, (k + 1) % 3]), load(vertices, v)))
+        back = unit(sub(load(vertices, faces[f, (k + 2) % 3]), load(vertices, v)))
+        angle = acos(min(1.0, max(-1.0, dot(out, back))))
+        store(normals.vertices, v, add(load(normals.vertices, v), scale(angle, n)))
 
 
 @njit(cache=True)

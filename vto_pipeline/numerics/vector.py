@@ -14,6 +14,12 @@ def load(array, i):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
+def load_at(array, i, j):
+    """Return row j of array[i], of an (N, M, 3) array. A view array[i] would count references: slow in a loop."""
+    return array[i, j, 0], array[i, j, 1], array[i, j, 2]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
 def store(array, i, a):
     """Write a into row i of an (N, 3) array."""
     array[i, 0], array[i, 1], array[i, 2] = a
@@ -21,7 +27,7 @@ def store(array, i, a):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def store_at(array, i, j, a):
-    """Write a into row j of array[i], of an (N, M, 3) array. A view array[i] would count references: slow in a loop."""
+    """Write a into row j of array[i], of an (N, M, 3) array, as `load_at` reads it."""
     array[i, j, 0], array[i, j, 1], array[i, j, 2] = a
 
 
