@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
@@ -53,5 +54,8 @@ class SurfaceDistance:
     def signed(self, points: FloatArray) -> Nearest:
         """Return the nearest surface points; distances are negative inside."""
         found = self.nearest(points)
-        inside = self._winding.winding_number(np.ascontiguousarray(points)) > 0.5
-        return Nearest(np.where(inside, -found.distance, found.distance), found.face, found.point)
+        return Nearest(np.where(self.inside(points), -found.distance, found.distance), found.face, found.point)
+
+    def inside(self, points: FloatArray, above: float = 0.5) -> NDArray[np.bool_]:
+        """Return whether points are inside, shape (N,): where the winding number is above this."""
+        return np.asarray(self._winding.winding_number(np.ascontiguousarray(points)) > above)

@@ -2,47 +2,84 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numba import njit
+from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from vto_pipeline.cloth.collision.clean import clean_faces
 from vto_pipeline.cloth.collision.contacts import Contacts, Round, ride
-from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.cloth.collision.march import march
+from vto_pipeline.cloth.collision.nearest import Nearest, Searched
+from vto_pipeline.cloth.collision.solid import SLOW
+from vto_pipeline.cloth.collision.triangle_planes import INSIDE, OUTSIDE, RIM, sides, triangle_planes
+from vto_pipeline.cloth.collision.visible import Touchable, touchable
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.numerics import bvh
-from vto_pipeline.numerics.distance import blend
-from vto_pipeline.numerics.pseudonormals import feature_normal, pseudonormals, update
-from vto_pipeline.numerics.vector import cross, dot, load, norm, scale, store, sub, unit
+from vto_pipeline.numerics.pseudonormals import Pseudonormals, pseudonormals, update
 
+_SURELY = (
+    0.55  # winding number above which a point is inside an open body; straight behind an open sheet it is one half
+)
 _FAR = 1e6  # m; the first search has no limit, since cloth may start anywhere in the body
+
+
+class _Surface(NamedTuple):
+    """A body fitted to where it is.
+
+    Args:
+        faces, normals: All of it.
+        searched: What can be touched of it.
+        part: How that lies on the whole, while the body rests and parts of it are inside others.
+        judge: Of inside and outside, where normals cannot tell; None if they always can.
+    """
+
+    faces: IntArray
+    normals: Pseudonormals
+    searched: Searched
+    part: Touchable | None = None
+    judge: SurfaceDistance | None = None
+
+    def on_body(self, found: Nearest) -> Nearest:
+        """Return where on the whole the places are that were found on what can be touched."""
+        return found if self.part is None else self.part.on_body(found)
 
 
 class BodyCollider:
     """A moving body: keyframes spread evenly over `seconds`, then at rest.
 
-    Keeps what makes the next search cheap: the tree, and for each cloth vertex the last triangle and distance.
+    Keeps what makes the next search cheap: the tree, and for each cloth vertex the last triangle and distance. The
+    body need not be clean (`clean`). What lies inside its other parts is no surface to it while it rests (`visible`).
+    Where it has holes, rims or branches, a vertex is inside where the winding number then surely says so: behind a
+    single sheet is not inside.
 
     Args:
         body: The keyframes.
         seconds: How long the motion takes [s].
         friction: Coulomb coefficient.
-        job: For what was left out; with `force_all` the tree is refitted though nothing moved.
+        job: For what was mended and left out; with `force_all` the tree is refitted though nothing moved.
     """
 
     def __init__(self, body: MovingBody, seconds: float, friction: float, job: Job | None = None) -> None:
         self._frames = body.keyframes
-        self._faces = body.faces.copy()
         self._seconds = seconds
         self._friction = friction
-        self._always_refit = job is not None and job.force_all
-        self._fitted_to = self.at(0.0)
-        self._tree = bvh.build(self._fitted_to, self._faces)
-        self._normals = pseudonormals(self._fitted_to, self._faces)
+        self._job = job or Job()
+        self._clean = clean_faces(self._frames, body.faces)
+        if str(self._clean):
+            self._job.note(f"body: {self._clean}")
         self._guess: np.ndarray = np.empty(0, np.int32)
         self._distance: FloatArray = np.empty(0)
         self._moves = len(self._frames) > 1 and bool(np.ptp(self._frames, axis=0).any())
-        if not self._moves and not self._always_refit and job is not None:
-            job.leave_out("refitting the body's tree", "the body is at rest")
+        self._fitted_to = self.at(0.0)
+        self._at_rest = not self._moves
+        self._surface = self._resting() if self._at_rest else self._whole()
+        if self._at_rest and not self._job.force_all:
+            self._job.leave_out("refitting the body's tree", "the body is at rest")
 
     def at(self, time: float) -> FloatArray:
         """Return the body's vertices at a time [s], shape (V, 3) [m]."""
@@ -53,69 +90,150 @@ class BodyCollider:
         first = int(place)
         return frames[first] + (place - first) * (frames[first + 1] - frames[first])
 
+    @property
+    def faces(self) -> IntArray:
+        """Its faces after cleaning, shape (F, 3)."""
+        return self._clean.faces
+
+    @property
+    def count(self) -> int:
+        """How many vertices it has."""
+        return self._frames.shape[1]
+
+    @property
+    def friction(self) -> float:
+        """Coulomb coefficient."""
+        return self._friction
+
+    @property
+    def shown(self) -> NDArray[np.bool_]:
+        """Which faces can be touched, shape (F,)."""
+        shown = np.ones(len(self.faces), np.bool_)
+        if self._surface.part is not None:
+            shown[:] = False
+            shown[self._surface.part.parent] = True
+        return shown
+
+    def nearest(self, count: int) -> IntArray:
+        """Return the face nearest to each of so many vertices when contacts were last found; -1 for none, at rest."""
+        known = len(self._guess) == count and not self._at_rest
+        return self._guess if known else np.full(count, -1, np.int32)
+
+    def holds(self, count: int) -> NDArray[np.bool_]:
+        """Return which vertices of a cloth of so many were inside when contacts were last found, shape (count,)."""
+        known = len(self._distance) == count
+        return self._distance < 0.0 if known else np.zeros(count, np.bool_)
+
     def contacts(self, positions: FloatArray, span: Round) -> Contacts:
         """See `Collider.contacts`."""
-        before = self.at(span.start)
-        after = self.at(span.end) if self._moves else before
-        if self._always_refit or (self._moves and not np.array_equal(before, self._fitted_to)):
-            bvh.refit(self._tree, before, self._faces)
-            update(self._normals, before, self._faces)
-            self._fitted_to = before
-        shift = float(np.sqrt(((after - before) ** 2).sum(axis=1).max())) if self._moves else 0.0
-        look = span.travel + shift
+        before, after = self._fit(span)
+        surface = self._surface
+        shift = float(np.sqrt(((after - before) ** 2).sum(axis=1).max())) if after is not before else 0.0
+        look = np.full(len(positions), span.travel + shift)
+        if span.move is not None:
+            look += np.linalg.norm(span.move, axis=1)
         if len(self._guess) != len(positions):
             self._guess = np.full(len(positions), -1, np.int32)
             self._distance = np.full(len(positions), -_FAR)
         reach = np.maximum(span.skin, -self._distance + look) + look  # cloth inside must not be lost
-        triangle, weights, feature = bvh.closest_points(self._tree, before, self._faces, positions, reach, self._guess)
-        distance, point, normal, near = _planes(
-            before, after, self._faces, self._normals, positions, triangle, weights, feature
+        near = surface.searched.nearest(positions, reach, self._guess)
+        found = surface.on_body(near)
+        side, distance = self._sides(positions, before, found)
+        self._guess, self._distance = near.triangle, np.where(side == INSIDE, -distance, distance)
+        seen_from = positions
+        if span.move is not None or after is not before:
+            way = self._way(before, after, span, found)
+            chosen = np.flatnonzero(self._heads_for_it(positions, before, span, side, found, way))
+            place, ahead = march(surface.searched, positions[chosen], way[chosen], near.of(chosen))
+            ahead = surface.on_body(ahead)
+            clear = _clear(positions[chosen], place, ahead.on(before, surface.faces), span.skin[chosen])
+            found = found.replaced(chosen[clear], ahead.of(clear))
+            seen_from = positions.copy()
+            seen_from[chosen[clear]] = place[clear]
+        distance, point, normal, there = triangle_planes(
+            before, after, surface.faces, surface.normals, positions, seen_from, side, *found
         )
-        self._guess, self._distance = triangle, distance
-        return ride(distance, point, normal, self._friction, near, span)
+        return ride(distance, point, normal, self._friction, there, span)
+
+    def _sides(self, positions: FloatArray, before: FloatArray, found: Nearest) -> tuple[NDArray[np.int8], FloatArray]:
+        """Return on which side of the body vertices are, and how far from it [m]."""
+        surface = self._surface
+        side, distance = sides(before, surface.faces, surface.normals, positions, *found)
+        if surface.judge is not None:
+            doubtful = np.zeros(len(side), np.bool_)
+            if not self._clean.sealed:
+                doubtful |= (side == INSIDE) | (side == RIM)
+            if surface.part is not None:  # where two parts meet, the normal of one does not tell
+                doubtful |= surface.part.passing[found.triangle] & (found.triangle >= 0)
+            side[doubtful] = np.where(surface.judge.inside(positions[doubtful], _SURELY), INSIDE, OUTSIDE)
+        return side, distance
+
+    def _way(self, before: FloatArray, after: FloatArray, span: Round, found: Nearest) -> FloatArray:
+        """Return the way of each vertex, seen from the place of the body it is nearest to [m], shape (V, 3)."""
+        way = np.zeros((len(found.triangle), 3)) if span.move is None else span.move
+        if after is before:
+            return way
+        carried = found.on(after - before, self._surface.faces)
+        return way - np.where((found.triangle >= 0)[:, None], carried, 0.0)
+
+    def _heads_for_it(
+        self,
+        positions: FloatArray,
+        before: FloatArray,
+        span: Round,
+        side: NDArray[np.int8],
+        found: Nearest,
+        way: FloatArray,
+    ) -> NDArray[np.bool_]:
+        """Return which vertices go far, and beyond the plane of the nearest place, shape (V,)."""
+        away = positions - found.on(before, self._surface.faces)
+        distance = np.linalg.norm(away, axis=1)
+        beyond = distance**2 + np.einsum("ij,ij->i", away, way) < span.skin * distance
+        far = np.linalg.norm(way, axis=1) > SLOW * span.skin
+        return np.asarray((side == OUTSIDE) & (found.triangle >= 0) & far & beyond)
+
+    def _fit(self, span: Round) -> tuple[FloatArray, FloatArray]:
+        """Return the vertices at begin and end of a round, with the surface fitted to the begin."""
+        if self._at_rest:
+            if self._job.force_all:
+                vertices, faces, tree = self._surface.searched
+                bvh.refit(tree, vertices, faces)
+            return self._fitted_to, self._fitted_to
+        before = self.at(span.start)
+        if span.start >= self._seconds:
+            self._at_rest, self._fitted_to, self._guess = True, before, np.empty(0, np.int32)
+            self._surface = self._resting()
+            return before, before
+        if not np.array_equal(before, self._fitted_to):
+            faces, normals, searched = self._surface[:3]
+            bvh.refit(searched.tree, before, faces)
+            update(normals, before, faces)
+            self._surface = self._surface._replace(searched=searched._replace(vertices=before))
+            self._fitted_to = before
+        return before, self.at(span.end)
+
+    def _whole(self) -> _Surface:
+        vertices, faces = self._fitted_to, self._clean.faces
+        return _Surface(faces, pseudonormals(vertices, faces), Searched(vertices, faces, bvh.build(vertices, faces)))
+
+    def _resting(self) -> _Surface:
+        """Return the body as it stands, without what cannot be touched."""
+        whole = self._whole()
+        mesh = TriangleMesh(self._fitted_to, whole.faces)
+        distance = SurfaceDistance(mesh)
+        part = touchable(mesh, distance)
+        if part.buried or part.passing.any():
+            self._job.note(
+                f"body: {part.buried} faces lie inside its other parts and are not touched, "
+                f"{int(part.passing.sum())} pass through others"
+            )
+            searched = Searched(part.vertices, part.faces, bvh.build(part.vertices, part.faces))
+            return whole._replace(searched=searched, part=part, judge=distance)
+        return whole if self._clean.sealed else whole._replace(judge=distance)
 
 
-@njit(cache=True)
-def _planes(before, after, faces, normals, positions, triangle, weights, feature):  # type: ignore[no-untyped-def]
-    """Return signed distance (V,), point and normal at begin and end (V, 2, 3), and whether there is a plane (V,)."""
-    count = len(positions)
-    distance = np.full(count, np.inf)
-    point, normal = np.zeros((count, 2, 3)), np.zeros((count, 2, 3))
-    near = np.zeros(count, np.bool_)
-    for i in range(count):
-        t = triangle[i]
-        if t < 0:
-            continue
-        out = unit(feature_normal(normals, faces, t, feature[i]))
-        if out == (0.0, 0.0, 0.0):  # over the rim of an open body there is no inside
-            continue
-        a, b, c = load(before, faces[t, 0]), load(before, faces[t, 1]), load(before, faces[t, 2])
-        w = (weights[i, 0], weights[i, 1], weights[i, 2])
-        on = blend(w, a, b, c)
-        away = sub(load(positions, i), on)
-        length = norm(away)
-        sign = 1.0 if dot(away, out) >= 0.0 else -1.0
-        n = scale(sign / length, away) if length > 1e-7 else out  # nearer, the direction is only rounding
-        a1, b1, c1 = load(after, faces[t, 0]), load(after, faces[t, 1]), load(after, faces[t, 2])
-        near[i] = True
-        distance[i] = sign * length
-        store(point[i], 0, on)
-        store(point[i], 1, blend(w, a1, b1, c1))
-        store(normal[i], 0, n)
-        store(normal[i], 1, _turned(n, a, b, c, a1, b1, c1))
-    return distance, point, normal, near
-
-
-@njit(cache=True)
-def _turned(n, a, b, c, a1, b1, c1):  # type: ignore[no-untyped-def]
-    """Return direction n after triangle abc has moved to a1 b1 c1, turning with its edge ab and its normal."""
-    u, z = unit(sub(b, a)), unit(cross(sub(b, a), sub(c, a)))
-    u1, z1 = unit(sub(b1, a1)), unit(cross(sub(b1, a1), sub(c1, a1)))
-    v, v1 = cross(z, u), cross(z1, u1)
-    x, y, w = dot(n, u), dot(n, v), dot(n, z)
-    turned = (
-        x * u1[0] + y * v1[0] + w * z1[0],
-        x * u1[1] + y * v1[1] + w * z1[1],
-        x * u1[2] + y * v1[2] + w * z1[2],
-    )
-    return unit(turned) if norm(turned) > 0.5 else n
+def _clear(positions: FloatArray, place: FloatArray, on: FloatArray, skin: FloatArray) -> NDArray[np.bool_]:
+    """Return which vertices are before the plane through a point that faces a place on their way, shape (N,)."""
+    normal = place - on
+    room = np.einsum("ij,ij->i", positions - on, normal)
+    return np.asarray(room >= SLOW * skin * np.linalg.norm(normal, axis=1))

@@ -40,6 +40,8 @@ class Round(NamedTuple):
         travel: No vertex moves farther in it [m].
         skin: Distance to keep from surfaces, of each vertex [m], shape (V,).
         recovery: Speed at which cloth inside a surface is led out [m/s].
+        move: Where each vertex is heading in the round, if known [m], shape (V, 3); a plane is then chosen that is not
+            in its way unless the surface is.
     """
 
     start: float
@@ -47,6 +49,7 @@ class Round(NamedTuple):
     travel: float
     skin: FloatArray
     recovery: float
+    move: FloatArray | None = None
 
 
 class Collider(Protocol):

@@ -1,4 +1,4 @@
-"""Colliders with a formula: sphere, capsule, plane. And a mesh at rest, as users give it."""
+"""Colliders as users give them: solids with a formula, and meshes. All are at rest; `moving.Moving` moves them."""
 
 from __future__ import annotations
 
@@ -6,48 +6,95 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vto_pipeline.cloth.collision.contacts import Contacts, Round, ride
+from vto_pipeline.cloth.collision.contacts import Contacts, Round
+from vto_pipeline.cloth.collision.pose import Pose, Turn, Vector, along_y, pose
+from vto_pipeline.cloth.collision.solid import solid_contacts
 from vto_pipeline.errors import InputError
 from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.mesh import TriangleMesh
-
-Vector = tuple[float, float, float]
+from vto_pipeline.numerics.solids import ELLIPSOID, HALF_SPACE, ROUNDED_BOX
 
 
 @dataclass(frozen=True)
 class Sphere:
-    """A fixed ball: center [m], radius [m], Coulomb friction."""
+    """A ball: center [m], radius [m], Coulomb friction."""
 
     center: Vector
     radius: float
     friction: float = 0.3
 
+    def __post_init__(self) -> None:
+        _check_sizes("sphere radius", self.radius)
+
     def contacts(self, positions: FloatArray, span: Round) -> Contacts:
         """See `Collider.contacts`."""
-        return _round_contacts(
-            positions, np.broadcast_to(self.center, positions.shape), self.radius, self.friction, span
-        )
+        size = (0.0, 0.0, 0.0, self.radius)
+        return solid_contacts(ROUNDED_BOX, size, pose(self.center), self.friction, positions, span)
 
 
 @dataclass(frozen=True)
 class Capsule:
-    """A fixed rod with round ends: end points [m], radius [m], Coulomb friction."""
+    """A rod with round ends: end points [m], radius [m], Coulomb friction."""
 
     start: Vector
     end: Vector
     radius: float
     friction: float = 0.3
 
+    def __post_init__(self) -> None:
+        _check_sizes("capsule radius", self.radius)
+
     def contacts(self, positions: FloatArray, span: Round) -> Contacts:
         """See `Collider.contacts`."""
-        start, axis = np.array(self.start), np.subtract(self.end, self.start)
-        along = np.clip((positions - start) @ axis / max(float(axis @ axis), 1e-300), 0.0, 1.0)
-        return _round_contacts(positions, start + along[:, None] * axis, self.radius, self.friction, span)
+        axis, middle = np.subtract(self.end, self.start), 0.5 * np.add(self.start, self.end)
+        length = float(np.linalg.norm(axis))
+        where = Pose(along_y(axis) if length > 0.0 else np.eye(3), middle)
+        size = (0.0, 0.5 * length, 0.0, self.radius)
+        return solid_contacts(ROUNDED_BOX, size, where, self.friction, positions, span)
+
+
+@dataclass(frozen=True)
+class Ellipsoid:
+    """An ellipsoid: center [m], semi-axes along its own x, y, z [m], rotation, Coulomb friction."""
+
+    center: Vector
+    radii: Vector
+    rotation: Turn = (0.0, 0.0, 0.0)
+    friction: float = 0.3
+
+    def __post_init__(self) -> None:
+        _check_sizes("ellipsoid radius", *self.radii)
+
+    def contacts(self, positions: FloatArray, span: Round) -> Contacts:
+        """See `Collider.contacts`."""
+        x, y, z = self.radii
+        where = pose(self.center, self.rotation)
+        return solid_contacts(ELLIPSOID, (x, y, z, 0.0), where, self.friction, positions, span)
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box: center [m], half its sizes along its own x, y, z [m], rotation, Coulomb friction."""
+
+    center: Vector
+    half_sizes: Vector
+    rotation: Turn = (0.0, 0.0, 0.0)
+    friction: float = 0.3
+
+    def __post_init__(self) -> None:
+        _check_sizes("half size of a box", *self.half_sizes)
+
+    def contacts(self, positions: FloatArray, span: Round) -> Contacts:
+        """See `Collider.contacts`."""
+        x, y, z = self.half_sizes
+        where = pose(self.center, self.rotation)
+        return solid_contacts(ROUNDED_BOX, (x, y, z, 0.0), where, self.friction, positions, span)
 
 
 @dataclass(frozen=True)
 class Plane:
-    """A fixed half-space: a point on its face [m], the normal out of it, Coulomb friction."""
+    """A half-space: a point on its face [m], the normal out of it, Coulomb friction."""
 
     point: Vector
     normal: Vector
@@ -59,38 +106,23 @@ class Plane:
 
     def contacts(self, positions: FloatArray, span: Round) -> Contacts:
         """See `Collider.contacts`."""
-        normal = np.array(self.normal) / np.linalg.norm(self.normal)
-        distance = (positions - self.point) @ normal
-        point = positions - distance[:, None] * normal
-        return _still(distance, point, np.broadcast_to(normal, positions.shape), self.friction, span)
+        where = Pose(along_y(self.normal), np.asarray(self.point, dtype=np.float64))
+        return solid_contacts(HALF_SPACE, (0.0, 0.0, 0.0, 0.0), where, self.friction, positions, span)
 
 
 @dataclass(frozen=True)
 class MeshCollider:
-    """A fixed surface: triangles counter-clockwise seen from outside, Coulomb friction."""
+    """A surface: triangles counter-clockwise seen from outside, Coulomb friction.
 
-    mesh: TriangleMesh
+    One that changes its shape is a `MovingBody`: keyframes spread evenly over `seconds`, then at rest.
+    """
+
+    mesh: TriangleMesh | MovingBody
     friction: float = 0.3
+    seconds: float = 0.0
 
 
-def _round_contacts(positions: FloatArray, axis: FloatArray, radius: float, friction: float, span: Round) -> Contacts:
-    """Return contacts with a surface `radius` away from the nearest axis points, shape (V, 3)."""
-    away = positions - axis
-    length = np.linalg.norm(away, axis=1)
-    up = np.broadcast_to([0.0, 1.0, 0.0], away.shape)
-    normal = np.where(length[:, None] > 0.0, away / np.maximum(length, 1e-300)[:, None], up)
-    return _still(length - radius, axis + radius * normal, normal, friction, span)
-
-
-def _still(distance: FloatArray, point: FloatArray, normal: FloatArray, friction: float, span: Round) -> Contacts:
-    """Return contacts with a surface that does not move; point and normal of shape (V, 3)."""
-    twice = (len(distance), 2, 3)
-    near = distance < span.skin + span.travel
-    return ride(
-        distance,
-        np.ascontiguousarray(np.broadcast_to(point[:, None], twice)),
-        np.ascontiguousarray(np.broadcast_to(normal[:, None], twice)),
-        friction,
-        near,
-        span,
-    )
+def _check_sizes(name: str, *sizes: float) -> None:
+    for size in sizes:
+        if not 0.0 < size < np.inf:
+            raise InputError(f"{name} is {size}; wanted a length above zero")
