@@ -5,10 +5,13 @@ import pytest
 from cloth_scenes import ball, fabric, moved, tube
 from numpy.testing import assert_allclose, assert_array_equal
 
+import vto_pipeline.cloth.drape as drape_module
 from vto_pipeline.cloth.drape import drape
+from vto_pipeline.cloth.start import Start, vertices_of
 from vto_pipeline.errors import ConfigError, IntersectingError
-from vto_pipeline.geometry.intersections import intersecting_faces
+from vto_pipeline.geometry.intersections import intersecting_faces, self_intersections
 from vto_pipeline.model.body import MovingBody
+from vto_pipeline.model.garment import Garment, RestShape
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -26,6 +29,19 @@ def pear(swell=1.0):
 def vest(shift=(0.0, 0.0, 0.0)):
     """A tube that cannot slip over the wide part of the pear: its waist is 0.115 m, the pear 0.14 m."""
     return moved(tube(0.115, 0.2, 72, 24, base=0.0), *shift)
+
+
+def double_vest(through=0.0):
+    """Two vests 6 mm apart, one about the other; a patch in front of the inner one is pushed out, through the other."""
+    inner, outer = vest(), tube(0.121, 0.2, 72, 24, base=0.0)
+    mesh = TriangleMesh(
+        np.vstack([inner.vertices, outer.vertices]), np.vstack([inner.faces, outer.faces + len(inner.vertices)])
+    )
+    moved_out = mesh.vertices.copy()
+    x, y, z = inner.vertices.T
+    out = through * np.exp(-((y - 0.1) ** 2 + z**2) / 0.02**2) * (x > 0)
+    moved_out[: len(x)] *= 1.0 + out[:, None] / np.hypot(x, z)[:, None] * [1.0, 0.0, 1.0]
+    return Garment(TriangleMesh(moved_out, mesh.faces), RestShape(mesh.vertices))
 
 
 def test_a_vest_comes_to_rest_on_the_pear():
@@ -74,6 +90,41 @@ def test_leaving_nothing_out_changes_nothing():
     assert_allclose(whole.mesh.vertices, plain.mesh.vertices, rtol=0, atol=1e-4)  # the promise: 0.1 mm
 
 
+def test_what_the_search_for_self_contacts_saved_is_told_and_nothing_when_all_is_forced():
+    quick, plain, whole = {**QUICK, "settle_seconds": 0.3}, Job(), Job(force_all=True)
+    ends = [drape(double_vest(), pear(), fabric(bending=1e-5), quick, job).mesh.vertices for job in (plain, whole)]
+    assert_allclose(ends[1], ends[0], rtol=0, atol=1e-4)  # the promise: 0.1 mm
+    assert "questions needed none" in dict(plain.left_out)["self-collision search"]
+    assert plain.metrics["self_searches_left_out"] > 0 < plain.metrics["self_searches_saved_s"]
+    assert "self-collision search" not in dict(whole.left_out)
+    assert whole.metrics["self_searches_left_out"] == 0 == whole.metrics["self_searches_saved_s"]
+    assert whole.metrics["self_searches"] > plain.metrics["self_searches"] > 0
+
+
+def test_a_garment_that_starts_through_itself_is_untangled():
+    start = double_vest(through=0.012)
+    assert len(self_intersections(start.mesh)) > 20
+    found = drape(start, pear(), fabric(bending=1e-5), {**QUICK, "place": "as_it_stands"})
+    assert len(self_intersections(found.mesh)) == found.audit["self_intersections"] == 0
+    assert found.audit["self_intersection_places"] == []
+    assert found.audit["rms_stretch"] < 0.1
+
+
+def test_what_cannot_be_untangled_is_told_with_places(monkeypatch):
+    def give_up(positions, faces, rest, thickness, job, body=None):
+        pairs = self_intersections(TriangleMesh(positions, faces))
+        return Start(positions, len(pairs), len(pairs), vertices_of(pairs, faces, len(positions)))
+
+    monkeypatch.setattr(drape_module, "free_start", give_up)
+    job = Job()
+    quick = {"settle_seconds": 0.1, "place": "as_it_stands"}
+    found = drape(double_vest(through=0.03), pear(), fabric(bending=1e-5), quick, job)
+    assert found.audit["self_intersections"] == len(self_intersections(found.mesh)) > 0
+    assert any("cross each other, near (0.1" in text for text in job.warnings)
+    places = np.array(found.audit["self_intersection_places"])
+    assert_allclose(places, [[0.12, 0.1, 0.0]] * len(places), rtol=0, atol=0.05)  # the patch is some 40 mm wide
+
+
 def test_a_spent_budget_stops_and_says_so():
     job = Job()
     drape(vest(), pear(), fabric(bending=1e-5), {"time_budget_s": 0.01}, job)
@@ -84,6 +135,7 @@ def test_a_spent_budget_stops_and_says_so():
 def test_what_cannot_be_cleared_is_an_error_with_places_and_the_partial_result():
     plug = tube(0.02, 0.1, 24, 12, base=0.25)  # far too narrow for the pear's top, through which it is stuck
     hopeless = {"place": "as_it_stands", "clear_rounds": 0, "grow_above_mm": 1000, "recovery_speed": 0.01}
+    hopeless["self_collision"] = False  # else the start is untangled
     with pytest.raises(IntersectingError, match=r"pairs of triangles .* near \(") as caught:
         drape(plug, pear(), fabric(), {**hopeless, "settle_seconds": 0.1})
     partial = caught.value.partial

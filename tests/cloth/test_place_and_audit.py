@@ -1,15 +1,25 @@
 """The place of a garment, the growing body, the judge, and the last pass."""
 
+import json
+import time
+
 import numpy as np
 import pytest
 from cloth_scenes import ball, box, fabric, moved, sheet, tube
 from numpy.testing import assert_allclose
+from scipy.optimize import minimize
 
+from vto_pipeline import cloth
 from vto_pipeline.cloth.audit import audit
+from vto_pipeline.cloth.balance import elastic_energy
 from vto_pipeline.cloth.build import at_rest, build
 from vto_pipeline.cloth.clear import clear_of_body
 from vto_pipeline.cloth.collision.body import BodyCollider
+from vto_pipeline.cloth.constraints.sweep import add_forces
 from vto_pipeline.cloth.grow import growing
+from vto_pipeline.cloth.judge.balance import Weave, knows
+from vto_pipeline.cloth.judge.gap import gaps_within
+from vto_pipeline.cloth.materials import Materials
 from vto_pipeline.cloth.place import PlaceConfig, place
 from vto_pipeline.cloth.rest_shape import RestShapeConfig, rest_shape
 from vto_pipeline.cloth.stepper import StepConfig, Stepper
@@ -105,6 +115,162 @@ def test_the_judge_counts_self_intersections():
     found = audit(both, RestShape(both.vertices), None, settled=True, energy=0.0, residual=0.0)
     assert found["self_intersections"] >= 4
     assert found["min_clearance_mm"] is None
+
+
+def judged(mesh, rest=None, body=None, **more):
+    """The findings, which must survive as JSON."""
+    at_rest_ = RestShape(mesh.vertices if rest is None else rest)
+    found = audit(mesh, at_rest_, body, settled=True, energy=0.0, residual=0.0, **more)
+    return json.loads(json.dumps(found))
+
+
+def crumpled(seed=0):
+    """A sheet with warp across its grid, stretched, sheared and bent at random."""
+    rest = sheet(9, 12, 0.2, 0.3)
+    bent = rest.vertices * [1.05, 0.98, 1.0] + np.sin(rest.vertices[:, [1, 0, 1]] * [9, 7, 12]) * 0.02
+    return rest, bent + np.random.default_rng(seed).normal(size=bent.shape) * 1e-3
+
+
+def test_the_judge_says_where_triangles_cross():
+    block, mesh = box((0.4, 0.1, 0.4)), moved(sheet(9, 9, 0.2, 0.2, upright=False), 0.1, 0.03, -0.1)
+    found = judged(mesh, body=block)
+    places = np.array(found["body_intersection_places"])
+    assert 0 < len(places) <= 10
+    assert_allclose(places[:, 0], 0.2, rtol=0, atol=0.025)  # through the side at x = 0.2, to a triangle's length
+    assert found["penetrating_vertices"] == int((mesh.vertices[:, 0] < 0.2 - 1e-12).sum())
+    other = moved(sheet(5, 5, 0.2, 0.2), 0.113, 0.1, 0.01)
+    both = TriangleMesh(np.vstack([mesh.vertices, other.vertices]), np.vstack([mesh.faces, other.faces + 81]))
+    found = judged(both)
+    assert found["self_intersections"] > 0
+    assert found["min_self_gap_mm"] == 0.0
+    assert_allclose(np.array(found["self_intersection_places"])[:, 2], 0.01, rtol=0, atol=0.03)
+
+
+def test_the_judge_tells_warp_weft_and_shear():
+    rest = sheet(7, 7, 0.2, 0.2)  # warp is y, weft is x
+    pulled = TriangleMesh(rest.vertices * [1.02, 1.05, 1.0], rest.faces)
+    found = judged(pulled, rest.vertices)
+    for name, wanted in (("warp_strain", 0.05), ("weft_strain", 0.02), ("shear_rad", 0.0)):
+        assert_allclose(found[f"max_{name}"], wanted, rtol=0, atol=1e-12)
+        assert_allclose(found[f"rms_{name}"], wanted, rtol=0, atol=1e-12)
+    assert_allclose([found["largest_strain"], found["least_strain"]], [0.05, 0.02], rtol=0, atol=1e-12)
+    sheared = rest.vertices.copy()
+    sheared[:, 0] += 0.1 * sheared[:, 1]
+    found = judged(TriangleMesh(sheared, rest.faces), rest.vertices)
+    assert_allclose(found["max_shear_rad"], np.arctan(0.1), rtol=1e-9)
+    principal = np.sqrt(np.linalg.eigvalsh(np.array([[1.0, 0.1], [0.1, 1.01]]))) - 1  # of FᵀF
+    assert_allclose([found["least_strain"], found["largest_strain"]], principal, rtol=1e-9)
+
+
+def test_the_judge_finds_one_overstretched_triangle():
+    rest = sheet(9, 9, 0.2, 0.2)
+    x = rest.vertices.copy()
+    x[40] += [0.0, 0.01, 0.0]  # 40 % of an edge
+    found = judged(TriangleMesh(x, rest.faces), rest.vertices)
+    assert_allclose(found["max_warp_strain"], 0.4, rtol=1e-9)
+    assert found["rms_warp_strain"] < 0.1
+
+
+@pytest.mark.parametrize("distance", [0.5e-3, 2e-3, 4.9e-3])
+def test_the_judge_measures_the_gap_between_layers(distance):
+    one = sheet(9, 9, 0.2, 0.2, upright=False)
+    other = moved(one, 0.013, distance, 0.007)
+    both = TriangleMesh(np.vstack([one.vertices, other.vertices]), np.vstack([one.faces, other.faces + 81]))
+    apart = np.vstack([one.vertices, moved(other, 0, 0.1, 0).vertices])
+    assert_allclose(judged(both, apart)["min_self_gap_mm"], 1e3 * distance, rtol=1e-9)
+    assert judged(TriangleMesh(apart, both.faces))["min_self_gap_mm"] is None
+    assert judged(one)["min_self_gap_mm"] is None
+
+
+def test_gaps_are_those_of_brute_force():
+    rng = np.random.default_rng(0)
+    x = rng.uniform(0, 0.02, (24, 3))
+    faces = np.arange(24).reshape(-1, 3)
+    pairs, gaps = gaps_within(x, 10.0 * x, faces, 0.02)
+    corner = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]])
+    known = {tuple(pair): gap for pair, gap in zip(np.sort(pairs, axis=1).tolist(), gaps, strict=True)}
+    checked = 0
+    for (i, j), gap in known.items():
+
+        def apart(w, i=i, j=j):  # two points by barycentric weights
+            p, q = (w[:3] @ x[faces[i]], w[3:] @ x[faces[j]])
+            return 1e4 * np.sum((p - q) ** 2)
+
+        sums = [{"type": "eq", "fun": lambda w, s=s: w[s : s + 3].sum() - 1} for s in (0, 3)]
+        starts = [np.concatenate([a, b]) for a in corner for b in corner]
+        least = min(
+            minimize(apart, s, bounds=[(0, 1)] * 6, constraints=sums, method="SLSQP", tol=1e-12).fun for s in starts
+        )
+        if least > 1e-6:  # triangles that cross have no gap; that is counted elsewhere
+            assert_allclose(gap, np.sqrt(least / 1e4), rtol=1e-3, atol=1e-7)
+            checked += 1
+    assert checked > 10
+
+
+def test_energy_and_forces_of_judge_and_solver_agree():
+    rest, x = crumpled()
+    weave = fabric(stretch=1500, weft=900, shear=60, poisson=0.2, bending=1e-4)
+    model = build(rest, RestShape(rest.vertices), weave)
+    mine = Weave(rest, RestShape(rest.vertices), weave)
+    wanted = np.zeros_like(x)
+    add_forces(x, model.constraints, wanted)
+    assert_allclose(mine.energy(x), elastic_energy(model, x), rtol=1e-9)
+    assert_allclose(mine.forces(x), wanted, rtol=0, atol=1e-6 * np.abs(wanted).max())  # central differences
+    assert_allclose(mine.mass, model.mass, rtol=1e-12)
+    assert mine.energy(x) > 1e-3
+
+
+def test_the_judge_knows_what_it_does_not_know():
+    assert knows(Materials())
+    for other in ({"membrane": "green"}, {"bending": "isometric"}, {"strain_limit": 0.1}, {"hysteresis": True}):
+        assert not knows(Materials(**other))
+
+
+def test_the_judge_sees_balance_and_the_want_of_it():
+    mesh = sheet(7, 13, 0.1, 0.3)
+    weave = fabric(stretch=60.0, shear=60.0)
+    top = tuple(range(7))
+    found = cloth.simulate(
+        mesh, weave, pinned=top, seconds=20.0, settings={"until": "rest", "target_error_mm": 1e-3, "damping": 8.0}
+    )
+    hung = TriangleMesh(found.positions, mesh.faces)
+    calm = judged(hung, mesh.vertices, fabric=weave, pinned=top)
+    assert_allclose(calm["judged_residual"], found.report["residual"], rtol=1e-3)  # differences of rounded energies
+    assert calm["judged_residual"] < 0.1
+    assert_allclose(calm["judged_energy_j"], found.report["energy_j"], rtol=1e-9)
+    x = hung.vertices.copy()
+    x[45] += [0.002, 0, 0]
+    assert judged(TriangleMesh(x, mesh.faces), mesh.vertices, fabric=weave, pinned=top)["judged_residual"] > 0.5
+    assert judged(hung, mesh.vertices, fabric=weave)["judged_residual"] > 1.0  # the pins bear all of it
+
+
+@pytest.mark.parametrize(("friction", "bears"), [(0.6, True), (0.3, False)])
+def test_a_body_bears_what_lies_on_it_within_the_cone_of_friction(friction, bears):
+    tilt = np.arctan(0.5)
+    turn = np.array([[np.cos(tilt), -np.sin(tilt), 0], [np.sin(tilt), np.cos(tilt), 0], [0, 0, 1]])
+    block = box((0.4, 0.1, 0.4))
+    block = TriangleMesh(block.vertices @ turn.T, block.faces)
+    mesh = moved(sheet(7, 7, 0.2, 0.2, upright=False), -0.1, 0.052, -0.1)
+    lying = TriangleMesh(mesh.vertices @ turn.T, mesh.faces)
+    found = judged(lying, mesh.vertices, block, fabric=fabric(), friction=friction)
+    wanted = 0.0 if bears else np.sin(tilt) - friction * np.cos(tilt)
+    assert_allclose(found["judged_residual"], wanted, rtol=0, atol=1e-6)
+    lifted = moved(lying, 0, 0.02, 0)
+    found = judged(lifted, mesh.vertices, block, fabric=fabric(), friction=friction)
+    assert_allclose(found["judged_residual"], 1.0, rtol=0, atol=1e-6)  # 20 mm above it, nothing bears
+
+
+@pytest.mark.slow
+def test_the_judge_is_quick():
+    mesh, form = tube(0.12, 0.6, 80, 64, base=0.2), skittle()
+    weave, rest = fabric(bending=1e-5), RestShape(mesh.vertices)
+    assert len(mesh.faces) > 10000
+    took = []
+    for _ in range(3):
+        began = time.perf_counter()
+        audit(mesh, rest, form, settled=True, energy=0.0, residual=0.0, fabric=weave)
+        took.append(time.perf_counter() - began)
+    assert min(took) < 1.0
 
 
 def test_a_spike_between_the_vertices_is_cleared():

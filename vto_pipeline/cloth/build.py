@@ -19,6 +19,7 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.units import GRAVITY
 
+_OWN_SIZE = 0.2  # of a triangle's lowest height: two such reaches are less than the way to its second neighbours
 _LEAST_MASS = 1e-3  # of the median: a vertex with slivers only must still be movable
 
 
@@ -33,6 +34,8 @@ class ClothModel:
         constraints: What resists deformation: the data of each kind of `constraints.KINDS` that it has.
         edge_length: Median rest length of the edges [m].
         gravity: [m/s²], shape (3,).
+        reach: Half the distance each vertex keeps from the rest of the cloth [m], shape (V,).
+        friction: Coulomb coefficient, cloth against cloth.
     """
 
     faces: IntArray
@@ -41,6 +44,8 @@ class ClothModel:
     constraints: tuple[Any, ...]
     edge_length: float
     gravity: FloatArray
+    reach: FloatArray
+    friction: float
 
 
 @dataclass(frozen=True)
@@ -115,7 +120,27 @@ def build(
         constraints=fabric_constraints(mesh, rest, fabric, checked(Materials, materials), job or Job(), held),
         edge_length=float(np.median(edges)),
         gravity=np.array(gravity, dtype=np.float64),
+        reach=_reaches(corners, mesh.faces, count, fabric.thickness),
+        friction=fabric.friction,
     )
+
+
+def _reaches(corners: FloatArray, faces: IntArray, count: int, thickness: float) -> FloatArray:
+    """Return half the thickness, less where triangles are so small that neighbours would keep each other apart.
+
+    Args:
+        corners: Of the triangles at rest [m], shape (F, 3, 3).
+        faces: Shape (F, 3).
+        count: Of vertices.
+        thickness: [m].
+    """
+    edges = np.roll(corners, -1, axis=1) - corners
+    double = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    longest = np.linalg.norm(edges, axis=2).max(axis=1)
+    lowest = np.divide(double, longest, out=np.zeros_like(double), where=longest > 0.0)
+    reach = np.full(count, 0.5 * thickness)
+    np.minimum.at(reach, faces, (_OWN_SIZE * lowest)[:, None])
+    return reach
 
 
 def model_of(
@@ -146,6 +171,8 @@ def model_of(
         constraints,
         edge_length,
         np.array(gravity, dtype=np.float64),
+        np.zeros(len(mass)),
+        0.0,
     )
 
 

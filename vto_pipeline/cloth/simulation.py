@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,12 +14,14 @@ from vto_pipeline.cloth.balance import elastic_energy
 from vto_pipeline.cloth.build import at_rest, build
 from vto_pipeline.cloth.collision.body import BodyCollider
 from vto_pipeline.cloth.collision.contacts import Collider
-from vto_pipeline.cloth.collision.shapes import Capsule, MeshCollider, Plane, Sphere
+from vto_pipeline.cloth.collision.moving import Moving
+from vto_pipeline.cloth.collision.shapes import Box, Capsule, Ellipsoid, MeshCollider, Plane, Sphere
 from vto_pipeline.cloth.materials import Materials
 from vto_pipeline.cloth.refine import refine
 from vto_pipeline.cloth.settings import checked
 from vto_pipeline.cloth.settle import SettleLimits, settle
-from vto_pipeline.cloth.stepper import StepConfig, Stepper
+from vto_pipeline.cloth.start import free_start
+from vto_pipeline.cloth.stepper import Pins, StepConfig, Stepper
 from vto_pipeline.cloth.untie import untie
 from vto_pipeline.errors import InputError
 from vto_pipeline.model.arrays import FloatArray
@@ -27,13 +29,14 @@ from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.cloth import TraceRow
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import RestShape
+from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.numerics.threads import limited_threads
 from vto_pipeline.units import GRAVITY
 
 _REST_MM = 0.1  # error at rest that is asked for when nobody says
 
-AnyCollider = Sphere | Capsule | Plane | MeshCollider
+AnyCollider = Sphere | Capsule | Ellipsoid | Box | Plane | MeshCollider | Moving
 
 
 class SimulateConfig(StepConfig, Materials):
@@ -58,6 +61,7 @@ class SimulateConfig(StepConfig, Materials):
     skin_mm: float | None = Field(
         None, gt=0, le=100, description="Distance kept from colliders [mm]; by default a quarter edge, 1 to 3 mm"
     )
+    force_all: bool = Field(False, description="Leave nothing out that this scene does not need: to compare")
     gravity: tuple[float, float, float] = Field((0.0, -GRAVITY, 0.0), description="[m/s²]")
 
 
@@ -69,7 +73,9 @@ class Trajectory:
         positions: [m], shape (V, 3).
         velocities: [m/s], shape (V, 3).
         report: seconds (wall), prepare_s (what the method made before), method, reason, substeps, steps,
-            contact_rounds, simulated_s, energy_j, residual; with "rest" settled; and error_mm where it is known.
+            contact_rounds, simulated_s, energy_j, residual; with "rest" settled; error_mm where it is known; where the
+            cloth is kept from itself start_pairs (of triangles that met), start_left (that still did after untangling)
+            and self_contact (a `collision.self_contact.Tally`, with saved_s).
         trace: Error against run time, where it is known.
     """
 
@@ -85,6 +91,7 @@ def simulate(
     *,
     rest: ArrayLike | None = None,
     pinned: Sequence[int] = (),
+    pin_path: Callable[[float], FloatArray] | None = None,
     colliders: Sequence[AnyCollider] = (),
     seconds: float,
     settings: Mapping[str, object] | SimulateConfig | None = None,
@@ -95,7 +102,8 @@ def simulate(
         mesh: Where it starts [m].
         fabric: What it is made of.
         rest: Rest positions [m], shape (V, 3); the start when None. Flat rest angles.
-        pinned: Vertices held where they are.
+        pinned: Vertices held where they are, or led.
+        pin_path: Where those are at a time [s], in their order: [m], shape (P, 3). Where they start when None.
         colliders: What it may lie on.
         seconds: Simulated time; with until "rest" the limit [s].
         settings: Keys of `SimulateConfig`.
@@ -111,15 +119,31 @@ def simulate(
     shape = RestShape(mesh.vertices if rest is None else np.asarray(rest, dtype=np.float64))
     model = build(mesh, shape, fabric, pinned=tuple(pinned), gravity=config.gravity, materials=config)
     skin = default_skin(model.edge_length) if config.skin_mm is None else 1e-3 * config.skin_mm
-    shapes = [_collider(one) for one in colliders]
+    job = Job(force_all=config.force_all)
+    shapes = [_collider(one, job) for one in colliders]
     skins = np.full(len(mesh.vertices), skin)
-    state = at_rest(untie(mesh.vertices, shape.positions, mesh.faces, pinned))
+    positions, crossed = untie(mesh.vertices, shape.positions, mesh.faces, pinned), None
+    report: dict[str, object] = {}
+    if config.self_collision:
+        start = free_start(positions, mesh.faces, shape.positions, fabric.thickness, job)
+        positions, crossed = start.positions, start.crossed
+        report.update(start_pairs=start.pairs, start_left=start.left)
+    state = at_rest(positions)
+    pins = None if pin_path is None else Pins(np.asarray(pinned, dtype=np.int64), pin_path)
 
     def make(substeps: float | None) -> Stepper:
         finer = config if substeps is None else config.model_copy(update={"substeps": substeps})
-        return Stepper(model, shapes, skins, finer, damping=config.damping)
+        return Stepper(
+            model,
+            shapes,
+            skins,
+            finer,
+            damping=config.damping,
+            pins=pins,
+            crossed=crossed,
+            force_all=config.force_all,
+        )
 
-    report: dict[str, object] = {}
     trace: Sequence[TraceRow] = ()
     with limited_threads(config.threads):
         preparing = time.perf_counter()
@@ -151,6 +175,9 @@ def simulate(
         energy_j=elastic_energy(model, state.positions),
         residual=stepper.residual(state),
     )
+    if stepper.self_contact is not None:
+        tally = stepper.self_contact.tally
+        report.update(self_contact={**asdict(tally), "saved_s": tally.saved_s})
     return Trajectory(state.positions, state.velocities, report, trace)
 
 
@@ -162,7 +189,11 @@ def default_skin(edge_length: float) -> float:
     return float(np.clip(0.25 * edge_length, 1e-3, 3e-3))
 
 
-def _collider(shape: AnyCollider) -> Collider:
+def _collider(shape: AnyCollider, job: Job) -> Collider:
     if isinstance(shape, MeshCollider):
-        return BodyCollider(MovingBody(shape.mesh.vertices[None], shape.mesh.faces), 0.0, shape.friction)
+        mesh = shape.mesh
+        body = mesh if isinstance(mesh, MovingBody) else MovingBody(mesh.vertices[None], mesh.faces)
+        return BodyCollider(body, shape.seconds, shape.friction, job)
+    if isinstance(shape, Moving) and isinstance(shape.shape, MeshCollider):
+        return Moving(_collider(shape.shape, job), shape.path)
     return shape

@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from math import ceil
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from vto_pipeline.cloth.balance import out_of_balance
 from vto_pipeline.cloth.build import ClothModel, ClothState
+from vto_pipeline.cloth.collision.body import BodyCollider
 from vto_pipeline.cloth.collision.contacts import Collider, Round, gather, nothing
+from vto_pipeline.cloth.collision.hold_apart import hold_apart
+from vto_pipeline.cloth.collision.self_contact import SelfContact
 from vto_pipeline.cloth.methods import FRAME, METHODS, Choice, Method, choose
+from vto_pipeline.cloth.solvers.newton import Newton
 from vto_pipeline.errors import DivergedError
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.settings import Config
 
+_OUT_OF_BOUNDS = 1e9  # m, m/s
 _WHOLE = 1e-6  # steps: what rounding may add to a whole number of them
 
 
@@ -30,7 +38,25 @@ class StepConfig(Config):
     travel_mm: float = Field(
         5.0, gt=0, le=100, description="How far cloth may move before contacts are found anew [mm]"
     )
+    self_collision: bool = Field(True, description="Whether cloth is kept from passing through itself")
+    body_features: bool = Field(
+        False,
+        description="Whether corners and edges of mesh bodies push cloth between its vertices, with self_collision: "
+        "needed where the body is sharper than the cloth is fine; slower, and later at rest",
+    )
     recovery_speed: float = Field(0.5, gt=0, le=10, description="Speed at which cloth inside a body is led out [m/s]")
+
+
+class Pins(NamedTuple):
+    """Held vertices that are led along a path.
+
+    Args:
+        vertices: Which, shape (P,).
+        path: Where they are at a time [s]: [m], shape (P, 3).
+    """
+
+    vertices: NDArray[np.int64]
+    path: Callable[[float], FloatArray]
 
 
 class Stepper:
@@ -42,6 +68,7 @@ class Stepper:
         substeps: Steps per 1/60 s; after `prepare`, and may be changed between runs.
         steps: Steps taken so far.
         rounds: Times contacts were found.
+        self_contact: What keeps the cloth from itself, None if nothing does.
     """
 
     choice: Choice
@@ -56,6 +83,9 @@ class Stepper:
         *,
         damping: float = 0.0,
         max_speed: float = np.inf,
+        pins: Pins | None = None,
+        crossed: NDArray[np.bool_] | None = None,
+        force_all: bool = False,
     ) -> None:
         self.skin = skin
         self.steps = 0
@@ -66,7 +96,18 @@ class Stepper:
         self._damping = damping
         self._max_speed = max_speed
         self._method: Method | None = None
+        self._pins = pins
         self._contacts = nothing(len(skin))
+        self.self_contact: SelfContact | None = None
+        if config.self_collision and len(model.faces) > 0:
+            self.self_contact = SelfContact(
+                model.faces,
+                model.reach,
+                model.friction,
+                bodies=[one for one in colliders if config.body_features and isinstance(one, BodyCollider)],
+                crossed=crossed,
+                force_all=force_all,
+            )
 
     def prepare(self, positions: FloatArray) -> None:
         """Choose the method, and let it make what it needs, for a cloth that starts here [m], shape (V, 3). Once.
@@ -82,6 +123,8 @@ class Stepper:
         self._method = METHODS[self.choice.method](
             self._model, sweeps=self.choice.sweeps, damping=self._damping, max_speed=self._max_speed
         )
+        if isinstance(self._method, Newton):
+            self._method.self_contact = self.self_contact
 
     def run(self, state: ClothState, seconds: float) -> ClothState:
         """Return the state after so much simulated time [s].
@@ -114,7 +157,9 @@ class Stepper:
 
     def _round_length(self, state: ClothState, h: float) -> int:
         """Return how many steps no vertex travels farther than the contacts are good for."""
-        most = max(1, round(self.substeps))
+        most = 1 if self._pins is not None else max(1, round(self.substeps))
+        if not isinstance(self._method, Newton) and self._is_near_itself(state, h * most):
+            most = 1  # those that know no contacts of the cloth with itself have them put right after each step
         if not self._colliders:
             return most
         speed = self._speed(state) + float(np.linalg.norm(self._model.gravity)) * h * most
@@ -122,15 +167,55 @@ class Stepper:
 
     def _round(self, state: ClothState, h: float, count: int) -> ClothState:
         travel = max(self._config.travel_mm * 1e-3, 2.0 * self._speed(state) * h)
-        span = Round(state.time, state.time + count * h, travel, self.skin, self._config.recovery_speed)
+        move = count * h * state.velocities
+        span = Round(state.time, state.time + count * h, travel, self.skin, self._config.recovery_speed, move)
         self._contacts = gather(self._colliders, state.positions, span)
         assert self._method is not None  # `run` prepared it
+        before = state
+        if self._pins is not None:
+            state = self._led(state, self._pins, count * h)
         after = self._method.advance(state, self._contacts, h, count)
         self.steps += count
         self.rounds += 1
-        if not np.isfinite(after.positions).all() or not np.isfinite(after.velocities).all():
+        self._refuse_divergence(after)
+        if self.self_contact is not None and not isinstance(self._method, Newton):
+            after = self._apart(before, after, h * count)
+        return after
+
+    def _refuse_divergence(self, state: ClothState) -> None:
+        with np.errstate(over="ignore", invalid="ignore"):
+            farthest = np.abs(state.positions).max(initial=0.0) + np.abs(state.velocities).max(initial=0.0)
+        if not farthest < _OUT_OF_BOUNDS:
             raise DivergedError(
-                f"positions are not finite after {self.steps} steps ({state.time:.2f} s of cloth time)",
+                f"positions are not finite, or out of all bounds, after {self.steps} steps "
+                f"({state.time:.2f} s of cloth time)",
                 hint="more substeps, or a softer fabric",
             )
-        return after
+
+    def _led(self, state: ClothState, pins: Pins, seconds: float) -> ClothState:
+        """Return the state with the pins under way to where their path has them after so many seconds."""
+        positions, velocities = state.positions.copy(), state.velocities.copy()
+        there = pins.path(state.time + seconds)
+        velocities[pins.vertices] = (there - positions[pins.vertices]) / seconds
+        if not isinstance(self._method, Newton):  # the others hold what is held where it is
+            positions[pins.vertices] = there
+        return replace(state, positions=positions, velocities=velocities)
+
+    def _is_near_itself(self, state: ClothState, seconds: float) -> bool:
+        """Return whether, by its velocities, the cloth comes near itself in so many seconds."""
+        if self.self_contact is None:
+            return False
+        self.self_contact.at(state.time, state.time + seconds)
+        end = state.positions + seconds * (state.velocities + 0.5 * seconds * self._model.gravity)
+        return len(self.self_contact.near(state.positions, end, seconds).key) > 0
+
+    def _apart(self, state: ClothState, after: ClothState, seconds: float) -> ClothState:
+        """Put right what a method did that knows nothing of the cloth's contacts with itself."""
+        assert self.self_contact is not None
+        positions = after.positions.copy()
+        self.self_contact.at(state.time, state.time + seconds)
+        pairs = self.self_contact.near(state.positions, positions, seconds)
+        hold_apart(pairs, self._model.inverse_mass, state.positions, positions)
+        positions, _ = self.self_contact.safe(state.positions, positions)
+        velocities = after.velocities + (positions - after.positions) / seconds
+        return replace(after, positions=positions, velocities=velocities)

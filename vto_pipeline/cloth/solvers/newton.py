@@ -17,17 +17,20 @@ from numba import njit
 from numpy.typing import NDArray
 
 from vto_pipeline.cloth.build import ClothModel, ClothState
-from vto_pipeline.cloth.collision.contacts import Contacts
-from vto_pipeline.cloth.collision.planes import (
-    Planes,
-    add_planes,
-    keep_to_planes,
-    place_planes,
-    planes,
-    planes_energy,
-    revise_planes,
+from vto_pipeline.cloth.collision.active_set import ActiveSet, active_set, no_contacts, taken_on
+from vto_pipeline.cloth.collision.contact_springs import (
+    add_contacts,
+    add_last_forces,
+    contact_energy,
+    keep_apart,
+    linked_contacts,
+    revise,
+    taken_along,
 )
+from vto_pipeline.cloth.collision.contacts import Contacts
+from vto_pipeline.cloth.collision.pairs import no_pairs
 from vto_pipeline.cloth.collision.respond import respond
+from vto_pipeline.cloth.collision.self_contact import SelfContact
 from vto_pipeline.cloth.constraints.rigid import refuse_rigid
 from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM, add_damping_forces, add_forces
 from vto_pipeline.cloth.losses import own, recall, remember, slip
@@ -35,7 +38,8 @@ from vto_pipeline.cloth.stiffness import Stiffness
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.numerics.block_matrix import BlockMatrix, row_times
 from vto_pipeline.numerics.linear import pcg
-from vto_pipeline.numerics.multigrid import hierarchy, update
+from vto_pipeline.numerics.links import link, pull, pull_back
+from vto_pipeline.numerics.multigrid import Hierarchy, hierarchy, update
 
 _LEFT = 6.0  # 1/s: share of the forces at the begin of a step left by a linear solve, times h, so errors fall with h
 _OF_WEIGHT = 0.3  # share of the weight that counts as force where cloth is in balance
@@ -47,8 +51,10 @@ _BENT = 0.06  # 1/s: share of the motion's energy that curvature left out by an 
 _SLIGHT = 10.0  # times what is allowed: a fall that is not worth a second way down
 _SHORTEST = 1e-10  # share of a Newton step: from a point, cloth begins to grow by a millionth of its edges
 _ROUNDING = 1e-9  # relative change of the objective that is no change
-_CONTACT_ROUNDS = 3  # revisions of the set of pushing planes, a step
-_CHANGED = 0.02  # of the touching planes, under which their set is good enough
+_CONTACT_ROUNDS = 4  # revisions of the set of pushing planes, a step
+_CHANGED = 0.05  # of the contact forces: amiss by less, their set is good enough
+_EXTENSIONS = 2  # times an iteration is solved again with what it would have passed through
+_NO_MASS = 1e-300  # kg
 _CROSSED = 0.01  # of an edge: how far a plane may be crossed without solving again
 
 
@@ -78,6 +84,9 @@ class Newton:
         sweeps: Newton iterations a step, more where a step does not come down.
         damping: Rate at which velocities fade [1/s].
         max_speed: No vertex moves faster [m/s].
+
+    Attributes:
+        self_contact: What keeps the cloth from itself, if anything; may be set between runs.
     """
 
     def __init__(self, model: ClothModel, *, sweeps: int = 1, damping: float = 0.0, max_speed: float = np.inf) -> None:
@@ -85,18 +94,21 @@ class Newton:
         self._sweeps = sweeps
         self._damping = damping
         self._max_speed = max_speed
+        self.self_contact: SelfContact | None = None
         self._checked = False
         self._held = model.inverse_mass == 0.0
         self._stiffness = Stiffness(model)
         self._levels = hierarchy(self._stiffness.matrix, self._held)
         self._stiffness.write_to(self._levels.matrix.blocks[: self._levels.slots[1]])
-        self._planes: Planes = planes(0, len(model.mass))
-        self._pieces, self._shift = _loose_pieces(self._stiffness.matrix, model.mass, self._held)
+        self._active: ActiveSet = no_contacts(0)
+        self._loose = _pieces(self._stiffness.matrix, self._held)
         self._allowed = 0.0  # what a step may cost in energy by being solved in part [J]
         self._whole = np.zeros((len(model.mass), 3))  # what the residuals of a step are measured against [N]
 
     def advance(self, state: ClothState, contacts: Contacts, h: float, substeps: int) -> ClothState:
         """Return the state after `substeps` steps of h [s]. The contacts hold for their whole span.
+
+        Held vertices go on with the velocity they have.
 
         Raises:
             ConfigError: a constraint is rigid.
@@ -104,33 +116,61 @@ class Newton:
         if not self._checked:
             refuse_rigid(self._model.constraints, state.positions, "newton")
             self._checked = True
-        if len(self._planes.friction) != len(contacts.friction):
-            self._planes = planes(len(contacts.friction), len(self._held))
         recall(self._model, state.sliders)
         x, v = state.positions.copy(), state.velocities.copy()
         for step in range(substeps):
+            if self.self_contact is not None:
+                self.self_contact.at(state.time + step * h, state.time + (step + 1) * h)
             self._step(x, v, contacts, step / substeps, (step + 1) / substeps, h)
         return ClothState(x, v, state.time + substeps * h, remember(self._model))
 
     def _step(self, x: FloatArray, v: FloatArray, contacts: Contacts, t0: float, t1: float, h: float) -> None:
         model, held = self._model, self._held
+        start = x.copy()
         move = (h * exp(-self._damping * h)) * v
         move[held] = 0.0
+        led = held & (v != 0.0).any(axis=1)
+        x[led] += h * v[led]
         target = x + move + (~held)[:, None] * (h * h * model.gravity)
-        place_planes(self._planes, contacts, t0, t1, model.inverse_mass, x, target - x)
+        itself = self.self_contact
+        pairs = no_pairs() if itself is None else itself.near(start, target, h)
+        self._active = active_set(contacts, pairs, t0, t1, model.inverse_mass, start, target - start, self._active)
+        if led.any():  # what they pull at their neighbours by being led is no measure
+            forces = model.mass[:, None] * model.gravity
+            add_forces(start, model.constraints, forces)
+            self._whole = self._unbalanced(forces)
         self._allowed = _BENT * h * self._inertia(x, target, h)
-        first = self._iterate(x, x, target, move, h)
-        self._allowed = max(self._allowed, _BENT * h * first.fall)
+        first = self._iterate(x, x, target, move, h, measured=bool(led.any()))
+        if not led.any():  # else it is mostly what the led vertices have pulled at their neighbours
+            self._allowed = max(self._allowed, _BENT * h * first.fall)
         if first.share == 1.0 or first.foreseen < _SLIGHT * self._allowed:
             done = self._descend(x, target, h, first)
         else:  # the way there is curved: begin at its other end, and take the lower of the two
             done = self._descend(x, target, h, self._iterate(x, target, target, np.zeros_like(x), h))
             if done.share < 1.0 or done.left > first.left:
                 done = min(done, self._descend(x, target, h, first), key=lambda one: one.left)
-        start, x[:] = x.copy(), done.y
+        x[:] = done.y
         longest = self._max_speed * h
         respond(x, v, start, model.inverse_mass, contacts, t0, t1, h, longest, True, len(x) >= PARALLEL_FROM)
+        if itself is not None:
+            x[:], _ = itself.safe(start, x, taken_along(self._active, start))
+            v[:] = (x - start) / h
+            self._keep_momentum(v, (target - start) / h)  # what was cut short has pushed something else
         slip(x, model.constraints)
+
+    def _unbalanced(self, forces: FloatArray) -> FloatArray:
+        """Return what residuals are measured against [N], shape (V, 3): the forces that set the cloth in motion.
+
+        What contacts bear sets nothing in motion. But a share of the weight counts always.
+
+        Args:
+            forces: Elastic and gravity [N], shape (V, 3); changed.
+        """
+        model = self._model
+        add_last_forces(self._active, forces)
+        forces[self._held] = 0.0
+        weight = np.linalg.norm(model.gravity) * np.where(self._held, 0.0, model.mass)
+        return np.hypot(forces, _OF_WEIGHT * weight[:, None])
 
     def _descend(self, x: FloatArray, target: FloatArray, h: float, done: _Iteration) -> _Iteration:
         """Iterate on until the objective is a parabola, to within what is allowed, or will not fall."""
@@ -155,6 +195,8 @@ class Newton:
         guess: FloatArray,
         h: float,
         cycles: int = _CYCLES,
+        *,
+        measured: bool = False,
     ) -> _Iteration:
         """Take a Newton iteration from y, of a step of time from x.
 
@@ -164,8 +206,9 @@ class Newton:
             guess: Of the move from y [m], shape (V, 3).
             h: Step [s].
             cycles: Iterations of the linear solver at most.
+            measured: Whether it is known what residuals are measured against.
         """
-        model, levels, planes = self._model, self._levels, self._planes
+        model, levels = self._model, self._levels
         matrix = self._stiffness.assemble(y, 1.0 / (h * h), 1.0, 1.0 / h)
         forces = (model.mass / (h * h))[:, None] * (target - y)
         energy = add_forces(y, model.constraints, forces)
@@ -173,40 +216,85 @@ class Newton:
             add_damping_forces(y, (y - x) / h, model.constraints, forces)
         forces[self._held] = 0.0
         if y is x:
-            weight = np.linalg.norm(model.gravity) * np.where(self._held, 0.0, model.mass)
-            pull = forces - (model.mass / (h * h))[:, None] * guess  # in the cloth's own frame: speed is no force
-            self._whole = np.hypot(pull, _OF_WEIGHT * weight[:, None])
-            guess = _better(matrix, forces, guess, guess + (~self._held)[:, None] * (h * h * model.gravity))
+            if not measured:  # in the cloth's own frame: speed is no force
+                self._whole = self._unbalanced(forces - (model.mass / (h * h))[:, None] * guess)
+            guess = _better(levels, forces, guess, guess + (~self._held)[:, None] * (h * h * model.gravity))
         elif self._sweeps > 1:  # who asks for more wants to get to the end
             self._whole = forces
-        touches = bool(planes.there.any())
-        bare = matrix.blocks[matrix.diagonal] if touches else None
-        move, right, pushes = guess.copy(), forces, (0.0, 0.0, 0.0)
-        for _ in range(_CONTACT_ROUNDS):
+        bare = matrix.blocks[matrix.diagonal]
+        move, pushes, changed = guess.copy(), (0.0, 0.0, 0.0), 0.0
+        rounds, extensions = _CONTACT_ROUNDS, _EXTENSIONS
+        while True:
+            right = forces.copy()
+            touches = len(self._active.key) > 0
             if touches:
-                matrix.blocks[matrix.diagonal] = bare
-                right = forces.copy()
-                add_planes(planes, model.mass, h, x, y, matrix, right)
-                keep_to_planes(planes, x, y, move)
+                levels = self._couple(levels, matrix, bare, right, h, x, y)
+                keep_apart(self._active, model.inverse_mass, x, y, move)
             update(levels)
             pcg(levels, right, move, self._whole, _LEFT * h, cycles, True)
-            if not touches:
-                self._keep_momentum(move, target - y)
+            rounds -= 1
+            self._keep_momentum(move, target - y)
+            if touches:
+                pushes = tuple(contact_energy(self._active, x, y + share * move) for share in (0.0, 0.5, 1.0))
+                changed = revise(self._active, x, y + move, _CROSSED * model.edge_length)
+            if changed >= _CHANGED and rounds > 0:
+                continue
+            if changed >= _CHANGED or extensions == 0 or not self._take_on(x, y + move):
                 break
-            pushes = tuple(planes_energy(planes, x, y + share * move) for share in (0.0, 0.5, 1.0))
-            if revise_planes(planes, x, y + move, _CROSSED * model.edge_length) < _CHANGED:
-                break
-        foreseen = -_quadratic(matrix, right, move)
+            extensions -= 1
+            rounds = max(rounds, 1)
+        foreseen = -_quadratic(levels, right, move)
         return self._shortened(y, target, move, h, energy, pushes, foreseen)
 
+    def _couple(
+        self,
+        levels: Hierarchy,
+        matrix: BlockMatrix,
+        bare: FloatArray,
+        right: FloatArray,
+        h: float,
+        x: FloatArray,
+        y: FloatArray,
+    ) -> Hierarchy:
+        """Return the levels with the contacts that push in them.
+
+        Args:
+            levels: Without.
+            matrix: The first of them; its diagonal is put back to `bare` (V, 3, 3) first.
+            right: Forces [N], shape (V, 3), changed in place.
+            h: Step [s].
+            x, y: Positions at the begin of the step and now [m], shape (V, 3).
+        """
+        matrix.blocks[matrix.diagonal] = bare
+        vertices, weights = linked_contacts(self._active, self._held)
+        links = link(vertices, weights, levels.up, levels.rows)
+        add_contacts(self._active, self._model.mass, self._held, h, x, y, matrix, right, links.blocks)
+        return levels._replace(links=links)
+
+    def _take_on(self, x: FloatArray, end: FloatArray) -> bool:
+        """Add what a move from x to end would pass through to the contacts; return whether there was any."""
+        if self.self_contact is None:
+            return False
+        _, met = self.self_contact.safe(x, end)
+        before = len(self._active.key)
+        self._active = taken_on(self._active, met, x, end - x)
+        return len(self._active.key) > before
+
     def _keep_momentum(self, move: FloatArray, wanted: FloatArray) -> None:
-        """Shift each piece that nothing holds so that its mean move is the wanted one, whatever the solution left."""
-        if self._pieces is None:
+        """Shift each piece that nothing holds so that its mean move is the wanted one, whatever the solution left.
+
+        Pieces that push each other count as one.
+        """
+        if self._loose is None:
+            return
+        pieces, loose = self._loose.joined(self._active)
+        if not loose.any():
             return
         mass = self._model.mass
+        whole = np.bincount(pieces, mass)
         for k in range(3):
-            missing = np.bincount(self._pieces, mass * (wanted[:, k] - move[:, k]))
-            move[:, k] += (self._shift * missing)[self._pieces]
+            missing = np.bincount(pieces, mass * (wanted[:, k] - move[:, k]))
+            move[:, k] += np.where(loose, missing / np.maximum(whole, _NO_MASS), 0.0)[pieces]
 
     def _shortened(
         self,
@@ -246,33 +334,63 @@ class Newton:
         return float(0.5 / (h * h) * np.einsum("i,ij,ij->", self._model.mass, off, off))
 
 
-def _loose_pieces(
-    matrix: BlockMatrix, mass: FloatArray, held: NDArray[np.bool_]
-) -> tuple[NDArray[np.int32] | None, FloatArray]:
-    """Return the piece of each vertex, shape (V,), None if all are held somewhere; and one over each piece's mass
-    [1/kg], shape (P,), zero for pieces that are held."""
+class _Pieces(NamedTuple):
+    """What of the cloth hangs together.
+
+    Args:
+        of: The piece of each vertex, shape (V,).
+        held: Whether anything holds a piece, shape (P,).
+    """
+
+    of: NDArray[np.int32]
+    held: NDArray[np.bool_]
+
+    def joined(self, contacts: ActiveSet) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+        """Return pieces, and whether nothing holds them, where those that push each other are one."""
+        from scipy.sparse import csr_array
+        from scipy.sparse.csgraph import connected_components
+
+        pushing = contacts.pushing
+        if not pushing.any():
+            return self.of, ~self.held
+        count = len(self.held)
+        ends = self.of[contacts.vertices[pushing]]
+        used = contacts.weights[pushing] != 0.0
+        rows, columns = np.broadcast_to(ends[:, :1], ends.shape)[used], ends[used]
+        groups, group = connected_components(csr_array((np.ones(len(rows), np.int8), (rows, columns)), (count, count)))
+        held = np.zeros(groups, np.bool_)
+        held[group[self.held]] = True
+        outside = np.abs(contacts.weights[pushing].sum(axis=1)) > 0.5  # a place is held, not a way between two
+        held[group[ends[outside, 0]]] = True
+        return group[self.of], ~held
+
+
+def _pieces(matrix: BlockMatrix, held: NDArray[np.bool_]) -> _Pieces | None:
+    """Return the pieces of a cloth, None if all are held somewhere."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
 
-    count = len(mass)
+    count = len(held)
     ones = np.ones(len(matrix.columns), np.int8)
     pieces = connected_components(csr_array((ones, matrix.columns, matrix.starts), shape=(count, count)))[1]
-    whole, pinned = np.bincount(pieces, mass), np.bincount(pieces, held)
-    shift = np.divide(1.0, whole, out=np.zeros_like(whole), where=(pinned == 0) & (whole > 0.0))
-    return (pieces if shift.any() else None), shift
+    pinned = np.bincount(pieces, held) > 0
+    return None if pinned.all() else _Pieces(pieces, pinned)
 
 
-def _better(matrix: BlockMatrix, right: FloatArray, one: FloatArray, other: FloatArray) -> FloatArray:
+def _better(levels: Hierarchy, right: FloatArray, one: FloatArray, other: FloatArray) -> FloatArray:
     """Return that of two guesses at A d = right, shape (V, 3), with the smaller ½ dᵀ A d - dᵀ right."""
-    return one if _quadratic(matrix, right, one) <= _quadratic(matrix, right, other) else other
+    return one if _quadratic(levels, right, one) <= _quadratic(levels, right, other) else other
 
 
 @njit(cache=True, error_model="numpy")
-def _quadratic(matrix, right, d):
+def _quadratic(levels, right, d):
     """Return ½ dᵀ A d - dᵀ right."""
     total = 0.0
+    pull(levels.links, 0, d)
     for i in range(len(d)):
-        a, b, c = row_times(matrix, i, d)
+        a, b, c = row_times(levels.matrix, i, d)
+        e, f, g = pull_back(levels.links, i)
+        a, b, c = a + e, b + f, c + g
         total += d[i, 0] * (0.5 * a - right[i, 0])
         total += d[i, 1] * (0.5 * b - right[i, 1])
         total += d[i, 2] * (0.5 * c - right[i, 2])

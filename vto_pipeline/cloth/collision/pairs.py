@@ -1,0 +1,205 @@
+"""Where cloth nearly touches itself or a body: a vertex and a face, or two edges, to be kept apart along their way.
+
+Two features come nearest to each other at a vertex and a face, a vertex and an edge, two vertices, or inside two edges.
+A vertex and a face give all but the last; what lies on an edge or a corner of the face comes from its owner alone, so
+that a fold is not held as many times as faces meet there.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from vto_pipeline.cloth.collision.features import Features
+from vto_pipeline.numerics.distance import EDGE, FACE, VERTEX, closest_on_segments, closest_on_triangle
+from vto_pipeline.numerics.vector import add, axpy, cross, dot, load, norm, scale, store, sub
+
+_REGAINED = 0.2  # of a gap that is lost, at most, in a step: at once, layers would be thrown apart
+_PARALLEL = 1e-8  # sine squared between edges under which their nearest points mean nothing
+
+
+class Pairs(NamedTuple):
+    """P contacts of a cloth with itself and with bodies, sorted by key.
+
+    Args:
+        key: The same for the same features in the next step, shape (P,).
+        vertices: Of the cloth, shape (P, 4).
+        weights: Σ w x, with what is fixed, is the way between the two nearest points; zero for the corners of a body,
+            in whose place another vertex of the pair stands. Shape (P, 4).
+        normal: Unit, along that way, shape (P, 3).
+        gap: What normal · way must reach [m], shape (P,).
+        friction: Coulomb coefficient, shape (P,).
+        fixed: What a body adds to Σ w x at the end of the step [m], shape (P, 3).
+        carried: How much less it adds at the end than at the begin: how far it would take the cloth [m], shape (P, 3).
+    """
+
+    key: NDArray[np.int64]
+    vertices: NDArray[np.int32]
+    weights: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    gap: NDArray[np.float64]
+    friction: NDArray[np.float64]
+    fixed: NDArray[np.float64]
+    carried: NDArray[np.float64]
+
+
+class Owners(NamedTuple):
+    """Which face answers for what several share.
+
+    Args:
+        of_corner: The first face at each face's corners, shape (F, 3).
+        of_side: The first face at each face's edges, from corner k to k + 1, shape (F, 3).
+    """
+
+    of_corner: NDArray[np.int32]
+    of_side: NDArray[np.int32]
+
+
+def owners(features: Features, count: int) -> Owners:
+    """Return the owners for a surface of so many vertices."""
+    faces, edges = features.faces, features.edges
+    face = np.arange(len(faces), dtype=np.int32)[:, None] * np.ones(3, np.int32)
+    first_at, first_along = np.zeros(count, np.int32), np.zeros(len(edges), np.int32)
+    for own, first in ((features.own_vertices, first_at), (features.own_edges, first_along)):
+        first[own[own >= 0]] = face[own >= 0]
+    ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).astype(np.int64), axis=2)
+    numbers = edges[:, 0].astype(np.int64) * count + edges[:, 1]
+    side = np.searchsorted(numbers, ends[:, :, 0] * count + ends[:, :, 1])
+    return Owners(first_at[faces], first_along[side])
+
+
+def no_pairs() -> Pairs:
+    """Return none."""
+    return Pairs(
+        np.empty(0, np.int64),
+        np.empty((0, 4), np.int32),
+        np.empty((0, 4)),
+        np.empty((0, 3)),
+        np.empty(0),
+        np.empty(0),
+        np.empty((0, 3)),
+        np.empty((0, 3)),
+    )
+
+
+def against_bodies(
+    pairs: Pairs, count: int, begin: NDArray[np.float64], end: NDArray[np.float64], friction: NDArray[np.float64]
+) -> Pairs:
+    """Return the pairs by the cloth's vertices alone, sorted by key.
+
+    Args:
+        pairs: Of the vertices of a cloth, then of bodies.
+        count: Of the cloth's.
+        begin, end: Where those of the bodies are in this step [m], shape (B, 3).
+        friction: Coulomb coefficient of bodies there, shape (B,).
+    """
+    order = np.argsort(pairs.key)
+    of_body = pairs.vertices >= count
+    body = np.where(of_body, pairs.vertices - count, 0)
+    share = np.where(of_body, pairs.weights, 0.0)
+    own = np.take_along_axis(pairs.vertices, np.argmin(of_body, axis=1)[:, None], axis=1)
+    rough = np.take_along_axis(friction[body], np.argmax(of_body, axis=1)[:, None], axis=1)[:, 0]
+    return Pairs(
+        pairs.key[order],
+        np.where(of_body, own, pairs.vertices)[order],
+        np.where(of_body, 0.0, pairs.weights)[order],
+        pairs.normal[order],
+        pairs.gap[order],
+        np.where(of_body.any(axis=1), rough, pairs.friction)[order],
+        np.einsum("ps,psk->pk", share, end[body])[order],
+        np.einsum("ps,psk->pk", share, begin[body] - end[body])[order],
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def near_pairs(x, end, features, owners, to_face, to_edge, reach, recovery, apart, friction):
+    """Return those candidates that are, or come by straight ways, nearer than they may.
+
+    Args:
+        x, end: Positions at the begin and where vertices would go by themselves [m], shape (V, 3).
+        features, owners: Of the cloth, and of bodies.
+        to_face, to_edge: Candidates, shapes (N, 2) and (M, 2), sorted.
+        reach: Distance each vertex contributes to what two features keep [m], shape (V,).
+        recovery: How far those already nearer may be led apart [m].
+        apart: How far ways may be from what they are by themselves [m].
+        friction: Coulomb coefficient.
+    """
+    room = len(to_face) + len(to_edge)
+    key, gap = np.empty(room, np.int64), np.empty(room)
+    vertices, weights, normal = np.empty((room, 4), np.int32), np.empty((room, 4)), np.empty((room, 3))
+    faces, edges = features.faces, features.edges
+    count = 0
+    for p in range(len(to_face)):
+        v, f = to_face[p, 0], to_face[p, 1]
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        on, feature = closest_on_triangle(load(x, v), load(x, a), load(x, b), load(x, c))
+        if feature != FACE and not _answers(owners, faces, v, f, feature):
+            continue
+        vertices[count, 0], vertices[count, 1], vertices[count, 2], vertices[count, 3] = v, a, b, c
+        weights[count, 0], weights[count, 1], weights[count, 2], weights[count, 3] = 1.0, -on[0], -on[1], -on[2]
+        own = reach[v] + min(reach[a], min(reach[b], reach[c]))
+        if _is_near(x, end, vertices[count], weights[count], own, recovery, apart, normal, gap, count):
+            key[count] = np.int64(v) * len(faces) + f
+            count += 1
+    first = np.int64(len(x)) * len(faces)
+    for p in range(len(to_edge)):
+        e, f = to_edge[p, 0], to_edge[p, 1]
+        a, b, c, d = edges[e, 0], edges[e, 1], edges[f, 0], edges[f, 1]
+        s, t = closest_on_segments(load(x, a), load(x, b), load(x, c), load(x, d))
+        if not (0.0 < s < 1.0 and 0.0 < t < 1.0):
+            continue
+        u, w = sub(load(x, b), load(x, a)), sub(load(x, d), load(x, c))
+        across = cross(u, w)
+        if dot(across, across) <= _PARALLEL * dot(u, u) * dot(w, w):
+            continue
+        vertices[count, 0], vertices[count, 1], vertices[count, 2], vertices[count, 3] = a, b, c, d
+        weights[count, 0], weights[count, 1], weights[count, 2], weights[count, 3] = 1.0 - s, s, t - 1.0, -t
+        own = min(reach[a], reach[b]) + min(reach[c], reach[d])
+        if _is_near(x, end, vertices[count], weights[count], own, recovery, apart, normal, gap, count):
+            key[count] = first + np.int64(e) * len(edges) + f
+            count += 1
+    none = np.zeros((count, 3))
+    return Pairs(
+        key[:count],
+        vertices[:count],
+        weights[:count],
+        normal[:count],
+        gap[:count],
+        np.full(count, friction),
+        none,
+        none.copy(),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _answers(owners, faces, v, f, feature):
+    """Return whether face f answers for the edge or corner of it that vertex v is near; of two vertices the first."""
+    if feature >= EDGE:
+        owner = owners.of_side[f, feature - EDGE]
+    elif faces[f, feature - VERTEX] < v:
+        return False
+    else:
+        owner = owners.of_corner[f, feature - VERTEX]
+    return owner == f or faces[owner, 0] == v or faces[owner, 1] == v or faces[owner, 2] == v
+
+
+@njit(cache=True, error_model="numpy")
+def _is_near(x, end, vertices, weights, own, recovery, apart, normal, gap, place):
+    """Write normal and gap of a pair; return whether it is near enough to matter."""
+    way, moved = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for s in range(4):
+        i = vertices[s]
+        way = axpy(weights[s], load(x, i), way)
+        moved = axpy(weights[s], sub(load(end, i), load(x, i)), moved)
+    distance = norm(way)
+    if distance == 0.0:  # they cross: there is no side to keep
+        return False
+    n = scale(1.0 / distance, way)
+    if dot(n, add(way, moved)) > own + apart and distance > own:
+        return False
+    store(normal, place, n)
+    gap[place] = min(own, distance + min(recovery, _REGAINED * (own - distance)))
+    return True

@@ -1,0 +1,289 @@
+"""A cloth, itself and bodies: what to keep apart in a step, and how far the step may go. Knows no solver."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vto_pipeline.cloth.collision.body import BodyCollider
+from vto_pipeline.cloth.collision.body_features import BodyFeatures, Candidates, no_candidates
+from vto_pipeline.cloth.collision.candidates import self_candidates, still_overlap
+from vto_pipeline.cloth.collision.features import features
+from vto_pipeline.cloth.collision.pairs import Pairs, against_bodies, near_pairs, no_pairs, owners
+from vto_pipeline.cloth.collision.pieces import pieces
+from vto_pipeline.cloth.collision.reach import reach
+from vto_pipeline.cloth.collision.safe import safe_way
+from vto_pipeline.geometry.intersections import self_intersections
+from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.numerics import bvh
+from vto_pipeline.units import GRAVITY
+
+_RECOVERY = 0.1  # m/s: speed at which layers nearer than their thickness are led apart
+_ROOM = 0.1  # of an edge: the most that layers are looked for beyond their thickness, or none could be proven apart
+_LOOK = 50  # searches after which to see whether the tree is still good, and what has come free
+_WIDER = 0.3  # of the longest way: how much farther than asked for a search looks, to serve the rest of the step too
+
+
+@dataclass
+class Tally:
+    """What was done and what was not.
+
+    Args:
+        asked: How often something had to be known of a step.
+        out_of_reach: Of those, how often the cloth could be shown to stay out of its own reach.
+        reused: Of those, how often an earlier search still held.
+        searched: Of those, how often candidates were searched for.
+        proof_s, search_s: Time taken by these [s].
+        body_searched: How often candidates between cloth and bodies were searched for.
+        body_s: Time taken by that [s].
+        impacts: Times of impact looked for.
+        shortened: Vertices that could not go their whole way, over all steps.
+        uncut: Pairs of the cloth and a moving body that meet, however short the cloth's move is cut.
+    """
+
+    asked: int = 0
+    out_of_reach: int = 0
+    reused: int = 0
+    searched: int = 0
+    proof_s: float = 0.0
+    search_s: float = 0.0
+    body_searched: int = 0
+    body_s: float = 0.0
+    impacts: int = 0
+    shortened: int = 0
+    uncut: int = 0
+
+    @property
+    def saved_s(self) -> float:
+        """Time that the searches left out would have taken, by those that were done [s]; 0 where there was none."""
+        return self.search_s / max(self.searched, 1) * (self.out_of_reach + self.reused)
+
+
+class _Found(NamedTuple):
+    """Candidates, good while all vertices stay between these places [m], shape (V, 3)."""
+
+    candidates: Candidates
+    low: FloatArray
+    high: FloatArray
+
+    def serves(self, low: FloatArray, high: FloatArray) -> bool:
+        """Return whether these ways stay there."""
+        return len(self.low) == len(low) and bool((low >= self.low).all() and (high <= self.high).all())
+
+
+_NOTHING = _Found(no_candidates(), np.empty((0, 3)), np.empty((0, 3)))
+
+
+class SelfContact:
+    """Contacts of a cloth with itself, and with the features of bodies.
+
+    Args:
+        faces: Shape (F, 3).
+        reach: Half the distance each vertex keeps from the rest of the cloth [m], shape (V,).
+        friction: Coulomb coefficient, cloth against cloth.
+        bodies: From which the cloth keeps its reach between its vertices, too.
+        crossed: Vertices of what crosses from the start, and takes no part until it is free, shape (V,).
+        force_all: Search always, to compare.
+
+    Attributes:
+        tally: What was done.
+    """
+
+    def __init__(
+        self,
+        faces: IntArray,
+        reach: FloatArray,
+        friction: float,
+        *,
+        bodies: Sequence[BodyCollider] = (),
+        crossed: NDArray[np.bool_] | None = None,
+        force_all: bool = False,
+    ) -> None:
+        self.tally = Tally()
+        self._cloth = self._features = features(faces, len(reach))
+        self._bodies: BodyFeatures | None = None
+        self._reach = self._all_reach = reach
+        if bodies:
+            self._bodies = BodyFeatures(bodies, self._cloth, len(reach))
+            self._features = self._bodies.features
+            self._all_reach = np.concatenate([reach, np.zeros(len(self._bodies.friction))])
+        self._owners = owners(self._features, len(self._all_reach))
+        self._pieces = pieces(faces, len(reach))
+        self._friction = friction
+        self._crossed = np.zeros(len(reach), np.bool_) if crossed is None else crossed.copy()
+        self._force_all = force_all
+        self._tree: bvh.Bvh | None = None
+        self._length: float | None = None
+        self._found = self._beside = _NOTHING
+
+    def at(self, begin: float, end: float) -> None:
+        """Take the bodies to a step between these times [s]; what is asked next is about it."""
+        if self._bodies is not None:
+            self._bodies.at(begin, end)
+
+    def near(self, x: FloatArray, end: FloatArray, seconds: float) -> Pairs:
+        """Return the pairs that are, or come by straight ways, nearer than they may; see `pairs.near_pairs`.
+
+        So are those that come near where one falls and the other is held. Vertices before faces of a body are not among
+        them: planes hold those, and farther away.
+
+        Args:
+            x, end: Positions at the begin and where vertices would go by themselves [m], shape (V, 3).
+            seconds: How long that takes [s].
+        """
+        apart = min(GRAVITY * seconds**2, _ROOM * self._edge(x))
+        found = self._candidates(x, _together(x, end), 0.5 * apart)
+        if self._bodies is not None:
+            found = found.joined(self._beyond_planes(self._outside(self._bodies, x, end), len(x)))
+        return self._pairs(x, end, found, _RECOVERY * seconds, apart)
+
+    def _edge(self, x: FloatArray) -> float:
+        """Return the median length of the cloth's edges when first asked [m]."""
+        if self._length is None:
+            ends = x[self._cloth.edges]
+            self._length = float(np.median(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)))
+        return self._length
+
+    def safe(self, x: FloatArray, end: FloatArray, pushed: FloatArray | None = None) -> tuple[FloatArray, Pairs]:
+        """Return positions on the way to `end` that nothing crosses another on the way to, and what would have.
+
+        Before a moving body it is safest to be carried along: each vertex as what is beside it moves, or, where layers
+        would meet by that, all alike. Where neither is safe, as between two bodies, the cloth is kept from passing
+        through itself and what rests, and what meets is counted.
+
+        Args:
+            x, end: Positions at the begin, where nothing crosses, and wanted [m], shape (V, 3).
+            pushed: How far what has no features takes along each vertex that is in its way [m], shape (V, 3).
+        """
+        if self._crossed.any() and self.tally.asked % _LOOK == 0:
+            self._release(x)
+        start, wanted, bodies = x, end, self._bodies
+        beside, step = no_candidates(), 0.0
+        carried = np.zeros_like(x) if pushed is None else pushed
+        if bodies is not None:
+            start, wanted = bodies.beside(x, False), bodies.beside(end, True)
+            beside = self._outside(bodies, x, end, bodies.step)
+            if bodies.moving(beside).any():
+                led = bodies.carried(beside)
+                carried, step = np.where(led != 0.0, led, carried), bodies.step
+        backs = [x]
+        if carried.any():
+            common = carried.sum(axis=0) / max(int(carried.any(axis=1).sum()), 1)
+            backs = [x + carried, x + common]
+        room = max(step, float(np.sqrt((carried**2).sum(axis=1).max(initial=0.0))))
+        if bodies is not None:
+            backs = [bodies.beside(back, True) for back in backs]
+        found = self._candidates(x, _together(x, end), room).joined(beside)
+        moving = np.zeros(found.number, np.bool_) if bodies is None else bodies.moving(found)
+        self.tally.impacts += found.number
+        for back in backs:
+            there, share, hit, stuck = safe_way(start, wanted, back, self._features, *found, self._all_reach)
+            if not (stuck & ~moving).any():
+                break
+        else:
+            there, share, _, _ = safe_way(start, wanted, start, self._features, *found.chosen(~moving), self._all_reach)
+            stuck = hit
+        self.tally.uncut += int((stuck & moving).sum())
+        self.tally.shortened += int((share[: len(x)] < 1.0).sum())
+        return there[: len(x)], self._pairs(x, end, self._beyond_planes(found.chosen(hit), len(x)), 0.0, 0.0)
+
+    def _beyond_planes(self, found: Candidates, count: int) -> Candidates:
+        """Return those that are not of a vertex of the cloth and a face of a body: planes hold these."""
+        held = (found.to_face[:, 0] < count) & (found.to_face[:, 1] >= len(self._cloth.faces))
+        return found._replace(to_face=found.to_face[~held])
+
+    def _release(self, x: FloatArray) -> None:
+        """Let what no longer crosses anything take part."""
+        faces = self._cloth.faces
+        still = np.zeros(len(x), np.bool_)
+        still[faces[self_intersections(TriangleMesh(x, faces)).reshape(-1)]] = True
+        self._crossed &= still
+        self._found = _NOTHING  # what was found without them no longer holds
+
+    def _pairs(self, x: FloatArray, end: FloatArray, found: Candidates, recovery: float, apart: float) -> Pairs:
+        if found.number == 0:
+            return no_pairs()
+        start, bodies = x, self._bodies
+        if bodies is not None:
+            start, end = bodies.beside(x, False), bodies.beside(end, True)
+        pairs = near_pairs(
+            start, end, self._features, self._owners, *found, self._all_reach, recovery, apart, self._friction
+        )
+        if bodies is None:
+            return pairs
+        return against_bodies(pairs, len(x), bodies.begin, bodies.end, bodies.friction)
+
+    def _candidates(self, x: FloatArray, end: FloatArray, room: float = 0.0) -> Candidates:
+        """Return candidates for ways that have in common what the vertices do not move."""
+        self.tally.asked += 1
+        radius = self._reach + room
+        low, high = _between(x, end, radius)
+        if not self._force_all:
+            if self._found.serves(low, high):
+                self.tally.reused += 1
+                return self._still(self._found.candidates, x, end, radius)
+            began = time.perf_counter()
+            proof = reach(self._pieces, x, end, radius)
+            self.tally.proof_s += time.perf_counter() - began
+            if proof.out:
+                self.tally.out_of_reach += 1
+                return no_candidates()
+        began = time.perf_counter()
+        wider = self._wider(x, end) + room
+        found = Candidates(*self_candidates(self._fitted(x, end, wider), self._cloth, x, end, wider, self._crossed))
+        self._found = _Found(found, *_between(x, end, wider))
+        self.tally.searched += 1
+        self.tally.search_s += time.perf_counter() - began
+        return self._still(found, x, end, radius)
+
+    def _still(self, found: Candidates, x: FloatArray, end: FloatArray, radius: FloatArray) -> Candidates:
+        """Return what of the candidates is one on these ways: what is left out must not change what is found."""
+        return found.chosen(still_overlap(self._cloth, *found, x, end, radius))
+
+    def _outside(self, bodies: BodyFeatures, x: FloatArray, end: FloatArray, room: float = 0.0) -> Candidates:
+        """Return candidates between the cloth, with room about its ways [m], and what is outside it of bodies."""
+        began = time.perf_counter()
+        start, there = bodies.beside(x, False), bodies.beside(end, True)
+        if self._force_all or not self._beside.serves(*_between(start, there, self._all_reach + room)):
+            wider = self._wider(x, end) + room
+            found = bodies.search(self._fitted(x, end, wider), x, end, wider)
+            padded = np.concatenate([wider, np.full(len(bodies.friction), room)])
+            self._beside = _Found(found, *_between(start, there, padded))
+            self.tally.body_searched += 1
+        found = self._beside.candidates
+        found = found.chosen(still_overlap(bodies.features, *found, start, there, self._all_reach + room))
+        found = bodies.outside(found, x, end, self._reach + room)
+        self.tally.body_s += time.perf_counter() - began
+        return found
+
+    def _wider(self, x: FloatArray, end: FloatArray) -> FloatArray:
+        """Return radii to search within, with room for the rest of the step [m], shape (V,)."""
+        if self._force_all:
+            return self._reach
+        return self._reach + _WIDER * float(np.sqrt(((end - x) ** 2).sum(axis=1).max(initial=0.0)))
+
+    def _fitted(self, x: FloatArray, end: FloatArray, radius: FloatArray) -> bvh.Bvh:
+        """Return the tree over the cloth's faces on these ways."""
+        faces = self._cloth.faces
+        due = (self.tally.searched + self.tally.body_searched) % _LOOK == 0
+        worn = due and self._tree is not None and bvh.degraded(self._tree, x, faces)
+        if self._tree is None or worn:
+            self._tree = bvh.build(x, faces)
+        bvh.refit_swept(self._tree, x, end, faces, radius)
+        return self._tree
+
+
+def _between(x: FloatArray, end: FloatArray, radius: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the lowest and highest places of vertices on their ways, with their radii [m], shapes (V, 3)."""
+    return np.minimum(x, end) - radius[:, None], np.maximum(x, end) + radius[:, None]
+
+
+def _together(x: FloatArray, end: FloatArray) -> FloatArray:
+    """Return the ends of the ways less what all have in common, which brings nothing nearer to anything."""
+    return end - (end - x).mean(axis=0)

@@ -1,0 +1,30 @@
+"""Takes kinks out: about a crossing that pushing does not undo, cloth is replaced by the smoothest that fits in."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.linalg import spsolve
+
+from vto_pipeline.model.arrays import FloatArray, IntArray
+
+
+def smoothed(positions: FloatArray, laplacian: csr_matrix, centre: IntArray, rings: int) -> FloatArray:
+    """Return the positions with harmonic ones about the centre: each vertex a mean of its neighbours.
+
+    Args:
+        positions: [m], shape (V, 3).
+        laplacian: Of the cloth as it started, shape (V, V).
+        centre: Vertices, any shape.
+        rings: How many rings of neighbours move with them.
+    """
+    near = np.zeros(len(positions))
+    near[centre] = 1.0
+    for _ in range(rings - 1):
+        near = (abs(laplacian) @ near > 0.0).astype(np.float64)
+    free = near > 0.0
+    result = positions.copy()
+    if free.any() and not free.all():
+        rows = laplacian[free]
+        result[free] = spsolve(rows[:, free].tocsc(), -(rows[:, ~free] @ positions[~free])).reshape(-1, 3)
+    return result
