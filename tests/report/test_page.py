@@ -129,6 +129,9 @@ def test_layers_and_what_shows_first() -> None:
     assert [layer["name"] for layer in layers if layer["visible"]] == ["Garment", "Body"]
     assert {"Stretch", "Clearance", "Labels"} < {layer["name"] for layer in layers}
     assert next(layer for layer in layers if layer["name"] == "Stretch")["legend"]["unit"] == "%"
+    assert "Crossings" not in {layer["name"] for layer in layers}
+    marked = scene_of(build_page(run_record(), {**all_parts(), "crossings": tube(0.01, 1.0, 1.01)}))["layers"]
+    assert [layer["name"] for layer in marked if layer["visible"]] == ["Garment", "Body", "Crossings"]
     only_scan = scene_of(build_page(run_record(), {"garment_surface": tube(0.2, 0.3, 1.7)}))["layers"]
     assert [layer["visible"] for layer in only_scan] == [True]
 

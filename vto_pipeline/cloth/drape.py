@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from pydantic import Field
@@ -13,17 +14,19 @@ from vto_pipeline.cloth.balance import elastic_energy
 from vto_pipeline.cloth.build import ClothModel, ClothState, at_rest, build, without_gravity
 from vto_pipeline.cloth.clear import clear_of_body
 from vto_pipeline.cloth.collision.body import BodyCollider
+from vto_pipeline.cloth.collision.self_contact import Tally
 from vto_pipeline.cloth.grow import growing
+from vto_pipeline.cloth.judge.balance import knows
 from vto_pipeline.cloth.materials import Materials
 from vto_pipeline.cloth.place import PlaceConfig, place
 from vto_pipeline.cloth.settings import checked
 from vto_pipeline.cloth.settle import SettleLimits, Settling, settle
 from vto_pipeline.cloth.simulation import default_skin
+from vto_pipeline.cloth.start import free_start
 from vto_pipeline.cloth.stepper import StepConfig, Stepper
 from vto_pipeline.cloth.warm_up import warm_up
 from vto_pipeline.errors import DivergedError, IntersectingError
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.cloth import Draped
 from vto_pipeline.model.fabric import Fabric
@@ -33,6 +36,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 _CALM = 20.0  # 1/s: velocities fade this fast while the body grows, where the way does not matter
 _SHOWN = 5  # places named in a message
+_JUST = 1e-3  # m beyond the skin: the judge takes cloth no farther from the body than this to lie on it
 
 
 class DrapeConfig(StepConfig, PlaceConfig, Materials):
@@ -72,8 +76,9 @@ def drape(
     """Drape a garment on a body.
 
     When the body moves, the garment is where its first keyframe has it and rides along. When the body is at rest, the
-    garment is put in its place first, and where it then cuts deep into the body, the body grows inside it. Then all
-    settles under gravity, and a last pass takes the remaining crossings out.
+    garment is put in its place first, and where it then cuts deep into the body, the body grows inside it. Where the
+    garment crosses itself, it is untangled before. Then all settles under gravity, and a last pass takes the remaining
+    crossings with the body out.
 
     Args:
         garment: The simulation mesh where it is now, and its rest shape; a mesh alone is its own rest shape.
@@ -83,7 +88,8 @@ def drape(
         job: For progress, findings and what was left out.
 
     Returns:
-        The garment at its end, the trace of the settling, and the audit.
+        The garment at its end, the trace of the settling, and the audit. Where it still crosses itself, the job is
+        warned, and the audit says where.
 
     Raises:
         ConfigError: an unknown setting or a value out of range.
@@ -103,33 +109,70 @@ def drape(
     start = TriangleMesh(body.keyframes[0], body.faces)
     mesh = garment.mesh if len(body.keyframes) > 1 else place(garment.mesh, start, config, job)
     model = build(mesh, garment.rest, fabric, materials=config, job=job)
-    work = _Work(model, fabric, config, job)
-    state = at_rest(mesh.vertices)
+    work = _Work(model, garment.rest, fabric, config, job)
+    state = work.free(at_rest(mesh.vertices))
     try:
-        state = work.grow(state, mesh, start)
+        state = work.free(work.grow(state, start), start)
         collider, seconds = work.collider(body)
         stepper = work.stepper(model, collider, config.damping)
         stepper.prepare(state.positions)
         job.note(f"{stepper.choice.method}, {stepper.substeps} steps per 1/60 s: {stepper.choice.reason}")
-        state = work.ride(state, stepper, seconds)
+        state = work.ride(state, stepper, seconds, body.final)
         settling = work.settle(state, stepper, deadline)
         job.progress(0.9, "clearing the body")
         state, pairs = clear_of_body(stepper, settling.state, model.faces, body.final, config.clear_rounds)
     except DivergedError as error:
         error.partial["draped"] = mesh
         raise
-    return _result(garment, body.final, model, stepper, settling, state, pairs, time.perf_counter() - began, job)
+    draped = TriangleMesh(state.positions, model.faces, garment.mesh.colors)
+    findings = work.judged(draped, body.final, stepper, state, settling.settled)
+    error_mm = 1e3 * settling.error if np.isfinite(settling.error) else None
+    work.account()
+    job.measure(seconds=time.perf_counter() - began, steps=stepper.steps, error_mm=error_mm, **findings)
+    if not settling.settled:
+        job.warn(
+            f"not at rest: {error_mm:.1f} mm still to come" if error_mm else "not at rest, and too early to say how far"
+        )
+    if findings["self_intersections"]:
+        job.warn(
+            f"{findings['self_intersections']} pairs of triangles of the garment cross each other, near "
+            f"{_named(findings['self_intersection_places'])}"
+        )
+    if len(pairs):
+        raise IntersectingError(
+            f"{len(pairs)} pairs of triangles of garment and body still cross, near "
+            f"{_named(findings['body_intersection_places'])}",
+            hint="is the garment the right way up, and large enough? a larger skin_mm or more clear_rounds may help",
+            partial={"draped": draped, "audit": findings, "trace": tuple(settling.trace)},
+        )
+    return Draped(draped, state.velocities, None, tuple(settling.trace), findings)
 
 
 class _Work:
     """The phases of one drape, and what they share."""
 
-    def __init__(self, model: ClothModel, fabric: Fabric, config: DrapeConfig, job: Job) -> None:
+    def __init__(self, model: ClothModel, rest: RestShape, fabric: Fabric, config: DrapeConfig, job: Job) -> None:
         self._model = model
+        self._rest = rest
+        self._fabric = fabric
         self._friction = fabric.friction if config.friction is None else config.friction
         self._skin = default_skin(model.edge_length) if config.skin_mm is None else 1e-3 * config.skin_mm
         self._config = config
         self._job = job
+        self._crossed = np.zeros(len(model.mass), np.bool_)
+        self._tallies: list[Tally] = []
+
+    def free(self, state: ClothState, body: TriangleMesh | None = None) -> ClothState:
+        """Return the cloth where it crosses neither itself nor the body; where it could not be freed, it may go on."""
+        if not self._config.self_collision:
+            return state
+        start = free_start(
+            state.positions, self._model.faces, self._rest.positions, self._fabric.thickness, self._job, body
+        )
+        self._crossed = start.crossed
+        if start.pairs == 0:
+            return state
+        return replace(state, positions=start.positions, velocities=np.zeros_like(state.velocities))
 
     def collider(self, body: MovingBody) -> tuple[BodyCollider, float]:
         """Return the collider, and how long its motion takes [s]."""
@@ -139,11 +182,23 @@ class _Work:
 
     def stepper(self, model: ClothModel, collider: BodyCollider, damping: float) -> Stepper:
         """Return the cloth among its colliders."""
-        skin = np.full(len(model.mass), self._skin)
-        return Stepper(model, [collider], skin, self._config, damping=damping, max_speed=self._config.max_speed)
+        made = Stepper(
+            model,
+            [collider],
+            np.full(len(model.mass), self._skin),
+            self._config,
+            damping=damping,
+            max_speed=self._config.max_speed,
+            crossed=self._crossed,
+            force_all=self._job.force_all,
+        )
+        if made.self_contact is not None:
+            self._tallies.append(made.self_contact.tally)
+        return made
 
-    def grow(self, state: ClothState, mesh: TriangleMesh, body: TriangleMesh) -> ClothState:
+    def grow(self, state: ClothState, body: TriangleMesh) -> ClothState:
         """Return the cloth outside the body."""
+        mesh = TriangleMesh(state.positions, self._model.faces)
         depth = -float(SurfaceDistance(body).signed(mesh.vertices).distance.min())
         if depth <= 1e-3 * self._config.grow_above_mm:
             self._job.leave_out(
@@ -156,12 +211,12 @@ class _Work:
         grown = self._march(state, stepper, seconds, 0.05, 0.3, "growing the body inside the garment")
         return at_rest(grown.positions)
 
-    def ride(self, state: ClothState, stepper: Stepper, seconds: float) -> ClothState:
+    def ride(self, state: ClothState, stepper: Stepper, seconds: float, body: TriangleMesh) -> ClothState:
         """Return the cloth after the body's motion."""
         if seconds == 0.0:
             self._job.leave_out("riding along with the body", "the body is at rest")
             return state
-        return self._march(state, stepper, seconds, 0.3, 0.5, "riding along with the body")
+        return self.free(self._march(state, stepper, seconds, 0.3, 0.5, "riding along with the body"), body)
 
     def settle(self, state: ClothState, stepper: Stepper, deadline: float) -> Settling:
         """Return the cloth at rest, or as near to it as allowed."""
@@ -179,6 +234,41 @@ class _Work:
         )
         return settle(stepper, state, limits, watch)
 
+    def judged(
+        self, mesh: TriangleMesh, body: TriangleMesh, stepper: Stepper, state: ClothState, settled: bool
+    ) -> dict[str, object]:
+        """Return the audit."""
+        return audit(
+            mesh,
+            self._rest,
+            body,
+            settled=settled,
+            energy=elastic_energy(self._model, state.positions),
+            residual=stepper.residual(state),
+            fabric=self._fabric if knows(self._config) else None,
+            friction=self._friction,
+            touching=float(stepper.skin.max()) + _JUST,
+        )
+
+    def account(self) -> None:
+        """Tell what the search for contacts of the cloth with itself took and saved."""
+        asked, out, reused = (
+            sum(getattr(one, name) for one in self._tallies) for name in ("asked", "out_of_reach", "reused")
+        )
+        if out + reused > 0:
+            self._job.leave_out(
+                "self-collision search",
+                f"{(out + reused) / asked:.0%} of {asked} questions needed none: the cloth was out of its own reach "
+                f"({out}), or an earlier search still held ({reused})",
+            )
+        if asked > 0:
+            self._job.measure(
+                self_searches=sum(one.searched for one in self._tallies),
+                self_searches_left_out=out + reused,
+                self_searches_took_s=sum(one.proof_s + one.search_s for one in self._tallies),
+                self_searches_saved_s=sum(one.saved_s for one in self._tallies),
+            )
+
     def _march(
         self, state: ClothState, stepper: Stepper, seconds: float, first: float, last: float, what: str
     ) -> ClothState:
@@ -189,45 +279,8 @@ class _Work:
         return state
 
 
-def _result(
-    garment: Garment,
-    body: TriangleMesh,
-    model: ClothModel,
-    stepper: Stepper,
-    settling: Settling,
-    state: ClothState,
-    pairs: IntArray,
-    seconds: float,
-    job: Job,
-) -> Draped:
-    mesh = TriangleMesh(state.positions, model.faces, garment.mesh.colors)
-    residual = stepper.residual(state)
-    findings = audit(
-        mesh,
-        garment.rest,
-        body,
-        settled=settling.settled,
-        energy=elastic_energy(model, state.positions),
-        residual=residual,
-    )
-    draped = Draped(mesh, state.velocities, None, tuple(settling.trace), findings)
-    error_mm = 1e3 * settling.error if np.isfinite(settling.error) else None
-    job.measure(seconds=seconds, steps=stepper.steps, error_mm=error_mm, **findings)
-    if not settling.settled:
-        job.warn(
-            f"not at rest: {error_mm:.1f} mm still to come" if error_mm else "not at rest, and too early to say how far"
-        )
-    if len(pairs):
-        raise IntersectingError(
-            f"{len(pairs)} pairs of triangles of garment and body still cross, near {_places(mesh, pairs)}",
-            hint="is the garment the right way up, and large enough? a larger skin_mm or more clear_rounds may help",
-            partial={"draped": mesh, "audit": findings, "trace": draped.trace},
-        )
-    return draped
-
-
-def _places(mesh: TriangleMesh, pairs: IntArray) -> str:
-    """Name some places [m], spread over the crossings."""
-    centres: FloatArray = mesh.vertices[mesh.faces[np.unique(pairs[:, 0])]].mean(axis=1)
-    chosen = centres[np.linspace(0, len(centres) - 1, min(_SHOWN, len(centres))).astype(int)]
+def _named(places: object) -> str:
+    """Name some places [m] of those that the judge lists."""
+    assert isinstance(places, list)
+    chosen = [places[k] for k in np.unique(np.linspace(0, len(places) - 1, _SHOWN).astype(int))] if places else []
     return ", ".join(f"({x:.2f}, {y:.2f}, {z:.2f})" for x, y, z in chosen)

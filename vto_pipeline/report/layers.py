@@ -16,14 +16,15 @@ from vto_pipeline.model.render import GlbPart
 from vto_pipeline.report.render_colors import join_parts
 from vto_pipeline.report.scales import CLEARANCE, SCAN, STRETCH, Key, Ramp
 
-_SKIN, _CLOTH, _FORM = "#d6b59c", "#6a8fc0", "#b9b5ad"
-_GROUPS = ("garment", "body", "scan")
+_SKIN, _CLOTH, _FORM, _MARK = "#d6b59c", "#6a8fc0", "#b9b5ad", "#d62728"
+_GROUPS = ("garment", "body", "marks", "scan")
 _PLAIN = (  # artifact, name, group, colour where it has none of its own
     ("render_mesh", "Garment", "garment", _CLOTH),
     ("draped", "Simulated cloth", "garment", _CLOTH),
     ("garment", "Garment as scanned", "garment", _CLOTH),
     ("avatar", "Body", "body", _SKIN),
     ("mannequin_surface", "Mannequin", "body", _FORM),
+    ("crossings", "Crossings", "marks", _MARK),
     ("garment_surface", "Garment scan", "scan", _CLOTH),
     ("body_surface", "Body scan", "scan", _SKIN),
 )

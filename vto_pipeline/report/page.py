@@ -22,7 +22,8 @@ def build_page(run_record: Mapping[str, Any], parts: Mapping[str, Any]) -> str:
     Args:
         run_record: What run.json holds.
         parts: Artifact -> value, as far as there are any: meshes and avatar for the 3D view with "fit_maps" and
-            "labels" for its colours, "fit_report", "measurements", "openings", "audit", "trace". Others are ignored.
+            "labels" for its colours and "crossings" where cloth crosses something, "fit_report", "measurements",
+            "openings", "audit", "trace". Others are ignored.
     """
     from jinja2 import Environment, StrictUndefined
 

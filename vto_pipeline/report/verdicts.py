@@ -37,9 +37,6 @@ def collect_verdicts(run_record: Mapping[str, Any], parts: Mapping[str, Any]) ->
         zones = parts["fit_report"].get("zones", [])
         tone = "warn" if any(zone["verdict"] in _POOR for zone in zones) else "good"
         found.append(Verdict(tone, parts["fit_report"]["verdict"], "fit"))
-    crossing = parts.get("audit", {}).get("self_intersections", 0)
-    if crossing:
-        found.append(Verdict("warn", f"{crossing} pairs of triangles of the cloth cross each other", "drape"))
     if not found:
         found.append(Verdict("good", "No stage failed or gave a warning.", "run"))
     return sorted(found, key=lambda verdict: _ORDER.index(verdict.tone))

@@ -16,6 +16,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
 from vto_pipeline.pipeline.stage import Stage
 from vto_pipeline.render.dress import DressConfig, dress
+from vto_pipeline.render.marks import mark_places
 from vto_pipeline.report.page import build_page
 
 Inputs = Mapping[str, Any]
@@ -56,7 +57,16 @@ def _observed_share(inputs: Inputs) -> float | None:
 
 def _page(inputs: Inputs, settings: Config, job: Job) -> Outputs:
     parts = {name: value for name, value in inputs.items() if name != "run_record"}
+    places = _crossings(inputs.get("audit", {}))
+    if places:
+        parts["crossings"] = mark_places(np.array(places))
     return {"page": build_page(inputs["run_record"], parts)}
+
+
+def _crossings(audit: Mapping[str, Any]) -> list[list[float]]:
+    """Return where the garment was found to cross the body or itself [m]."""
+    kinds = ("body_intersection_places", "self_intersection_places")
+    return [place for kind in kinds for place in audit.get(kind, [])]
 
 
 STAGES: tuple[Stage, ...] = (

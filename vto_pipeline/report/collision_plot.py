@@ -1,0 +1,172 @@
+"""What collision costs and what it leaves: queries, broad phase, scenes, work left out and friction in one picture."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vto_pipeline.errors import InputError
+from vto_pipeline.report.figure import COLORS, ELSEWHERE, canvas, label_decades, look_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Rows = Sequence[Mapping[str, Any]]
+
+_LINE = 0.24  # inch per line of a list
+_FLOOR = 1e-7  # an error share below this is drawn here
+_GOOD, _BAD = COLORS[2], COLORS[1]
+
+
+def draw_collision(bench: Mapping[str, Any]) -> bytes:
+    """Draw a panel for each kind of rows that there is.
+
+    Args:
+        bench: {"bench", "rows"}. Kinds are told by their errors: queries by "queries_per_s" (with "missed" and
+            "false_share"), the broad phase by "pairs", scenes by "crossings", bad starts by "pairs_left", work left
+            out by "saved_share" (with "difference_mm"), friction by "error_share" (with "allowed_share").
+
+    Returns:
+        A PNG.
+
+    Raises:
+        InputError: no row is of one of the kinds.
+    """
+    panels: list[tuple[str, Callable[[Axes, Rows], None]]] = [
+        ("queries_per_s", _queries),
+        ("pairs", _sizes),
+        ("crossings", _scenes),
+        ("pairs_left", _bad_starts),
+        ("saved_share", _left_out),
+        ("error_share", _friction),
+    ]
+    chosen = [(_with(bench["rows"], name), paint) for name, paint in panels]
+    filled = [(rows, paint) for rows, paint in chosen if rows]
+    if not filled:
+        raise InputError(f"bench {bench['bench']}: {len(bench['rows'])} rows, none with a figure of collision")
+    lines = [filled[k : k + 2] for k in range(0, len(filled), 2)]
+    heights = [max(2.6, 1.0 + _LINE * max(len(_names(rows)) for rows, _ in line)) for line in lines]
+    with canvas(11.0, sum(heights)) as drawn:
+        grid = drawn.figure.subplots(len(lines), 2, squeeze=False, height_ratios=heights)
+        for line, axes_line in zip(lines, grid, strict=True):
+            for k, axes in enumerate(axes_line):
+                if k < len(line):
+                    line[k][1](axes, line[k][0])
+                else:
+                    axes.set_axis_off()
+    return drawn.png
+
+
+def _with(rows: Rows, figure: str) -> list[Mapping[str, Any]]:
+    """Return the rows that have this figure as a finite number."""
+    return [row for row in rows if _finite(row["errors"].get(figure))]
+
+
+def _finite(value: object) -> bool:
+    return isinstance(value, int | float) and math.isfinite(value)
+
+
+def _names(rows: Rows) -> list[str]:
+    return list(dict.fromkeys(row["scene"] for row in rows))
+
+
+def _methods(rows: Rows) -> list[str]:
+    return list(dict.fromkeys(row["method"] for row in rows))
+
+
+def _list(axes: Axes, rows: Rows) -> dict[str, int]:
+    """Name the lines of a list, the first on top, and return the place of each."""
+    names = _names(rows)
+    axes.set_yticks(range(len(names)), names, size=7)
+    axes.set_ylim(len(names) - 0.4, -0.6)
+    axes.grid(visible=True, axis="x")
+    return {name: k for k, name in enumerate(names)}
+
+
+def _queries(axes: Axes, rows: Rows) -> None:
+    """Draw continuous tests a second; beside each bar what it missed and how often it spoke too early."""
+    labels = [f"{row['method']}, {row['scene']}" for row in rows]
+    rates = [row["errors"]["queries_per_s"] for row in rows]
+    methods = _methods(rows)
+    places = list(range(len(rows)))
+    axes.barh(places, rates, color=[look_of(methods.index(row["method"])).color for row in rows], height=0.7)
+    for place, row in zip(places, rows, strict=True):
+        errors = row["errors"]
+        false = f", {100 * errors['false_share']:.2g} % false" if _finite(errors.get("false_share")) else ""
+        text = f" {errors.get('missed', '?')} missed{false}"
+        axes.text(row["errors"]["queries_per_s"], place, text, va="center", size=7)
+    axes.set_yticks(places, labels, size=7)
+    axes.set(title="continuous tests", xlabel="queries per second", xscale="log")
+    axes.set_xlim(right=30.0 * max(rates))
+    axes.invert_yaxis()
+
+
+def _sizes(axes: Axes, rows: Rows) -> None:
+    """Draw seconds against vertices, with the exponent of each method."""
+    for k, (scene, method) in enumerate(dict.fromkeys((row["scene"], row["method"]) for row in rows)):
+        own = [row for row in rows if (row["scene"], row["method"]) == (scene, method) and row["seconds"] > 0.0]
+        points = sorted((row["vertices"], row["seconds"]) for row in own)
+        if not points:
+            continue
+        across, up = np.log(np.array(points, dtype=np.float64)).T
+        grows = f", exponent {np.polyfit(across, up, 1)[0]:.2f}" if len(set(across)) > 1 else ""
+        look = look_of(k)
+        axes.loglog(*np.exp([across, up]), look.line, color=look.color, marker=look.marker, label=f"{method}{grows}")
+    axes.set(title="broad and narrow phase", xlabel="vertices", ylabel="seconds a step")
+    label_decades(axes.xaxis)
+    label_decades(axes.yaxis)
+    axes.grid(visible=True)
+    axes.legend(loc="upper left", fontsize=7)
+
+
+def _scenes(axes: Axes, rows: Rows) -> None:
+    _timed(axes, rows, "crossings", "scenes: pairs that cross at the end")
+
+
+def _bad_starts(axes: Axes, rows: Rows) -> None:
+    _timed(axes, rows, "pairs_left", "bad starts: pairs left")
+
+
+def _timed(axes: Axes, rows: Rows, figure: str, title: str) -> None:
+    """Draw run times as a list, in the colour and with the number of what is left."""
+    places, methods = _list(axes, rows), _methods(rows)
+    for row in rows:
+        left, place = row["errors"][figure], places[row["scene"]]
+        color = _GOOD if left == 0 else _BAD
+        axes.plot(max(row["seconds"], 1e-3), place, look_of(methods.index(row["method"])).marker, color=color)
+        axes.annotate(f"{left:g}", (max(row["seconds"], 1e-3), place), (5, -2), textcoords="offset points", size=7)
+    for k, method in enumerate(methods):
+        axes.plot([], [], look_of(k).marker, color=ELSEWHERE, label=method)
+    axes.set(title=title, xlabel="run time [s]", xscale="log")
+    axes.margins(x=0.15)
+    axes.legend(fontsize=7)
+
+
+def _left_out(axes: Axes, rows: Rows) -> None:
+    """Draw the share of time saved; beside each bar the difference that it makes."""
+    places = _list(axes, rows)
+    for row in rows:
+        saved, place = 100.0 * row["errors"]["saved_share"], places[row["scene"]]
+        axes.barh(place, saved, color=COLORS[0], height=0.6)
+        text = f" {row['errors']['difference_mm']:.2g} mm"
+        axes.text(max(saved, 0.0), place, text, va="center", size=7)
+    axes.set(title="left out: the difference it makes", xlabel="time saved [%]")
+    axes.margins(x=0.2)
+
+
+def _friction(axes: Axes, rows: Rows) -> None:
+    """Draw relative errors as a list, with what is allowed as an upright stroke."""
+    places, methods = _list(axes, rows), _methods(rows)
+    for row in rows:
+        errors, place = row["errors"], places[row["scene"]]
+        look = look_of(methods.index(row["method"]))
+        axes.plot(max(abs(errors["error_share"]), _FLOOR), place, look.marker, color=look.color, alpha=0.8)
+        if _finite(errors.get("allowed_share")):
+            axes.plot([errors["allowed_share"]] * 2, [place - 0.4, place + 0.4], color="#000000", linewidth=1.2)
+    for k, method in enumerate(methods):
+        axes.plot([], [], look_of(k).marker, color=look_of(k).color, label=method)
+    axes.set(title="friction: error and what is allowed", xlabel="relative error", xscale="log")
+    axes.legend(fontsize=7, loc="lower left")
