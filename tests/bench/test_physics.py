@@ -51,9 +51,6 @@ def test_hanging_rows_hold_their_bars():
     catenaries = [row for row in rows if row.scene == "catenary"]
     assert catenaries[-1].errors["sag_share"] < 1e-3
     assert 1.8 < catenaries[-1].errors["order"] < 2.2
-    slopes = [row for row in rows if row.scene.startswith("slope")]
-    assert max(row.errors["slide_share"] for row in slopes) < 0.01
-    assert slopes[0].errors["slid_mm"] > 100.0
 
 
 def test_irregular_meshes_follow_no_direction_and_fill_their_shape():

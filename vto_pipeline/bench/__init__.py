@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from vto_pipeline.bench.bench import Bench
+from vto_pipeline.report.collision_plot import draw_collision
 from vto_pipeline.report.plots import Curves, draw_curves
 from vto_pipeline.report.scaling_plot import draw_scaling
 from vto_pipeline.report.verdict_table import draw_verdicts
@@ -47,6 +48,11 @@ BENCHES = {
     ),
     "physics": Bench(
         "elastica, buckling, drape: error against references", "vto_pipeline.bench.physics", _draw_physics
+    ),
+    "collision": Bench(
+        "queries, broad phase, self-contact, friction: what is missed, what is left, how long it takes",
+        "vto_pipeline.bench.collision",
+        draw_collision,
     ),
     "scaling": Bench(
         "run time at equal error from 1k vertices up, kernels, threads", "vto_pipeline.bench.scaling", draw_scaling

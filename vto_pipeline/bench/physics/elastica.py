@@ -6,6 +6,7 @@ Lengths are in units of the strip's length L, forces per width in units of B / L
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -96,13 +97,18 @@ class HeldStrip:
         across: Level force on the tip.
         down: Plumb force on the tip.
         clamp_curvature: At the clamp.
-        farthest: Largest distance from the plumb line.
+        shape: Distance from the plumb line and below the clamp, at even steps from the clamp to the tip, shape (N, 2).
     """
 
     across: float
     down: float
     clamp_curvature: float
-    farthest: float
+    shape: FloatArray
+
+    @property
+    def farthest(self) -> float:
+        """Largest distance from the plumb line."""
+        return float(np.abs(self.shape[:, 0]).max())
 
     @property
     def holding_friction(self) -> float:
@@ -123,7 +129,17 @@ def held_strip(shortening: float) -> HeldStrip:
         found = root(lambda y, part=part: _mismatch(y, part), unknown, tol=1e-11)
         unknown = found.x
     shape = _held_shape(unknown)
-    return HeldStrip(abs(unknown[2]), unknown[1], abs(unknown[0]), float(np.abs(shape[2]).max()))
+    return HeldStrip(abs(unknown[2]), unknown[1], abs(unknown[0]), shape[2:].T)
+
+
+@cache
+def slipping_strip(friction: float) -> float:
+    """Return the shortening from which the tip of a `held_strip` slips on a floor, by share of the length.
+
+    Args:
+        friction: Coefficient, up to 0.33: from there the strip's belly would be under the floor.
+    """
+    return float(brentq(lambda share: held_strip(share).holding_friction - friction, 1e-3, 0.32, xtol=1e-6))
 
 
 def _small_curvature(shortening: float) -> float:

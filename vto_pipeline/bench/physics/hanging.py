@@ -1,29 +1,25 @@
-"""What hangs and swings: chains and strips under their weight, the catenary, the pendulum, a slide down a slope."""
+"""What hangs and swings: chains and strips under their weight, the catenary, the pendulum."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from vto_pipeline.bench.bench import Measured, Row, Watch
+from vto_pipeline.bench.bench import Row, Watch
 from vto_pipeline.bench.physics.cantilever import MESHES
-from vto_pipeline.bench.physics.closed_forms import catenary, hanging_strip, pendulum_period, slide
+from vto_pipeline.bench.physics.closed_forms import catenary, hanging_strip, pendulum_period
 from vto_pipeline.bench.physics.meshes import MeshKind, strip
 from vto_pipeline.bench.physics.refinement import Case, refined
-from vto_pipeline.bench.timing import Timing
 from vto_pipeline.cloth.build import ClothModel, ClothState, build, model_of
 from vto_pipeline.cloth.collision.contacts import nothing
-from vto_pipeline.cloth.collision.shapes import Plane
 from vto_pipeline.cloth.constraints.spring import springs
 from vto_pipeline.cloth.equilibrium import EquilibriumConfig, equilibrium
 from vto_pipeline.cloth.integrators import INTEGRATORS
 from vto_pipeline.cloth.materials import Materials
 from vto_pipeline.cloth.settings import checked
-from vto_pipeline.cloth.simulation import simulate
 from vto_pipeline.cloth.solvers import SOLVERS
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import Fabric
@@ -46,8 +42,6 @@ def hanging_rows(quick: bool, watch: Watch) -> Iterator[Row]:
     counts = (200, 400, 800, 1600) if quick else (200, 400, 800, 1600, 3200)
     for method in ("xpbd", "newton", "bdf2"):
         yield from refined(watch, "pendulum 90°", method, {}, "steps", counts, partial(_pendulum, method))
-    for friction in (0.1, 0.5, 0.6, 0.9):
-        yield watch.row("slope 30°", "xpbd", {"friction": friction}, 9, partial(_slope, friction))
 
 
 def _chain(points: FloatArray, stiffness: float, pinned: list[int], rest: float) -> ClothModel:
@@ -137,36 +131,3 @@ def pendulum_error(name: str, steps: int) -> float:
         before = angle
     period = 2.0 * (zeros[1] - zeros[0]) if len(zeros) == 2 else np.inf
     return float(abs(period / (short * pendulum_period(0.5 * np.pi)) - 1.0))
-
-
-def _slope(friction: float) -> Measured:
-    """A small sheet on a slope of 30 degrees: it holds where tan 30° = 0.577 ≤ μ, else slides as known."""
-    incline, skin = np.radians(30.0), 1e-3
-    normal = np.array([np.sin(incline), np.cos(incline), 0.0])
-    along = np.array([np.cos(incline), -np.sin(incline), 0.0])
-    across = np.array([0.0, 0.0, 1.0])
-    u, v = (g.ravel() for g in np.meshgrid(np.linspace(-0.05, 0.05, 3), np.linspace(-0.05, 0.05, 3), indexing="ij"))
-    start = u[:, None] * along + v[:, None] * across + skin * normal
-    corner = np.array([3 * i + j for i in range(2) for j in range(2)])
-    faces = np.vstack(
-        [np.column_stack([corner, corner + 1, corner + 4]), np.column_stack([corner, corner + 4, corner + 3])]
-    )
-    fabric = Fabric("block", 0.2, 1e-3, 1e4, 1e4, 5e3, 0.0, 1e-3, 1e-3, 0.0, friction)
-    seconds, substeps = 0.3, 20
-    began = time.perf_counter()
-    found = simulate(
-        TriangleMesh(start, faces.astype(np.int32)),
-        fabric,
-        colliders=[Plane((0.0, 0.0, 0.0), tuple(normal), friction)],
-        seconds=seconds,
-        settings={"solver": "xpbd", "substeps": substeps, "skin_mm": 1e3 * skin},
-    )
-    steps = round(seconds * 60 * substeps)
-    wanted = slide(friction, incline, GRAVITY, seconds / steps, steps)
-    went = float(((found.positions - start) @ along).mean())
-    free_fall = slide(0.0, incline, GRAVITY, seconds / steps, steps)
-    return Timing(time.perf_counter() - began), {
-        "slide_share": abs(went - wanted) / free_fall,
-        "slid_mm": 1e3 * went,
-        "wanted_mm": 1e3 * wanted,
-    }
