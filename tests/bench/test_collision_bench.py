@@ -171,7 +171,7 @@ def plain(scene, method="ours", seconds=0.1, vertices=100, **errors):
 
 def test_each_kind_of_rows_has_its_panel():
     kinds = [
-        [plain("vertex-face", queries_per_s=1e6, missed=0, false_share=0.01)],
+        [plain("vertex-face", per_second=1e6, missed=0)],
         [plain("step", vertices=n, pairs=n, seconds=1e-6 * n) for n in (100, 1000)],
         [plain("sphere 32", crossings=0), plain("sphere 32", method="xpbd", crossings=3)],
         [plain("sleeve", pairs_left=0)],

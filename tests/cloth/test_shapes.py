@@ -178,6 +178,7 @@ def test_a_table_cloth_pulled_over_the_edge_is_never_on_the_wrong_side(kind, spe
         # what was over the last 50 mm, one edge of the cloth, may have slipped around the rim and swing under it
         over = (np.abs(local[:, [0, 2]]) < half[[0, 2]] - 0.05).all(axis=1)
         assert (local[over, 1] >= half[1] - 1e-6).all()
+        assert not (np.abs(local) < half - 1e-6).all(axis=1).any()  # and nothing is in it
         assert np.isfinite(local).all()
         assert over.any() or way == (-1, 0, 0)
 

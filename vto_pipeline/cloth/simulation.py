@@ -75,7 +75,7 @@ class Trajectory:
         report: seconds (wall), prepare_s (what the method made before), method, reason, substeps, steps,
             contact_rounds, simulated_s, energy_j, residual; with "rest" settled; error_mm where it is known; where the
             cloth is kept from itself start_pairs (of triangles that met), start_left (that still did after untangling)
-            and self_contact (a `collision.self_contact.Tally`, with saved_s).
+            and self_contact (a `collision.self_contact.Tally`, with saved_s); warnings, where anything is left.
         trace: Error against run time, where it is known.
     """
 
@@ -177,7 +177,10 @@ def simulate(
     )
     if stepper.self_contact is not None:
         tally = stepper.self_contact.tally
+        if tally.uncut:
+            job.warn(f"{tally.uncut} pairs were met by what moves where nothing could give way")
         report.update(self_contact={**asdict(tally), "saved_s": tally.saved_s})
+    report.update(warnings=tuple(job.warnings))
     return Trajectory(state.positions, state.velocities, report, trace)
 
 

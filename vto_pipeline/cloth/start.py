@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vto_pipeline.cloth.untangle import untangle
-from vto_pipeline.geometry.intersections import intersecting_faces, self_intersections
+from vto_pipeline.geometry.intersections import intersecting_faces, meeting_vertices, self_intersections
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -58,11 +58,4 @@ def free_start(
         positions, left, remaining = untangled.positions, untangled.pairs, untangled.left
     elif count > 0:
         job.warn(f"{count} pairs of triangles of the start meet: more than can be untangled before it moves")
-    return Start(positions, count, remaining, vertices_of(left, faces, len(positions)))
-
-
-def vertices_of(pairs: IntArray, faces: IntArray, count: int) -> NDArray[np.bool_]:
-    """Return which of so many vertices belong to faces in these pairs, shape (V,)."""
-    found = np.zeros(count, np.bool_)
-    found[faces[pairs.reshape(-1)]] = True
-    return found
+    return Start(positions, count, remaining, meeting_vertices(left, faces, len(positions)))

@@ -34,6 +34,13 @@ def self_intersections(mesh: TriangleMesh) -> IntArray:
     return _meeting_pairs(vertices, faces, np.full(len(faces), 2, np.int8))
 
 
+def meeting_vertices(pairs: IntArray, faces: IntArray, count: int) -> NDArray[np.bool_]:
+    """Return which of so many vertices belong to faces in these pairs, shape (count,)."""
+    found = np.zeros(count, np.bool_)
+    found[faces[pairs.reshape(-1)]] = True
+    return found
+
+
 def _meeting_pairs(vertices: FloatArray, faces: IntArray, side: NDArray[np.int8]) -> IntArray:
     corners = vertices[faces]
     low, high = corners.min(axis=1), corners.max(axis=1)

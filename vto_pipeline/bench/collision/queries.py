@@ -28,7 +28,7 @@ from vto_pipeline.numerics.distance import blend, closest_on_segments, closest_o
 from vto_pipeline.numerics.threads import limited_threads
 from vto_pipeline.numerics.vector import axpy, load_at, norm, scale, sub
 
-_PEER_BUDGET = 5.0  # s for each row; a tenth when quick
+_PEER_BUDGET = 5.0  # s for each row; a fiftieth when quick
 _PEER_TOLERANCE, _PEER_ITERATIONS = 1e-6, 100_000  # its default; a hundredth of its default
 _TOLD = 0.1  # of the time: less than this beside the cost of calling is not measured
 _GAPS = (2**40, 2**30, 2**20, 2**10, 1)  # of 2^40
@@ -61,7 +61,7 @@ def query_rows(quick: bool, watch: Watch) -> Iterator[Row]:
         settings: dict[str, Value] = {} if family.gap is None else {"gap_share": family.gap}
         yield watch.row(family.scene, "planes", settings, count, partial(_ours, family, count))
         if peer and family.cloth:
-            budget = 0.1 * _PEER_BUDGET if quick else _PEER_BUDGET
+            budget = 0.02 * _PEER_BUDGET if quick else _PEER_BUDGET
             yield watch.row(family.scene, "tight_inclusion", settings, count, partial(_peers, family, count, budget))
 
 

@@ -19,7 +19,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from vto_pipeline.numerics.vector import axpy, dot, load, norm, scale, store, sub, unit
+from vto_pipeline.cloth.collision.plane import plane_at
+from vto_pipeline.numerics.vector import axpy, dot, load, norm, store, sub, unit
 
 _PAIRS = np.int64(1) << 40  # keys from here on are of pairs, those under it of planes
 
@@ -106,17 +107,13 @@ def active_set(contacts, pairs, t0, t1, inverse_mass, x, guess, before):
         for i in range(len(x)):
             if not contacts.active[s, i] or inverse_mass[i] == 0.0:
                 continue
-            p0, p1 = load(contacts.point[s, i], 0), load(contacts.point[s, i], 1)
-            n0, n1 = load(contacts.normal[s, i], 0), load(contacts.normal[s, i], 1)
-            away = sub(p1, p0)
-            normal = unit(axpy(t1, sub(n1, n0), n0))
-            offset = contacts.offset[s, i, 0] + t1 * (contacts.offset[s, i, 1] - contacts.offset[s, i, 0])
+            normal, place, offset, carried = plane_at(contacts, s, i, t0, t1)
             found.key[count] = s * len(x) + i
             found.vertices[count, 0], found.weights[count, 0] = i, 1.0
-            found.level[count] = dot(normal, axpy(t1, away, p0)) + offset
+            found.level[count] = dot(normal, place) + offset
             found.friction[count] = contacts.friction[s]
             store(found.normal, count, normal)
-            store(found.carried, count, scale(t1 - t0, away))
+            store(found.carried, count, carried)
             count += 1
     for p in range(len(pairs.key)):
         _take_pair(found, count, pairs, p)
@@ -193,14 +190,14 @@ def _recall(found, c, before, x, guess):
     if place < len(before.key) and before.key[place] == found.key[c]:
         found.force[c], found.sliding[c] = before.force[place], before.sliding[place]
         store(found.slide, c, load(before.slide, place))
-        store(found.rub, c, along(n, load(before.rub, place)))
+        store(found.rub, c, tangential(n, load(before.rub, place)))
     touched = found.force[c] > 0.0
     reached = dot(n, sum_at(found, c, x)) + dot(n, sum_at(found, c, guess))
     found.pushing[c] = reached < found.level[c] or touched
     if touched:
-        slip = along(n, load(found.slide, c))  # the normal has turned since
+        slip = tangential(n, load(found.slide, c))  # the normal has turned since
     else:  # it arrives: friction is against the way it comes
-        slip = along(n, sub(sum_at(found, c, guess), load(found.carried, c)))
+        slip = tangential(n, sub(sum_at(found, c, guess), load(found.carried, c)))
         found.sliding[c] = True
     found.sliding[c] &= norm(slip) > 0.0
     store(found.slide, c, unit(slip))
@@ -216,6 +213,15 @@ def sum_at(contacts, c, x):
 
 
 @njit(cache=True, error_model="numpy")
-def along(normal, a):
+def yields(contacts, c, inverse_mass):
+    """Return how far a unit of force times time squared moves what contact c keeps apart [1/kg]."""
+    total = 0.0
+    for s in range(4):
+        total += contacts.weights[c, s] ** 2 * inverse_mass[contacts.vertices[c, s]]
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def tangential(normal, a):
     """Return the part of a along the surface."""
     return axpy(-dot(normal, a), normal, a)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from vto_pipeline.cloth.collision.active_set import along, sum_at
+from vto_pipeline.cloth.collision.active_set import sum_at, tangential, yields
 from vto_pipeline.numerics.vector import axpy, dot, load, norm, scale, store, sub, unit
 
 _SOFT = 1e2  # times mass / h², of pairs
@@ -138,16 +138,14 @@ def keep_apart(contacts, inverse_mass, x, y, move):
     for c in range(len(contacts.key)):
         if not contacts.pushing[c]:
             continue
-        give = 0.0
-        for s in range(4):
-            give += contacts.weights[c, s] ** 2 * inverse_mass[contacts.vertices[c, s]]
+        give = yields(contacts, c, inverse_mass)
         if give == 0.0:
             continue
         n, now, moved = load(contacts.normal, c), sum_at(contacts, c, y), sum_at(contacts, c, move)
         shift = scale(contacts.level[c] - dot(n, now) - dot(n, moved), n)
         if contacts.friction[c] > 0.0 and not contacts.sliding[c]:
             way = sub(sub(now, sum_at(contacts, c, x)), load(contacts.carried, c))
-            shift = sub(shift, along(n, axpy(1.0, moved, way)))
+            shift = sub(shift, tangential(n, axpy(1.0, moved, way)))
         for s in range(4):
             i = contacts.vertices[c, s]
             store(move, i, axpy(contacts.weights[c, s] * inverse_mass[i] / give, shift, load(move, i)))
@@ -265,4 +263,4 @@ def _gap(contacts, c, y):
 def _slip(contacts, c, x, y):
     """Return how far contact c moved along the surface, against it [m]."""
     moved = sub(sub(sum_at(contacts, c, y), sum_at(contacts, c, x)), load(contacts.carried, c))
-    return along(load(contacts.normal, c), moved)
+    return tangential(load(contacts.normal, c), moved)

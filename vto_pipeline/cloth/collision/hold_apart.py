@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from vto_pipeline.cloth.collision.active_set import sum_at, yields
 from vto_pipeline.numerics.vector import add, axpy, dot, load, norm, scale, store, sub
 
 _SWEEPS = 20
@@ -26,12 +27,10 @@ def hold_apart(pairs, inverse_mass, start, x):
     pushed, rubbed = np.zeros(len(pairs.key)), np.zeros((len(pairs.key), 3))
     for _ in range(_SWEEPS):
         for p in range(len(pairs.key)):
-            give = 0.0
-            for s in range(4):
-                give += pairs.weights[p, s] ** 2 * inverse_mass[pairs.vertices[p, s]]
+            give = yields(pairs, p, inverse_mass)
             if give == 0.0:
                 continue
-            n, now, before = load(pairs.normal, p), _at(pairs, p, x), _at(pairs, p, start)
+            n, now, before = load(pairs.normal, p), sum_at(pairs, p, x), sum_at(pairs, p, start)
             push = max(0.0, pushed[p] + (pairs.gap[p] - dot(n, add(now, load(pairs.fixed, p)))) / give)
             slip = sub(sub(now, before), load(pairs.carried, p))
             slip = axpy(-dot(n, slip), n, slip)
@@ -45,12 +44,3 @@ def hold_apart(pairs, inverse_mass, start, x):
             for s in range(4):
                 i = pairs.vertices[p, s]
                 store(x, i, axpy(pairs.weights[p, s] * inverse_mass[i], shift, load(x, i)))
-
-
-@njit(cache=True, error_model="numpy")
-def _at(pairs, p, x):
-    """Return Σ w x of a pair."""
-    total = (0.0, 0.0, 0.0)
-    for s in range(4):
-        total = axpy(pairs.weights[p, s], load(x, pairs.vertices[p, s]), total)
-    return total

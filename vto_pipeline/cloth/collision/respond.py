@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from numba import njit, prange
 
+from vto_pipeline.cloth.collision.plane import plane_at
 from vto_pipeline.numerics.friction import friction_shift
-from vto_pipeline.numerics.vector import add, axpy, dot, load, norm, scale, store, sub, unit
+from vto_pipeline.numerics.vector import add, axpy, dot, load, norm, scale, store, sub
 
 _CHUNK = 512  # vertices a thread takes at a time
 
@@ -48,15 +49,11 @@ def _respond(x, v, start, inverse_mass, contacts, t0, t1, h, longest, finish, fi
         for s in range(len(contacts.friction)):
             if not contacts.active[s, i]:
                 continue
-            p0, p1 = load(contacts.point[s, i], 0), load(contacts.point[s, i], 1)
-            n0, n1 = load(contacts.normal[s, i], 0), load(contacts.normal[s, i], 1)
-            away = sub(p1, p0)
-            normal = unit(axpy(t1, sub(n1, n0), n0))
-            offset = contacts.offset[s, i, 0] + t1 * (contacts.offset[s, i, 1] - contacts.offset[s, i, 0])
-            push = offset - dot(normal, sub(here, axpy(t1, away, p0)))
+            normal, place, offset, carried = plane_at(contacts, s, i, t0, t1)
+            push = offset - dot(normal, sub(here, place))
             if push > 0.0:
                 here = axpy(push, normal, here)
-                slip = sub(sub(here, begin), scale(t1 - t0, away))
+                slip = sub(sub(here, begin), carried)
                 here = add(here, friction_shift(slip, normal, push, contacts.friction[s]))
         if finish:
             move = sub(here, begin)

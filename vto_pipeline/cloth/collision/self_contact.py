@@ -18,7 +18,7 @@ from vto_pipeline.cloth.collision.pairs import Pairs, against_bodies, near_pairs
 from vto_pipeline.cloth.collision.pieces import pieces
 from vto_pipeline.cloth.collision.reach import reach
 from vto_pipeline.cloth.collision.safe import safe_way
-from vto_pipeline.geometry.intersections import self_intersections
+from vto_pipeline.geometry.intersections import meeting_vertices, self_intersections
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.numerics import bvh
@@ -201,9 +201,7 @@ class SelfContact:
     def _release(self, x: FloatArray) -> None:
         """Let what no longer crosses anything take part."""
         faces = self._cloth.faces
-        still = np.zeros(len(x), np.bool_)
-        still[faces[self_intersections(TriangleMesh(x, faces)).reshape(-1)]] = True
-        self._crossed &= still
+        self._crossed &= meeting_vertices(self_intersections(TriangleMesh(x, faces)), faces, len(x))
         self._found = _NOTHING  # what was found without them no longer holds
 
     def _pairs(self, x: FloatArray, end: FloatArray, found: Candidates, recovery: float, apart: float) -> Pairs:

@@ -6,7 +6,8 @@ from math import sqrt
 
 from numba import njit, prange
 
-from vto_pipeline.numerics.vector import add, axpy, dot, load, scale, store, sub, unit
+from vto_pipeline.cloth.collision.plane import plane_at
+from vto_pipeline.numerics.vector import add, axpy, dot, load, scale, store, sub
 
 _CHUNK = 512  # vertices a thread takes at a time
 
@@ -37,16 +38,12 @@ def press(x, start, weights, contacts, t0, t1, pressed):
 @njit(cache=True, error_model="numpy")
 def _press_one(i, s, x, start, weight, contacts, t0, t1, pressed):
     here, before = load(x, i), load(pressed[s], i)
-    p0, p1 = load(contacts.point[s, i], 0), load(contacts.point[s, i], 1)
-    n0, n1 = load(contacts.normal[s, i], 0), load(contacts.normal[s, i], 1)
-    away = sub(p1, p0)
-    normal = unit(axpy(t1, sub(n1, n0), n0))
-    offset = contacts.offset[s, i, 0] + t1 * (contacts.offset[s, i, 1] - contacts.offset[s, i, 0])
-    lack = offset - dot(normal, sub(here, axpy(t1, away, p0)))
+    normal, place, offset, carried = plane_at(contacts, s, i, t0, t1)
+    lack = offset - dot(normal, sub(here, place))
     pushed = dot(before, normal)
     push = max(0.0, pushed + lack / weight)
     here = axpy(weight * (push - pushed), normal, here)
-    slip = sub(sub(here, load(start, i)), scale(t1 - t0, away))
+    slip = sub(sub(here, load(start, i)), carried)
     rubbed = axpy(-pushed, normal, before)
     wanted = axpy(-1.0 / weight, axpy(-dot(slip, normal), normal, slip), rubbed)
     length, most = sqrt(dot(wanted, wanted)), contacts.friction[s] * push

@@ -10,6 +10,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from vto_pipeline.cloth.build import ClothModel
+from vto_pipeline.cloth.collision.plane import plane_at
 from vto_pipeline.cloth.constraints.sweep import (
     linearise_one,
     rows_of,
@@ -19,7 +20,7 @@ from vto_pipeline.cloth.constraints.sweep import (
 )
 from vto_pipeline.cloth.solvers.iterated import ImplicitStep, Iterated
 from vto_pipeline.model.arrays import FloatArray, IntArray
-from vto_pipeline.numerics.vector import add, axpy, dot, load, norm, scale, store, sub, unit
+from vto_pipeline.numerics.vector import add, axpy, dot, load, norm, scale, store, sub
 
 
 class VertexDescent(Iterated):
@@ -130,18 +131,14 @@ def _move_vertex(i, x, start, forces, blocks, contacts, t0, t1):
 @njit(cache=True, error_model="numpy")
 def _before_plane(i, s, here, begin, inverse, contacts, t0, t1):
     """Return the minimum of a vertex's quadratic model in front of a plane, with Coulomb friction against its slip."""
-    p0, p1 = load(contacts.point[s, i], 0), load(contacts.point[s, i], 1)
-    n0, n1 = load(contacts.normal[s, i], 0), load(contacts.normal[s, i], 1)
-    away = sub(p1, p0)
-    normal = unit(axpy(t1, sub(n1, n0), n0))
-    offset = contacts.offset[s, i, 0] + t1 * (contacts.offset[s, i, 1] - contacts.offset[s, i, 0])
-    lack = offset - dot(normal, sub(here, axpy(t1, away, p0)))
+    normal, place, offset, carried = plane_at(contacts, s, i, t0, t1)
+    lack = offset - dot(normal, sub(here, place))
     if lack <= 0.0:
         return here
     give = _times(inverse, normal)
     push = lack / dot(normal, give)
     here = axpy(push, give, here)
-    slip = sub(sub(here, begin), scale(t1 - t0, away))
+    slip = sub(sub(here, begin), carried)
     slip = axpy(-dot(slip, normal), normal, slip)
     length = norm(slip)
     if length == 0.0:
