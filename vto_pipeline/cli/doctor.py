@@ -32,6 +32,7 @@ _MODULES = {
     "opencv-python-headless": "cv2",
     "pillow": "PIL",
     "pyamg": "pyamg",
+    "pymetis": "pymetis",
     "pycolmap": "pycolmap",
     "pydantic": "pydantic",
     "pyfqmr": "pyfqmr",

@@ -6,31 +6,34 @@ import numpy as np
 from numba import njit
 
 from vto_pipeline.cloth.build import ClothModel
-from vto_pipeline.cloth.collision.contacts import Contacts
+from vto_pipeline.cloth.collision.active_set import ActiveSet, sum_at
 from vto_pipeline.cloth.constraints.sweep import add_forces
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.numerics.vector import axpy, dot, load, norm, scale, store, sub
 from vto_pipeline.units import GRAVITY
 
-_TOUCHING = 1e-4  # m: nearer to its plane than this, a vertex may be held by it
+_TOUCHING = 1e-4  # m: what is farther apart bears nothing
+_SWEEPS = 200  # at most, to find what contacts bear
+_SETTLED = 1e-4  # of the forces: a sweep that changes less is the last
 
 
-def out_of_balance(model: ClothModel, positions: FloatArray, contacts: Contacts) -> float:
+def out_of_balance(model: ClothModel, positions: FloatArray, contacts: ActiveSet) -> float:
     """Return the left-over force, rms over the free vertices, as a share of a vertex's weight.
 
-    Internal forces and gravity, less what contact can bear: the push along the normal, and friction inside its cone.
+    Internal forces and gravity, less the most that contacts can bear: forces inside their friction cones, with bodies
+    and of the cloth with itself.
 
     Args:
         model: The cloth.
         positions: [m], shape (V, 3).
-        contacts: Planes, taken at the end of their span.
+        contacts: With what it may touch there.
     """
     forces = model.mass[:, None] * model.gravity
     add_forces(positions, model.constraints, forces)
-    _bear(forces, positions, contacts)
     free = model.inverse_mass > 0.0
     if not free.any():
         return 0.0
+    _bear(forces, positions, contacts, np.where(free, model.inverse_mass, 0.0))
     share = np.linalg.norm(forces[free], axis=1) / (model.mass[free] * GRAVITY)
     return float(np.sqrt(np.mean(share**2)))
 
@@ -40,20 +43,48 @@ def elastic_energy(model: ClothModel, positions: FloatArray) -> float:
     return float(add_forces(positions, model.constraints, np.zeros_like(positions)))
 
 
-@njit(cache=True)
-def _bear(forces, positions, contacts):  # type: ignore[no-untyped-def]
-    """Take from each force what its contacts can hold, in place."""
+@njit(cache=True, error_model="numpy")
+def _bear(forces, positions, contacts, inverse_mass):  # type: ignore[no-untyped-def]
+    """Take from the forces what contacts can bear, in place: projected Gauss-Seidel on Σ |force / mass|²."""
+    borne = np.zeros((len(contacts.key), 3))
+    total = 0.0
     for i in range(len(forces)):
-        f = load(forces, i)
-        for s in range(len(contacts.friction)):
-            if not contacts.active[s, i]:
+        total += norm(load(forces, i)) * inverse_mass[i]
+    for _ in range(_SWEEPS):
+        changed = 0.0
+        for c in range(len(contacts.key)):
+            n = load(contacts.normal, c)
+            if dot(n, sum_at(contacts, c, positions)) - contacts.level[c] > _TOUCHING:
                 continue
-            n = load(contacts.normal[s, i], 1)
-            gap = dot(n, sub(load(positions, i), load(contacts.point[s, i], 1))) - contacts.offset[s, i, 1]
-            push = -dot(f, n)
-            if gap > _TOUCHING or push <= 0.0:
+            pull, give, weight = (0.0, 0.0, 0.0), 0.0, 0.0
+            for s in range(4):
+                i = contacts.vertices[c, s]
+                per = contacts.weights[c, s] * inverse_mass[i] ** 2
+                pull, give = axpy(per, load(forces, i), pull), give + contacts.weights[c, s] * per
+                weight += abs(contacts.weights[c, s]) * inverse_mass[i]
+            if give == 0.0:
                 continue
-            f = axpy(push, n, f)
-            along, hold = norm(f), contacts.friction[s] * push
-            f = scale(1.0 - hold / along, f) if along > hold else (0.0, 0.0, 0.0)
-        store(forces, i, f)
+            before = load(borne, c)
+            after = _in_cone(axpy(-1.0 / give, pull, before), n, contacts.friction[c])
+            store(borne, c, after)
+            move = sub(after, before)
+            changed += weight * norm(move)
+            for s in range(4):
+                i = contacts.vertices[c, s]
+                if inverse_mass[i] > 0.0:
+                    store(forces, i, axpy(contacts.weights[c, s], move, load(forces, i)))
+        if changed <= _SETTLED * total:
+            break
+
+
+@njit(cache=True, error_model="numpy")
+def _in_cone(force, normal, friction):  # type: ignore[no-untyped-def]
+    """Return the push along the normal and the friction that go with it, of a force that is asked for."""
+    push = dot(force, normal)
+    if push <= 0.0:
+        return (0.0, 0.0, 0.0)
+    along = axpy(-push, normal, force)
+    asked = norm(along)
+    if asked > friction * push:
+        along = scale(friction * push / asked, along)
+    return axpy(push, normal, along)

@@ -16,6 +16,7 @@ from vto_pipeline.model.cloth import TraceRow
 _WINDOW = 0.1  # s of cloth time between looks
 _QUIET = 3  # looks in a row under the bound: an oscillating cloth stands still for an instant at each turn
 _COARSE = 2.0  # times the bound: waiting longer for a coarse answer, itself in error by more, is waste
+_STILL = 0.1  # times the bound: what moves no farther is at rest, whatever force a few contacts argue about
 _SLOWEST = 0.95  # a decay slower than this cannot be told from none
 
 
@@ -25,7 +26,7 @@ class SettleLimits:
 
     Args:
         error: Predicted distance to the state of rest, rms over vertices [m].
-        residual: Or left-over force, as a share of weight.
+        residual: And left-over force, as a share of weight, by methods whose state of rest is exact.
         seconds: Cloth time at most [s].
         finest: Steps per 1/60 s that are not refined further.
         deadline: `time.perf_counter` at which to stop; without effect on the result unless it is reached.
@@ -95,10 +96,11 @@ def settle(
         watch((result.state.time - state.time) / limits.seconds, result.error)
         first = coarse is None and not exact
         bound = _COARSE * limits.error if first else (1.0 if exact else 0.5) * limits.error
-        quiet = quiet + 1 if to_come < bound or result.residual < limits.residual else 0
+        balanced = result.residual < limits.residual or not exact or to_come < _STILL * bound
+        quiet = quiet + 1 if to_come < bound and balanced else 0
         if quiet < _QUIET:
             continue
-        if result.error < limits.error or result.residual < limits.residual:
+        if result.error < limits.error:
             result.settled = True
             break
         if 2 * stepper.substeps > limits.finest:

@@ -13,9 +13,11 @@ from pydantic import Field
 
 from vto_pipeline.cloth.balance import out_of_balance
 from vto_pipeline.cloth.build import ClothModel, ClothState
+from vto_pipeline.cloth.collision.active_set import active_set, no_contacts
 from vto_pipeline.cloth.collision.body import BodyCollider
 from vto_pipeline.cloth.collision.contacts import Collider, Round, gather, nothing
 from vto_pipeline.cloth.collision.hold_apart import hold_apart
+from vto_pipeline.cloth.collision.pairs import no_pairs
 from vto_pipeline.cloth.collision.self_contact import SelfContact
 from vto_pipeline.cloth.methods import FRAME, METHODS, Choice, Method, choose
 from vto_pipeline.cloth.solvers.newton import Newton
@@ -145,7 +147,10 @@ class Stepper:
 
     def residual(self, state: ClothState) -> float:
         """Return the out-of-balance force; see `balance.out_of_balance`."""
-        return out_of_balance(self._model, state.positions, self._contacts)
+        x, still = state.positions, np.zeros_like(state.positions)
+        pairs = no_pairs() if self.self_contact is None else self.self_contact.near(x, x, FRAME / self.substeps)
+        touched = active_set(self._contacts, pairs, 0.0, 1.0, self._model.inverse_mass, x, still, no_contacts(0))
+        return out_of_balance(self._model, x, touched)
 
     @property
     def rests_exactly(self) -> bool:

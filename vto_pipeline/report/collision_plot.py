@@ -111,7 +111,9 @@ def _sizes(axes: Axes, rows: Rows) -> None:
         across, up = np.log(np.array(points, dtype=np.float64)).T
         grows = f", exponent {np.polyfit(across, up, 1)[0]:.2f}" if len(set(across)) > 1 else ""
         look = look_of(k)
-        axes.loglog(*np.exp([across, up]), look.line, color=look.color, marker=look.marker, label=f"{scene}: {method}{grows}")
+        axes.loglog(
+            *np.exp([across, up]), look.line, color=look.color, marker=look.marker, label=f"{scene}: {method}{grows}"
+        )
     axes.set(title="broad and narrow phase", xlabel="vertices", ylabel="seconds a step")
     label_decades(axes.xaxis)
     label_decades(axes.yaxis)

@@ -8,6 +8,7 @@ from numba import njit
 from vto_pipeline.cloth.collision.active_set import sum_at, tangential, yields
 from vto_pipeline.numerics.vector import axpy, dot, load, norm, scale, store, sub, unit
 
+_HARD = 30.0  # times the stiffness of what lies on a plane
 _SOFT = 1e2  # times mass / h², of pairs
 _FIRM = 4.0  # last force / gap: with that stiffness, as much again would take a quarter of the gap
 _LOST = 0.5  # share of the gap; where more is lost, the spring was too soft for what it bears
@@ -102,7 +103,7 @@ def linked_contacts(contacts, held):
 
 @njit(cache=True, error_model="numpy")
 def _set_springs(contacts, mass, held, h, matrix):
-    """Make planes about as stiff as the cloth holds what they touch, and all much stiffer than inertia."""
+    """Make planes stiffer than the cloth holds what they touch, and all much stiffer than inertia."""
     for c in range(len(contacts.key)):
         give = stiff_give = 0.0
         lone = _is_against_other(contacts, c)
@@ -117,8 +118,8 @@ def _set_springs(contacts, mass, held, h, matrix):
         if give == 0.0:  # nothing of it can move
             contacts.spring[c] = contacts.lift[c] = 0.0
         elif lone:
-            contacts.spring[c] = 1.0 / stiff_give
-            contacts.lift[c] = 0.0 if is_single(contacts, c) else contacts.force[c] * stiff_give
+            contacts.spring[c] = _HARD / stiff_give
+            contacts.lift[c] = contacts.force[c] / contacts.spring[c]
         else:
             borne = _FIRM * contacts.force[c] / max(contacts.level[c], _NO_LENGTH)
             contacts.spring[c] = min(1.0 / stiff_give, max(1.0 / give, borne))
@@ -202,7 +203,7 @@ def revise(contacts, x, y, allowed):
     Args:
         contacts: Changed in place.
         x, y: Positions at the begin and at the end of the step [m], shape (V, 3).
-        allowed: How far a contact may be crossed, or left by what pushes, without being put right [m].
+        allowed: How far a contact may be crossed without being put right [m].
 
     Returns:
         The forces that were not as they should be, as a share of those that pushed.
@@ -219,7 +220,7 @@ def revise(contacts, x, y, allowed):
                 amiss += -contacts.spring[c] * gap if gap < -allowed else 0.0
             continue
         if gap > 0.0:
-            amiss += contacts.force[c] if gap > allowed else 0.0
+            amiss += contacts.spring[c] * gap  # what pushes does not pull
             contacts.pushing[c] = contacts.sliding[c] = False
             contacts.force[c] = contacts.lift[c] = 0.0
             store(contacts.rub, c, (0.0, 0.0, 0.0))

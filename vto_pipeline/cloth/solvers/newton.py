@@ -3,8 +3,8 @@
 Each step minimises ½ |y - x̃|²_M / h² + E(y) over the positions y, x̃ being where the cloth would go without forces
 (Martin et al. 2011, eq. 3). One Newton iteration from the begin of the step is the scheme of Baraff & Witkin 1998. It
 is enough while the objective falls as a parabola does; where cloth turns, or is thrown about, more are made. The
-stiffness is positive semidefinite (`cloth.stiffness`), the systems are solved by conjugate gradients with multigrid,
-and contacts are part of them.
+stiffness is positive semidefinite (`cloth.stiffness`), the systems are solved by `linear_system`, and contacts are part
+of them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from vto_pipeline.cloth.build import ClothModel, ClothState
 from vto_pipeline.cloth.collision.active_set import ActiveSet, active_set, no_contacts, taken_on
@@ -34,17 +33,16 @@ from vto_pipeline.cloth.collision.self_contact import SelfContact
 from vto_pipeline.cloth.constraints.rigid import refuse_rigid
 from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM, add_damping_forces, add_forces
 from vto_pipeline.cloth.losses import own, recall, remember, slip
+from vto_pipeline.cloth.solvers.linear_system import LinearSystem
+from vto_pipeline.cloth.solvers.momentum import keep_momentum, pieces
 from vto_pipeline.cloth.stiffness import Stiffness
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.numerics.block_matrix import BlockMatrix, row_times
-from vto_pipeline.numerics.linear import pcg
-from vto_pipeline.numerics.links import link, pull, pull_back
-from vto_pipeline.numerics.multigrid import Hierarchy, hierarchy, update
+from vto_pipeline.numerics.block_matrix import row_times
+from vto_pipeline.numerics.links import pull, pull_back
+from vto_pipeline.numerics.multigrid import Hierarchy
 
 _LEFT = 6.0  # 1/s: share of the forces at the begin of a step left by a linear solve, times h, so errors fall with h
 _OF_WEIGHT = 0.3  # share of the weight that counts as force where cloth is in balance
-_CYCLES = 30  # at most, of a linear solve
-_MORE_CYCLES = 200  # where that was not enough to go down
 _ENOUGH = 3  # Newton iterations of a step that comes down by full moves
 _HARDEST = 20  # Newton iterations at most, of a step that will not come down
 _BENT = 0.06  # 1/s: share of the motion's energy that curvature left out by an iteration may cost in a second
@@ -52,9 +50,8 @@ _SLIGHT = 10.0  # times what is allowed: a fall that is not worth a second way d
 _SHORTEST = 1e-10  # share of a Newton step: from a point, cloth begins to grow by a millionth of its edges
 _ROUNDING = 1e-9  # relative change of the objective that is no change
 _CONTACT_ROUNDS = 4  # solutions with a revised set of contacts, an iteration
-_CHANGED = 0.05  # of the contact forces: amiss by less, their set is good enough
+_CHANGED = 0.01  # of the contact forces: amiss by less, their set is good enough
 _EXTENSIONS = 2  # times an iteration is solved again with what it would have passed through
-_NO_MASS = 1e-300  # kg
 _CROSSED = 0.01  # of an edge: how far a plane may be crossed without solving again
 
 
@@ -98,10 +95,10 @@ class Newton:
         self._checked = False
         self._held = model.inverse_mass == 0.0
         self._stiffness = Stiffness(model)
-        self._levels = hierarchy(self._stiffness.matrix, self._held)
-        self._stiffness.write_to(self._levels.matrix.blocks[: self._levels.slots[1]])
+        self._system = LinearSystem(self._stiffness.matrix, self._held)
+        self._stiffness.write_to(self._system.blocks)
         self._active: ActiveSet = no_contacts(0)
-        self._loose = _pieces(self._stiffness.matrix, self._held)
+        self._pieces = pieces(self._stiffness.matrix, self._held)
         self._allowed = 0.0  # what a step may cost in energy by being solved in part [J]
         self._whole = np.zeros((len(model.mass), 3))  # what the residuals of a step are measured against [N]
 
@@ -134,7 +131,7 @@ class Newton:
         target = x + move + (~held)[:, None] * (h * h * model.gravity)
         itself = self.self_contact
         pairs = no_pairs() if itself is None else itself.near(start, target, h)
-        self._active = active_set(contacts, pairs, t0, t1, model.inverse_mass, start, target - start, self._active)
+        self._active = active_set(contacts, pairs, t0, t1, model.inverse_mass, start, move, self._active)
         if led.any():  # what they pull at their neighbours by being led is no measure
             forces = model.mass[:, None] * model.gravity
             add_forces(start, model.constraints, forces)
@@ -181,7 +178,7 @@ class Newton:
                 break
             after = self._iterate(x, done.y, target, zero, h)
             if after.share == 0.0:
-                after = self._iterate(x, done.y, target, zero, h, _MORE_CYCLES)
+                after = self._iterate(x, done.y, target, zero, h, exactly=True)
             if after.share == 0.0:
                 break
             done = after
@@ -194,8 +191,8 @@ class Newton:
         target: FloatArray,
         guess: FloatArray,
         h: float,
-        cycles: int = _CYCLES,
         *,
+        exactly: bool = False,
         measured: bool = False,
     ) -> _Iteration:
         """Take a Newton iteration from y, of a step of time from x.
@@ -205,11 +202,12 @@ class Newton:
             target: Where vertices would go without forces [m], shape (V, 3).
             guess: Of the move from y [m], shape (V, 3).
             h: Step [s].
-            cycles: Iterations of the linear solver at most.
+            exactly: Whether its system is to be solved to rounding.
             measured: Whether it is known what residuals are measured against.
         """
-        model, levels = self._model, self._levels
+        model, system = self._model, self._system
         matrix = self._stiffness.assemble(y, 1.0 / (h * h), 1.0, 1.0 / h)
+        system.uncouple()
         forces = (model.mass / (h * h))[:, None] * (target - y)
         energy = add_forces(y, model.constraints, forces)
         if y is not x:
@@ -218,7 +216,7 @@ class Newton:
         if y is x:
             if not measured:  # in the cloth's own frame: speed is no force
                 self._whole = self._unbalanced(forces - (model.mass / (h * h))[:, None] * guess)
-            guess = _better(levels, forces, guess, guess + (~self._held)[:, None] * (h * h * model.gravity))
+            guess = _better(system.levels, forces, guess, guess + (~self._held)[:, None] * (h * h * model.gravity))
         elif self._sweeps > 1:  # who asks for more wants to get to the end
             self._whole = forces
         bare = matrix.blocks[matrix.diagonal]
@@ -228,10 +226,11 @@ class Newton:
             right = forces.copy()
             touches = len(self._active.key) > 0
             if touches:
-                levels = self._couple(levels, matrix, bare, right, h, x, y)
+                matrix.blocks[matrix.diagonal] = bare
+                between = system.couple(*linked_contacts(self._active, self._held))
+                add_contacts(self._active, model.mass, self._held, h, x, y, matrix, right, between)
                 keep_apart(self._active, model.inverse_mass, x, y, move)
-            update(levels)
-            pcg(levels, right, move, self._whole, _LEFT * h, cycles, True)
+            system.solve(right, move, self._whole, _LEFT * h, exactly=exactly or touches)
             rounds -= 1
             self._keep_momentum(move, target - y)
             if touches:
@@ -243,33 +242,8 @@ class Newton:
                 break
             extensions -= 1
             rounds = max(rounds, 1)
-        foreseen = -_quadratic(levels, right, move)
+        foreseen = -_quadratic(system.levels, right, move)
         return self._shortened(y, target, move, h, energy, pushes, foreseen)
-
-    def _couple(
-        self,
-        levels: Hierarchy,
-        matrix: BlockMatrix,
-        bare: FloatArray,
-        right: FloatArray,
-        h: float,
-        x: FloatArray,
-        y: FloatArray,
-    ) -> Hierarchy:
-        """Return the levels with the contacts that push in them.
-
-        Args:
-            levels: Without.
-            matrix: The first of them; its diagonal is put back to `bare` (V, 3, 3) first.
-            right: Forces [N], shape (V, 3), changed in place.
-            h: Step [s].
-            x, y: Positions at the begin of the step and now [m], shape (V, 3).
-        """
-        matrix.blocks[matrix.diagonal] = bare
-        vertices, weights = linked_contacts(self._active, self._held)
-        links = link(vertices, weights, levels.up, levels.rows)
-        add_contacts(self._active, self._model.mass, self._held, h, x, y, matrix, right, links.blocks)
-        return levels._replace(links=links)
 
     def _take_on(self, x: FloatArray, end: FloatArray) -> bool:
         """Add what a move from x to end would pass through to the contacts; return whether there was any."""
@@ -285,16 +259,8 @@ class Newton:
 
         Pieces that push each other count as one.
         """
-        if self._loose is None:
-            return
-        pieces, loose = self._loose.joined(self._active)
-        if not loose.any():
-            return
-        mass = self._model.mass
-        whole = np.bincount(pieces, mass)
-        for k in range(3):
-            missing = np.bincount(pieces, mass * (wanted[:, k] - move[:, k]))
-            move[:, k] += np.where(loose, missing / np.maximum(whole, _NO_MASS), 0.0)[pieces]
+        if self._pieces is not None:
+            keep_momentum(self._pieces, self._active, self._model.mass, move, wanted)
 
     def _shortened(
         self,
@@ -332,49 +298,6 @@ class Newton:
     def _inertia(self, y: FloatArray, target: FloatArray, h: float) -> float:
         off = y - target
         return float(0.5 / (h * h) * np.einsum("i,ij,ij->", self._model.mass, off, off))
-
-
-class _Pieces(NamedTuple):
-    """What of the cloth hangs together.
-
-    Args:
-        of: The piece of each vertex, shape (V,).
-        held: Whether anything holds a piece, shape (P,).
-    """
-
-    of: NDArray[np.int32]
-    held: NDArray[np.bool_]
-
-    def joined(self, contacts: ActiveSet) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-        """Return pieces, and whether nothing holds them, where those that push each other are one."""
-        from scipy.sparse import csr_array
-        from scipy.sparse.csgraph import connected_components
-
-        pushing = contacts.pushing
-        if not pushing.any():
-            return self.of, ~self.held
-        count = len(self.held)
-        ends = self.of[contacts.vertices[pushing]]
-        used = contacts.weights[pushing] != 0.0
-        rows, columns = np.broadcast_to(ends[:, :1], ends.shape)[used], ends[used]
-        groups, group = connected_components(csr_array((np.ones(len(rows), np.int8), (rows, columns)), (count, count)))
-        held = np.zeros(groups, np.bool_)
-        held[group[self.held]] = True
-        outside = np.abs(contacts.weights[pushing].sum(axis=1)) > 0.5  # a place is held, not a way between two
-        held[group[ends[outside, 0]]] = True
-        return group[self.of], ~held
-
-
-def _pieces(matrix: BlockMatrix, held: NDArray[np.bool_]) -> _Pieces | None:
-    """Return the pieces of a cloth, None if all are held somewhere."""
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import connected_components
-
-    count = len(held)
-    ones = np.ones(len(matrix.columns), np.int8)
-    pieces = connected_components(csr_array((ones, matrix.columns, matrix.starts), shape=(count, count)))[1]
-    pinned = np.bincount(pieces, held) > 0
-    return None if pinned.all() else _Pieces(pieces, pinned)
 
 
 def _better(levels: Hierarchy, right: FloatArray, one: FloatArray, other: FloatArray) -> FloatArray:
