@@ -6,6 +6,8 @@ import numpy as np
 import trimesh
 from scipy.spatial import ConvexHull
 
+from vto_pipeline.model.body import Avatar
+
 
 def crossing(vertices: np.ndarray, faces: np.ndarray) -> bool:
     """Whether a mesh passes through itself, by ipctk's exact test."""
@@ -32,3 +34,48 @@ def inside(points: np.ndarray, vertices: np.ndarray, faces: np.ndarray) -> np.nd
     det = (a * np.cross(b, c)).sum(axis=2)
     half = np.arctan2(det, la * lb * lc + (a * b).sum(2) * lc + (b * c).sum(2) * la + (c * a).sum(2) * lb)
     return half.sum(axis=1) / (2 * np.pi) > 0.5
+
+
+def slice_body(body: Avatar) -> dict[str, float]:
+    """Measure a body in its bind pose by trimesh's sections and the hull of their loops [m], and its volume [m3].
+
+    Only the levels and the landmarks are taken from the body; girths of trunk, legs and left arm, lengths, heights.
+    """
+    v, loops = body.bind_vertices, body.loops
+    mesh = trimesh.Trimesh(v, body.faces, process=False)
+    at = {name: v[vertex] for name, vertex in body.landmarks.items()}
+    out = {}
+    for name in ("head", "neck", "chest", "underbust", "waist", "navel", "high_hip", "hip"):
+        # the hip's tape goes round both legs where it lies below the crotch
+        reach = np.abs(v[loops[name], 0]).max() + 0.01
+        out[f"{name}_girth"] = _taut(mesh, v[loops[name]].mean(axis=0), np.array([0.0, 1.0, 0.0]), reach)
+        out[f"{name}_height"] = v[loops[name], 1].mean() - v[:, 1].min()
+    for name in ("thigh", "knee", "calf", "ankle"):
+        out[f"{name}_girth"] = _taut(mesh, v[loops[f"left_{name}"]].mean(axis=0), np.array([0.0, 1.0, 0.0]))
+    along = v[loops["left_wrist"]].mean(axis=0) - v[loops["left_upper_arm"]].mean(axis=0)
+    for name in ("upper_arm", "elbow", "forearm", "wrist"):
+        out[f"{name}_girth"] = _taut(mesh, v[loops[f"left_{name}"]].mean(axis=0), along / np.linalg.norm(along))
+    arm = np.array([at[f"left_{name}"] for name in ("shoulder_point", "elbow_point", "wrist_point")])
+    return out | {
+        "stature": np.ptp(v[:, 1]),
+        "inside_leg": at["crotch_point"][1] - v[:, 1].min(),
+        "back_neck_height": at["back_neck"][1] - v[:, 1].min(),
+        "shoulder_height": at["left_shoulder_point"][1] - v[:, 1].min(),
+        "knee_height": v[loops["left_knee"], 1].mean() - v[:, 1].min(),
+        "back_shoulder_width": np.linalg.norm(at["left_shoulder_point"] - at["right_shoulder_point"]),
+        "outer_arm_length": np.linalg.norm(np.diff(arm, axis=0), axis=1).sum(),
+        "volume": mesh.volume if mesh.is_watertight else np.nan,
+    }
+
+
+def _taut(mesh: trimesh.Trimesh, origin: np.ndarray, normal: np.ndarray, reach: float | None = None) -> float:
+    """Perimeter of the hull of the section's loop about the origin, or of all within `reach` of the median plane."""
+    # a hair off the row: a plane through vertices is ambiguous for any slicer
+    origin = origin + 1e-5 * normal
+    loops = mesh.section(normal, origin).discrete
+    if reach is None:
+        points = min(loops, key=lambda loop: np.linalg.norm(loop.mean(axis=0) - origin))
+    else:
+        points = np.concatenate([loop for loop in loops if abs(loop[:, 0].mean()) < reach])
+    flat = trimesh.transform_points(points, trimesh.geometry.plane_transform(origin, normal))
+    return ConvexHull(flat[:, :2]).area

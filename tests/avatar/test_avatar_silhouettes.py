@@ -6,14 +6,19 @@ import numpy as np
 import pytest
 import trimesh
 from numpy.testing import assert_allclose
+from scipy.spatial import cKDTree
 
+from vto_pipeline.avatar.backdrop import person
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.from_silhouettes import SilhouettesConfig, fit_silhouettes
 from vto_pipeline.avatar.measure import measure
+from vto_pipeline.avatar.outline import Camera, ImageOutline, model_outline
+from vto_pipeline.avatar.template import template
 from vto_pipeline.errors import AvatarError
 from vto_pipeline.model.body import Avatar, Measurements
 from vto_pipeline.model.frames import Silhouettes
 from vto_pipeline.model.job import Job
+from vto_pipeline.render.rasterise import rasterise
 
 TRUTH = {"stature": 1.68, "chest_girth": 0.96, "waist_girth": 0.80, "hip_girth": 1.03}
 SIZE, FOCAL, DISTANCE, CAMERA_HEIGHT = (480, 360), 480.0, 2.5, 1.0
@@ -36,21 +41,91 @@ def photograph(body: Avatar, yaw: float) -> np.ndarray:
     return np.clip(image + rng.normal(0, 4, image.shape), 0, 255).astype(np.uint8)
 
 
+def test_the_rim_is_where_a_rasteriser_puts_it() -> None:
+    body = template(0.3)
+    camera = Camera(960.0, 720, 960)
+    placed = body.vertices - [0.0, 0.8, 2.5]
+    rim = model_outline(placed, body.faces, camera)
+    corners = np.dstack([camera.project(placed)[body.faces], -placed[body.faces][:, :, 2]])
+    mask = rasterise(np.ascontiguousarray(corners), 720, 960)[0] >= 0
+    seen = ImageOutline(mask)
+    away, ahead = seen.distance(rim.at)
+    assert_allclose(away, 0.0, rtol=0, atol=1.2)  # pixels are squares: half a diagonal, and a little at corners
+    assert abs(away.mean()) < 0.1, "neither inside nor outside on the whole"
+    assert ((ahead * rim.normals).sum(axis=1) > 0.7).all()
+    missed = cKDTree(rim.at).query(seen.points)[0]
+    assert missed.max() < 6.0, "the whole rim: no farther than half an edge"
+
+
+def test_pull_back_is_the_derivative_of_the_projection() -> None:
+    rng = np.random.default_rng(1)
+    points, normals = rng.normal(size=(9, 3)) * [0.5, 0.8, 0.2] - [0, 0, 2.5], rng.normal(size=(9, 2))
+    camera, step = Camera(800.0, 640, 480), 1e-6
+    slope = [
+        ((camera.project(points + step * e) - camera.project(points - step * e)) * normals).sum(axis=1) / (2 * step)
+        for e in np.eye(3)
+    ]
+    assert_allclose(camera.pull_back(points, normals), np.stack(slope, axis=1), rtol=1e-6, atol=1e-5)
+
+
+def views(body: Avatar) -> tuple[np.ndarray, np.ndarray]:
+    return photograph(body, 0.0), photograph(body, np.pi / 2)
+
+
+NAMES = Silhouettes(Path("front.png"), Path("side.png"), TRUTH["stature"])
+
+
 def test_intervals_hold_the_truth() -> None:
     body = fit_measurements(Measurements(TRUTH, sex="female"))
+    true = measure(body).values
     job = Job()
-    names = Silhouettes(Path("front.png"), Path("side.png"), TRUTH["stature"])
-    config = SilhouettesConfig(sex="female", distance_m=DISTANCE, camera_height_m=CAMERA_HEIGHT)
-    fitted = fit_silhouettes(names, photograph(body, 0.0), photograph(body, np.pi / 2), config, job)
+    fitted = fit_silhouettes(NAMES, *views(body), SilhouettesConfig(sex="female"), job)
     for name in ("chest_girth", "waist_girth", "hip_girth"):
         half = job.metrics[f"{name}_interval_mm"] * 1e-3
-        assert 0.01 < half < 0.09, "as wide as the literature says, no wider"
-        assert abs(job.metrics[f"{name}_m"] - TRUTH[name]) < half, name
-        assert_allclose(measure(fitted).values[name], job.metrics[f"{name}_m"], rtol=0, atol=0.02)
-    assert_allclose(measure(fitted).values["stature"], TRUTH["stature"], rtol=0, atol=1e-3)
+        assert 0.02 < half < 0.09, "as wide as the literature says, no wider"
+        assert abs(job.metrics[f"{name}_m"] - true[name]) < half, name
+        assert_allclose(measure(fitted).values[name], job.metrics[f"{name}_m"], rtol=0, atol=0.002)
+    assert_allclose(measure(fitted).values["stature"], TRUTH["stature"], rtol=0, atol=0.01)
+    assert job.metrics["front_outline_mm"] < 8
+    assert job.metrics["side_outline_mm"] < 8
 
 
-def test_an_empty_backdrop_is_told() -> None:
-    image = np.random.default_rng(0).normal(180, 3, (200, 150, 3)).clip(0, 255).astype(np.uint8)
-    with pytest.raises(AvatarError, match="backdrop"):
-        fit_silhouettes(Silhouettes(Path("f.png"), Path("s.png"), 1.7), image, image)
+@pytest.mark.slow  # fits the pictures both ways round
+def test_swapped_pictures_are_told() -> None:
+    front, side = views(fit_measurements(Measurements(TRUTH, sex="female")))
+    with pytest.raises(AvatarError, match="swapped"):
+        fit_silhouettes(NAMES, side, front, SilhouettesConfig(sex="female"))
+
+
+def backdrop(noise: float = 3.0) -> np.ndarray:
+    light = 180 + np.linspace(-15, 15, 150)[None, :, None]
+    return (light + np.random.default_rng(0).normal(0, noise, (200, 150, 3))).clip(0, 255).astype(np.uint8)
+
+
+def with_figure(*boxes: tuple[int, int, int, int]) -> np.ndarray:
+    image = backdrop()
+    for top, bottom, left, right in boxes:
+        image[top:bottom, left:right] = (90, 70, 60)
+    return image
+
+
+def test_the_person_is_cut_out_to_the_pixel_before_a_shaded_backdrop() -> None:
+    mask = person(with_figure((20, 190, 50, 90)), "f.png")
+    true = np.zeros((200, 150), dtype=bool)
+    true[20:190, 50:90] = True
+    assert (mask != true).sum() <= 4  # rounded corners
+
+
+@pytest.mark.parametrize(
+    ("image", "problem"),
+    [
+        (backdrop(), "nothing stands out"),
+        (with_figure((40, 200, 50, 90)), "cut off at the picture's bottom"),
+        (with_figure((0, 190, 50, 90)), "cut off at the picture's top"),
+        (with_figure((20, 190, 10, 50), (30, 190, 90, 130)), "2 things of a person's size"),
+        (with_figure((90, 130, 50, 90)), "40 of 200 pixels tall"),
+    ],
+)
+def test_bad_pictures_are_told(image: np.ndarray, problem: str) -> None:
+    with pytest.raises(AvatarError, match=problem):
+        person(image, "f.png")

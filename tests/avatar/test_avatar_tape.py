@@ -89,3 +89,13 @@ def test_names() -> None:
     with pytest.raises(InputError, match="waste_girth"):
         definition("waste_girth")
     assert len(DEFINITIONS) >= 30
+
+
+def test_chest_girth_is_continuous_where_the_arms_begin() -> None:
+    body = template(0.0)
+    tape = Tape(body)
+    rise = body.vertices[body.landmarks["left_armpit_point"], 1] - body.vertices[body.loops["chest"], 1].mean()
+    levels = np.arange(rise - 0.02, rise + 0.04, 0.001)
+    girths = [tape._across(DEFINITIONS["chest_girth"], body.vertices, "left", level).value for level in levels]
+    # a trunk tapers by some millimetres of girth per millimetre of height; an arm's flesh would add 90 at once
+    assert np.abs(np.diff(girths)).max() < 0.010

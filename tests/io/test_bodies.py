@@ -183,3 +183,47 @@ def test_a_damaged_avatar_is_refused(tmp_path: Path, change: dict[str, np.ndarra
     with pytest.raises(InputError) as caught:
         read_avatar(tmp_path / "avatar.npz")
     assert problem in caught.value.problem
+
+
+@pytest.mark.parametrize(
+    ("sex", "size", "chest_m"),
+    [
+        ("male", "M", 0.98),
+        ("female", "m", 0.94),
+        ("female", "4XL", 1.49),
+        ("male", "XXXL", 1.35),
+        ("female", "XS", 0.78),
+    ],
+)
+def test_letter_of_en_13402_is_the_middle_of_its_chest(sex: str, size: str, chest_m: float) -> None:
+    body = read_measurements({"sex": sex, "size": size, "measurements": {"stature": 170}})
+    assert body.values == {"stature": 1.70, "chest_girth": pytest.approx(chest_m, abs=1e-12)}
+
+
+def test_letter_beside_a_chest() -> None:
+    given = {"sex": "male", "size": "M", "unit": "in", "measurements": {"Chest girth": 38.0}}
+    assert read_measurements(given).values == {"chest_girth": pytest.approx(38 * 0.0254, abs=1e-12)}
+    with pytest.raises(InputError, match=r"size M is a chest of 0.94 to 1.02 m, but a chest of 1.118 m is given"):
+        read_measurements(given | {"measurements": {"Chest girth": 44.0}})
+
+
+@pytest.mark.parametrize(
+    ("document", "says"),
+    [
+        ({"size": "M"}, "letters differ between women and men"),
+        ({"sex": "male", "size": "huge"}, "size 'huge' is not known; wanted XXS"),
+        ({"sex": "male"}, "neither measurements nor size"),
+    ],
+)
+def test_letters_that_say_nothing(document: dict[str, object], says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        read_measurements(document)
+
+
+def test_titles_of_iso_8559() -> None:
+    written = {"Back neck point to waist": 41.0, "Upper-arm girth": 28.0, "Across front width": 33.0}
+    assert set(read_measurements({"measurements": written}).values) == {
+        "back_neck_to_waist",
+        "upper_arm_girth",
+        "across_front_width",
+    }

@@ -21,7 +21,8 @@ from vto_pipeline.model.arrays import FloatArray
 _ROUNDS = 150
 _STEP = 0.5
 _MAX_MOVE_M = 0.01
-_CROTCH_REACH_M = 0.035
+_SEAM_REACH_M = 0.035
+_SEAM_ROUNDS = 12
 
 
 def build(path: Path) -> None:
@@ -62,9 +63,11 @@ def settle(plan: BodyPlan) -> tuple[Grid, FloatArray]:
         points = _pull(plan, points + move - _along(normal, move), planes, mirror)
     for _ in range(8):
         points = _pull(plan, points, planes, mirror)
-    near = np.linalg.norm(points[:, None] - points[grid.rows["crotch"]], axis=2).min(axis=1)
-    share = np.exp(-((near / _CROTCH_REACH_M) ** 2))[:, None]
-    for _ in range(20):
+    # where trunk and legs were laid out apart, no edge may show
+    seam = points[np.concatenate([grid.rows["crotch"], grid.rows["seam"]])]
+    near = np.linalg.norm(points[:, None] - seam, axis=2).min(axis=1)
+    share = np.exp(-((near / _SEAM_REACH_M) ** 2))[:, None]
+    for _ in range(_SEAM_ROUNDS):
         move = _STEP * share * (smooth @ points - points)
         points = points + move - _along(planes, move)
         points[mirror, 0] = 0.0

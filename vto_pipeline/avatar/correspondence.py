@@ -41,9 +41,17 @@ class Pairs:
 
 
 class Target:
-    """A scan prepared for closest points."""
+    """A scan prepared for closest points.
 
-    def __init__(self, scan: TriangleMesh, probes: int, seed: int) -> None:
+    Args:
+        scan: In metres, +Y up.
+        probes: Points of it that are matched with the model.
+        seed: Of their places.
+        outside: What a point of the scan outside the model counts; less than 1 where clothes lie on the body.
+    """
+
+    def __init__(self, scan: TriangleMesh, probes: int, seed: int, outside: float = 1.0) -> None:
+        self._outside = outside
         self.vertices, self.faces = scan.vertices, scan.faces
         self.face_normals = face_normals(scan)
         self.probes, self.probe_normals, _ = sample_surface(scan, probes, seed)
@@ -60,7 +68,12 @@ class Target:
         face, closest, distance = closest_points(points, self.vertices, self.faces)
         agree = (normals * self.face_normals[face]).sum(axis=1) > _AGREE
         weight = robust(distance, reach) * (agree & ~self._rim_face[face] & (distance < 3 * reach))
+        weight *= self.counted(((closest - points) * normals).sum(axis=1))
         return closest, self.face_normals[face], weight
+
+    def counted(self, ahead: FloatArray) -> FloatArray:
+        """Return what points of the scan count that lie so far outside the model [m], negative inside."""
+        return np.where(ahead > 0, self._outside, 1.0)
 
     def pairs(self, vertices: FloatArray, faces: IntArray, chosen: NDArray[np.int64], reach: float) -> Pairs:
         """Match probes of the scan with the model, and chosen vertices of the model with the scan."""
@@ -70,6 +83,7 @@ class Target:
         face, closest, distance = closest_points(self.probes, vertices, faces)
         agree = (normal[face] * self.probe_normals).sum(axis=1) > _AGREE
         weight = robust(distance, reach) * (agree & (distance < 3 * reach))
+        weight *= self.counted(((self.probes - closest) * normal[face]).sum(axis=1))
         shares = barycentric(closest, corners[face])
         at, ahead, pull = self.onto_scan(vertices[chosen], vertex_normals(TriangleMesh(vertices, faces))[chosen], reach)
         return Pairs(

@@ -30,7 +30,7 @@ DEFINITIONS = {
     d.name: d
     for d in (
         Definition("stature", "height", "crown", "crown to floor"),
-        Definition("mass", "mass", "", "volume times 985 kg/m3 [kg]"),
+        Definition("mass", "mass", "", "volume times 1000 kg/m3 [kg]"),
         Definition("head_girth", "girth", "head", "horizontal girth of the head at its greatest length"),
         Definition("neck_girth", "girth", "neck", "horizontal girth at mid-neck, below the larynx"),
         Definition(
@@ -134,6 +134,7 @@ DEFINITIONS = {
         Definition("navel_height", "height", "navel", "navel to floor"),
         Definition("hip_height", "height", "hip", "hip level to floor"),
         Definition("inside_leg", "height", "crotch_point", "crotch to floor"),
+        Definition("thigh_height", "height", "thigh", "fold of the seat to floor"),
         Definition("knee_height", "height", "knee", "mid-patella to floor"),
         Definition("chest_depth", "depth", "chest", "front to back at bust level"),
         Definition("waist_breadth", "breadth", "navel", "side to side at the navel"),

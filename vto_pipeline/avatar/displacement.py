@@ -111,8 +111,10 @@ def _from_probes(
     shares = barycentric(closest, vertices[corners])
     facing = target.probe_normals
     agree = (np.einsum("nk,nkd->nd", shares, normals[corners]) * facing).sum(axis=1) > 0.5
+    ahead = ((target.probes - closest) * facing).sum(axis=1)
     weight = np.sqrt(
         robust(distance, reach)
+        * target.counted(ahead)
         * trust[corners].mean(axis=1)
         * (agree & (distance < 3 * reach))
         * len(vertices)
@@ -121,7 +123,7 @@ def _from_probes(
     along = np.einsum("nkd,nd->nk", normals[corners], facing) * shares * weight[:, None]
     row = np.repeat(np.arange(len(face)), 3)
     back = csr_matrix((along.ravel(), (row, corners.ravel())), (len(face), len(vertices)))
-    return back, weight * ((target.probes - closest) * facing).sum(axis=1)
+    return back, weight * ahead
 
 
 def _laplacian(faces: IntArray, count: int) -> csr_matrix:

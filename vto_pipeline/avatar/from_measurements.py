@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -12,15 +14,15 @@ from vto_pipeline.avatar.population import Population, population
 from vto_pipeline.avatar.shape import SEX_SHARE, ShapeSpace, shape_space
 from vto_pipeline.avatar.tape import Reading, Tape
 from vto_pipeline.errors import AvatarError
-from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.body import Avatar, Measurements
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.settings import Config
 
 _HOLD_M, _HOLD_KG = 0.0002, 0.05
-_MAX_STEP = 2.0
-_HALVINGS = 6
-_SETTLED = 1e-3
+_DAMPING, _TRIES = 1e-3, 8
+_SETTLED = 1e-5
+"""Relative fall of the residual below which the fit has arrived."""
 
 
 class MeasurementsConfig(Config):
@@ -29,12 +31,12 @@ class MeasurementsConfig(Config):
     sex: Literal["female", "male", "neutral"] = Field(
         default="neutral", description="whose body it is where the measurements do not say"
     )
-    iterations: int = Field(default=12, ge=1, le=100, description="Gauss-Newton steps at most")
+    iterations: int = Field(default=20, ge=1, le=100, description="Levenberg-Marquardt steps at most")
     tolerance_mm: float = Field(
         default=2.0, gt=0, le=50, description="larger misses of a given measurement are reported [mm]"
     )
     expected_weight: float = Field(
-        default=5.0, gt=0, le=100, description="how strongly the expected measurements hold, 1 as their spread"
+        default=4.0, gt=0, le=100, description="how strongly the expected measurements hold, 1 as their spread"
     )
     unlikely_sigmas: float = Field(
         default=4.0, gt=0, le=20, description="a given value this far from what the others say is reported"
@@ -46,8 +48,8 @@ def fit_measurements(
 ) -> Avatar:
     """Return the body that has the given measurements, in the bind pose.
 
-    Gauss-Newton on the shape parameters (Nocedal & Wright 2006, 10.3): given values are held, the others are drawn to
-    their expectation under ANSUR II given these, the parameters to the mean body.
+    Levenberg-Marquardt on the shape parameters (Nocedal & Wright 2006, 10.3): given values are held, the others are
+    drawn to their expectation under ANSUR II given these, the parameters to those of the mean body.
 
     Args:
         measurements: Names of `definitions`; a value with a sigma is an observation, one without is held.
@@ -69,14 +71,33 @@ def fit_measurements(
     _report_unlikely(prior, held, config, job)
     expected = prior.given(values, sigmas)
     space = shape_space(SEX_SHARE[sex])
-    parameters = _solve(space, held, expected, config, job)
-    body = space.avatar(parameters)
+    parameters = _solve(space, held, expected, config, job, _mean_body(sex, config))
+    spread = np.sqrt(np.diag(expected.covariance).clip(0.0)).tolist()
+    unsure = {name: s for name, s in zip(expected.names, spread, strict=True) if name not in held}
+    body = replace(space.avatar(parameters), sigmas=unsure)
     _report_errors(body, held, config, job)
+    _report_folds(space, body, job)
     return body
 
 
+@lru_cache(maxsize=4)
+def _mean_body(sex: str, config: MeasurementsConfig) -> FloatArray:
+    """Return the parameters of the population's mean, to which those of a person are drawn.
+
+    The template has them all but for a few millimetres and kilograms, and these would show in what is not measured.
+    """
+    prior, space = population(sex), shape_space(SEX_SHARE[sex])
+    held = {name: float(prior.mean[prior.names.index(name)]) for name in ("stature", "mass")}
+    return _solve(space, held, prior.given(held, {}), config, Job(), np.zeros(len(space.names)))
+
+
 def _solve(
-    space: ShapeSpace, held: dict[str, float], expected: Population, config: MeasurementsConfig, job: Job
+    space: ShapeSpace,
+    held: dict[str, float],
+    expected: Population,
+    config: MeasurementsConfig,
+    job: Job,
+    mean: FloatArray,
 ) -> FloatArray:
     tape = Tape(space.base)
     free = [k for k, name in enumerate(expected.names) if name not in held]
@@ -88,31 +109,32 @@ def _solve(
     weight[: len(held), : len(held)] = np.diag([1 / (_HOLD_KG if name == "mass" else _HOLD_M) for name in held])
     weight[len(held) :, len(held) :] = config.expected_weight * np.linalg.inv(np.linalg.cholesky(spread + floor))
     read = [DEFINITIONS[name] for name in names]
+    held_back = space.whitener.T @ space.whitener
 
     def residual(parameters: FloatArray) -> tuple[FloatArray, list[Reading]]:
         vertices = space.vertices(parameters)
         readings = [tape.read(what, vertices) for what in read]
         wrong = np.array([reading.value for reading in readings]) - target
-        return np.concatenate([weight @ wrong, space.whitener @ parameters]), readings
+        return np.concatenate([weight @ wrong, space.whitener @ (parameters - mean)]), readings
 
-    parameters = np.zeros(len(space.names))
+    parameters, damping = mean, _DAMPING
     wrong, readings = residual(parameters)
     for step in range(config.iterations):
-        slope = np.array([_by_parameters(space, reading) for reading in readings])
-        move = np.linalg.lstsq(np.concatenate([weight @ slope, space.whitener]), -wrong, rcond=None)[0]
-        size = np.abs(move / space.sigmas).max()
-        move *= min(1.0, _MAX_STEP / size)
+        slope = np.concatenate([weight @ [_by_parameters(space, reading) for reading in readings], space.whitener])
+        normal, descent = slope.T @ slope, -slope.T @ wrong
         # a taut tape jumps from one bump to the next: a full step may overshoot
-        for _ in range(_HALVINGS):
+        for _ in range(_TRIES):
+            move = np.linalg.solve(normal + damping * held_back, descent)
             tried, seen = residual(parameters + move)
             if tried @ tried < wrong @ wrong:
                 break
-            move /= 2
+            damping *= 10
         else:
             break
-        parameters, wrong, readings = parameters + move, tried, seen
+        gain = 1 - np.sqrt(tried @ tried / (wrong @ wrong))
+        parameters, wrong, readings, damping = parameters + move, tried, seen, damping / 10
         job.progress((step + 1) / config.iterations, f"fit to {len(held)} measurements, step {step + 1}")
-        if size < _SETTLED:
+        if gain < _SETTLED:
             break
     return parameters
 
@@ -122,6 +144,13 @@ def _by_parameters(space: ShapeSpace, reading: Reading) -> FloatArray:
 
 
 def _report_unlikely(prior: Population, held: dict[str, float], config: MeasurementsConfig, job: Job) -> None:
+    away = prior.distance(held, {})
+    # of n unit normals, the length is close to the root of n
+    if away > np.sqrt(len(held)) + config.unlikely_sigmas:
+        job.warn(
+            f"nobody surveyed is like this ({away:.1f} standard deviations from the mean body): what is not measured "
+            "is a guess, see its uncertainty"
+        )
     for name in held:
         if name not in prior.names:
             continue
@@ -149,5 +178,25 @@ def _report_errors(body: Avatar, held: dict[str, float], config: MeasurementsCon
         job.measure(**{f"{name}_error_mm": round(float(error) * 1e3, 3)})
         worst = max(worst, abs(error) * 1e3)
         if abs(error) * 1e3 > config.tolerance_mm:
-            job.warn(f"{name} = {value * 100:.1f} cm is missed by {error * 100:+.1f} cm: it contradicts the others")
+            job.warn(
+                f"{name}: asked {value * 100:.1f} cm, reached {(value + error) * 100:.1f} cm, "
+                f"{error * 100:+.1f} cm: it contradicts the others"
+            )
     job.measure(worst_error_mm=round(float(worst), 3))
+
+
+def _report_folds(space: ShapeSpace, body: Avatar, job: Job) -> None:
+    """Say where the asked lengths leave no room for the body between them."""
+    turned = np.einsum("fi,fi->f", *(_normals(v, body.faces) for v in (space.base.vertices, body.vertices))) < 0
+    if turned.any():
+        middle = space.base.vertices[body.faces[turned]].mean(axis=(0, 1))
+        near = {name: np.linalg.norm(space.base.vertices[at] - middle) for name, at in body.landmarks.items()}
+        job.warn(
+            f"the surface folds over itself in {turned.sum()} faces near the {min(near, key=lambda n: near[n])}: "
+            "the measurements contradict each other there"
+        )
+
+
+def _normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    return np.cross(b - a, c - a)

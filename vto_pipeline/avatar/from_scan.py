@@ -9,17 +9,27 @@ from pydantic import Field
 
 from vto_pipeline.avatar.correspondence import Target, closest_points
 from vto_pipeline.avatar.displacement import displace
+from vto_pipeline.avatar.levels import find_levels, with_rows_at
 from vto_pipeline.avatar.pose import named_pose
 from vto_pipeline.avatar.registration import Fit, first_fit, model, refine
 from vto_pipeline.avatar.scan_report import CORE, check, ends, report
-from vto_pipeline.avatar.scan_start import Start, clean, starts
+from vto_pipeline.avatar.scan_start import Start, upright_starts
 from vto_pipeline.avatar.settle import part_thighs, settle
 from vto_pipeline.avatar.shape import SEX_SHARE, ShapeSpace, shape_space
+from vto_pipeline.avatar.stance import stance
+from vto_pipeline.avatar.upright import in_metres
+from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Avatar
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
 
+_FINER = 3
+"""So many times more points of the scan are used while displacing."""
+_UNDER_CLOTHES = 0.1
+"""What a point outside the body counts there: the cloth's inmost places lie on the body, the others off it."""
+_CLOTHED_STIFFNESS = 2
+"""How many of the displacement's stiffnesses are gone through there: folds are not the body's."""
 _NOISE_SHARE = 0.2
 """Spread that distances are taken to have, as a share of the reach."""
 
@@ -35,19 +45,24 @@ class ScanConfig(Config):
     )
     final_reach_mm: float = Field(default=10.0, gt=0, le=100, description="the same at the end [mm]")
     stiffness: tuple[float, ...] = Field(
-        default=(100.0, 20.0, 4.0, 1.0, 0.3), description="of the displacement, falling"
+        default=(100.0, 20.0, 4.0, 1.0, 0.3, 0.1), description="of the displacement, falling"
     )
     rounds: int = Field(default=3, ge=1, le=50, description="displacement solves at each stiffness")
+    clothed: bool = Field(
+        default=False,
+        description="the scan is of clothes on the body: the body is kept inside it, and flagged as an estimate",
+    )
     max_mean_mm: float = Field(
         default=15.0, gt=0, description="a larger mean distance means that this is not a body [mm]"
     )
 
 
 def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | None = None) -> Avatar:
-    """Return our body registered to a scan, posed as the scan and in its frame.
+    """Return our body registered to a scan, posed as the scan and in its frame: metres, its upward axis turned to +Y.
 
     Args:
-        scan: Body or dress form [m], +Y up, any facing; head, hands, legs may be missing; floor and crumbs are dropped.
+        scan: Body or dress form; unit, upward axis and facing are found out; head, hands, legs may be missing; floor
+            and crumbs are dropped.
         config: Settings.
         job: Receives mean, rms and p95 of the distance from scan to body [mm]: of all points, of the core (no head,
             hands, feet), and of the explained ones (nearer than 10 mm: no stand, floor or hair), and their share.
@@ -57,27 +72,48 @@ def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | No
     """
     config, job = config or ScanConfig(), job or Job()
     job.progress(0.0, "find the body's facing and size")
-    kept = clean(scan, job)
-    target = Target(kept, config.probes, job.seed)
+    kept, guesses = upright_starts(in_metres(scan, job), job)
+    outside = _UNDER_CLOTHES if config.clothed else 1.0
+    target = Target(kept, config.probes, job.seed, outside)
     space = shape_space(SEX_SHARE[config.sex])
-    guesses = starts(kept)
     tries = [_pose_and_shape(space, target, guess, config, job, steps=8) for guess in guesses[:2]]
     scores = [_score(space, target, fit) for fit in tries]
     fit = _pose_and_shape(space, target, tries[int(np.argmin(scores))], config, job, steps=config.iterations)
     job.progress(0.6, "displace the body onto the scan")
-    posed = part_thighs(space, fit, model(space, fit))
-    hands = [k for k, name in enumerate(space.base.joint_names) if name.endswith("wrist")]
-    trust = 1 - space.base.weights[:, hands].sum(axis=1)
-    vertices = displace(target, posed, space.base.faces, trust, config.stiffness, config.rounds)
-    vertices = part_thighs(space, fit, vertices)
+    fine = Target(kept, _FINER * config.probes, job.seed, outside)
+    vertices = _displaced(space, fit, fine, config)
     check(kept, space, vertices, config.max_mean_mm)
+    stands = stance(space, fit)
+    if stands.stands:
+        job.progress(0.75, "find the body's own levels")
+        upright = (vertices - stands.translation) @ stands.yaw
+        space = with_rows_at(space, fit.parameters, upright, find_levels(upright, space.base))
+        stands = stance(space, fit)
+        vertices = _displaced(space, fit, fine, config)
+    else:
+        job.warn(
+            f"the body does not stand: a part of it leans {np.rad2deg(stands.lean):.0f} degrees; its "
+            "measurements are those of the body brought upright, and less certain"
+        )
     job.progress(0.9, "carry the body back to the bind pose")
-    body, bad = settle(space, fit, posed, vertices)
+    body, bad = settle(space, fit, stands, part_thighs(space, fit, model(space, fit)), vertices)
     report(kept, space, body.vertices, job)
     job.measure(tangled_faces=bad)
+    if config.clothed:
+        job.measure(estimated_under_clothing=True)
+        job.warn("the body is an estimate under clothing: do not choose a size by it without a tape")
     if bad:
         job.warn(f"{bad} faces of the registered body still pass through others, where the scan's own limbs touch")
     return body
+
+
+def _displaced(space: ShapeSpace, fit: Fit, target: Target, config: ScanConfig) -> FloatArray:
+    posed = part_thighs(space, fit, model(space, fit))
+    hands = [k for k, name in enumerate(space.base.joint_names) if name.endswith("wrist")]
+    trust = 1 - space.base.weights[:, hands].sum(axis=1)
+    stiffness = config.stiffness[:_CLOTHED_STIFFNESS] if config.clothed else config.stiffness
+    vertices = displace(target, posed, space.base.faces, trust, stiffness, config.rounds)
+    return part_thighs(space, fit, vertices)
 
 
 def _pose_and_shape(

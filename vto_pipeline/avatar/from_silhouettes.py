@@ -1,4 +1,4 @@
-"""A body from a front and a side photo: breadths and depths give what ANSUR II can make of them, with its uncertainty.
+"""A body from a front and a side photo: shape, poses and cameras that explain both outlines, and what that leaves open.
 
 Two outlines do not determine girths: even perfect ones leave 13 to 21 mm of mean error at chest, waist and hip. So an
 interval is reported.
@@ -6,29 +6,46 @@ interval is reported.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
-from scipy.ndimage import binary_fill_holes, label
+from scipy.spatial.transform import Rotation
 
-from vto_pipeline.avatar.from_measurements import MeasurementsConfig, fit_measurements
-from vto_pipeline.avatar.population import complete
+from vto_pipeline.avatar.backdrop import person
+from vto_pipeline.avatar.definitions import DEFINITIONS
+from vto_pipeline.avatar.implicit import arm_axis
+from vto_pipeline.avatar.outline import Camera, ImageOutline
+from vto_pipeline.avatar.population import population
+from vto_pipeline.avatar.pose import named_pose
+from vto_pipeline.avatar.registration import first_fit
+from vto_pipeline.avatar.scan_report import ends
+from vto_pipeline.avatar.scan_start import Start
+from vto_pipeline.avatar.shape import SEX_SHARE, ShapeSpace, shape_space
+from vto_pipeline.avatar.silhouette_fit import Evidence, Solution, View, step
+from vto_pipeline.avatar.tape import Tape
 from vto_pipeline.errors import AvatarError
 from vto_pipeline.model.arrays import ByteArray, FloatArray
-from vto_pipeline.model.body import Avatar, Measurements
+from vto_pipeline.model.body import Avatar
 from vto_pipeline.model.frames import Silhouettes
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.settings import Config
 
-_TOE_AHEAD, _FOOT_ASIDE = 0.105, 0.10
-"""How far the lowest visible point is nearer to the camera than the body, as a share of stature: toes, outer foot."""
-_BORDER = 0.03
-_MIN_SHARE = 0.3
-_LEVELS = {"waist_breadth": "navel_height", "hip_breadth": "hip_height"}
-_DEPTHS = {"chest_depth": "chest_height", "waist_depth": "navel_height", "hip_depth": "hip_height"}
+_OPEN_SHARE = {"chest_girth": 0.023, "waist_girth": 0.019, "hip_girth": 0.016}
+"""Spread of a girth where its breadth and depth are known exactly, as a share of it: regressions in ANSUR II."""
+_REACH_M, _LAST_REACH_M = 0.10, 0.02
+_ROUGH_STEPS = 7
+_STIFF = 4.0
+_POSES = ("a_pose", "arms_down", "t_pose")
+_ARMS_AHEAD_RAD = ((-0.2, 0.0), (0.15, 0.0), (0.5, 0.0), (0.0, 0.6))
+"""Swing of the shoulders, bend of the elbows: how the arms may be held in the side view."""
+_POOR_M, _BETTER = 0.012, 0.7
+"""Outlines this far apart (both views together) raise the question whether the pictures are swapped."""
+_ENDS_SHARE = 0.25
+"""How much head, hands and feet count: hair, fingers and shoes are not modelled."""
+_INDEPENDENT = 300.0
 
 
 class SilhouettesConfig(Config):
@@ -37,37 +54,14 @@ class SilhouettesConfig(Config):
     sex: Literal["female", "male", "neutral"] = Field(
         default="neutral", description="whose statistics complete the body"
     )
-    distance_m: float = Field(default=2.5, gt=0.5, le=20, description="from the camera to the body's axis [m]")
-    camera_height_m: float = Field(default=1.0, ge=0, le=3, description="of the lens above the floor [m]")
-    width_sigma_mm: float = Field(
-        default=8.0, gt=0, le=100, description="uncertainty of a breadth or depth read off the outline [mm]"
+    distance_m: float = Field(default=2.5, gt=0.5, le=20, description="from the camera to the body, about [m]")
+    outline_sigma_mm: float = Field(
+        default=4.0, gt=0, le=100, description="uncertainty of a point on the outline: picture, cloth, model [mm]"
     )
-
-
-@dataclass(frozen=True)
-class Outline:
-    """One view's silhouette, upright.
-
-    Args:
-        mask: Where the body is, shape (H, W).
-        top: Row of the crown.
-        metres: Size of a pixel at the body's axis [m].
-    """
-
-    mask: NDArray[np.bool_]
-    top: int
-    metres: float
-
-    def width(self, height: float, stature: float) -> float:
-        """Return the width [m] of the run through the body's middle at a height [m]; arms held off are other runs."""
-        row = self.mask[int(np.clip(self.top + round((stature - height) / self.metres), 0, len(self.mask) - 1))]
-        runs, count = label(row)
-        if count == 0:
-            raise AvatarError(f"the outline has no body at a height of {height:.2f} m")
-        columns = np.arange(len(row))
-        middle = float(np.median(np.nonzero(self.mask)[1]))
-        nearest = runs[np.argmin(np.where(row, np.abs(columns - middle), np.inf))]
-        return float((runs == nearest).sum()) * self.metres
+    iterations: int = Field(default=20, ge=5, le=200, description="Gauss-Newton steps")
+    max_wrong_mm: float = Field(
+        default=25.0, gt=0, description="a larger mean distance of the outlines means that this is no body [mm]"
+    )
 
 
 def fit_silhouettes(
@@ -77,7 +71,7 @@ def fit_silhouettes(
     config: SilhouettesConfig | None = None,
     job: Job | None = None,
 ) -> Avatar:
-    """Return the likeliest body behind two outlines.
+    """Return the likeliest body behind two outlines, in the bind pose.
 
     Args:
         silhouettes: Names of the photos, for messages, and the stature [m].
@@ -87,67 +81,113 @@ def fit_silhouettes(
         job: Receives `<girth>_m` and `<girth>_interval_mm` (half the 95 % interval) for chest, waist and hip.
 
     Raises:
-        AvatarError: no body stands out from the backdrop.
+        AvatarError: no body, or no whole one, stands out from the backdrop.
     """
     config, job = config or SilhouettesConfig(), job or Job()
-    stature = silhouettes.stature
-    front = _outline(front_image, stature, _TOE_AHEAD, str(silhouettes.front), config)
-    side = _outline(side_image, stature, _FOOT_ASIDE, str(silhouettes.side), config)
-    expected = complete(Measurements({"stature": stature}, sex=config.sex)).values
-    seen = {name: front.width(expected[level], stature) for name, level in _LEVELS.items()}
-    seen |= {name: side.width(expected[level], stature) for name, level in _DEPTHS.items()}
-    sigmas = dict.fromkeys(seen, config.width_sigma_mm * 1e-3)
-    tape = Measurements({"stature": stature, **seen}, sigmas, config.sex)
-    likely = complete(tape)
-    for name in ("chest_girth", "waist_girth", "hip_girth"):
-        job.measure(
-            **{
-                f"{name}_m": round(likely.values[name], 4),
-                f"{name}_interval_mm": round(1.96 * likely.sigmas[name] * 1e3, 1),
-            }
-        )
-    job.note("girths behind two outlines are intervals, not points; measure by tape where it matters")
-    return fit_measurements(tape, MeasurementsConfig(), job)
-
-
-def _outline(image: ByteArray, stature: float, nearer: float, where: str, config: SilhouettesConfig) -> Outline:
-    mask = _foreground(image, where)
-    rows = np.nonzero(mask.any(axis=1))[0]
-    # what stands nearer than the axis appears lower than the floor there
-    ahead = nearer * stature
-    below = config.camera_height_m * ahead / (config.distance_m - ahead)
-    return Outline(mask, int(rows[0]), (stature + below) / (rows[-1] + 1 - rows[0]))
-
-
-def _foreground(image: ByteArray, where: str) -> NDArray[np.bool_]:
-    """Separate body and backdrop: colour distance from the border, cut where both classes are tightest (Otsu 1979)."""
-    picture = image.astype(np.float64)
-    rim = max(2, int(_BORDER * min(image.shape[:2])))
-    border = np.concatenate(
-        [picture[:rim].reshape(-1, 3), picture[:, :rim].reshape(-1, 3), picture[:, -rim:].reshape(-1, 3)]
-    )
-    away = np.linalg.norm(picture - np.median(border, axis=0), axis=2)
-    parts, count = label(away > _otsu(away.ravel()))
-    if count == 0:
-        raise AvatarError("nothing stands out from the backdrop", where=where)
-    sizes = np.bincount(parts.ravel())[1:]
-    mask: NDArray[np.bool_] = binary_fill_holes(parts == 1 + int(np.argmax(sizes)))
-    tall = np.nonzero(mask.any(axis=1))[0]
-    if len(tall) < _MIN_SHARE * len(mask):
+    front, side = person(front_image, str(silhouettes.front)), person(side_image, str(silhouettes.side))
+    space = shape_space(SEX_SHARE[config.sex])
+    evidence = Evidence(population(config.sex), Tape(space.base), silhouettes.stature, config.distance_m)
+    job.progress(0.0, "how the person stands")
+    begin = _stand(space, front, side, evidence, config)
+    if sum(begin.wrong) > _POOR_M and sum(_stand(space, side, front, evidence, config).wrong) < _BETTER * sum(
+        begin.wrong
+    ):
         raise AvatarError(
-            f"the largest thing before the backdrop is {len(tall)} of {len(mask)} pixels tall",
-            where=where,
-            hint="the whole body should fill the picture's height, before a plain backdrop",
+            "the outlines fit a body better with front and side swapped",
+            where=f"{silhouettes.front}, {silhouettes.side}",
+            hint="the first picture is the one from the front",
         )
-    return mask
+    job.progress(0.5, "shape, poses and cameras")
+    solution = _advance(space, begin.views, evidence, 1 - (1 - _ENDS_SHARE) * ends(space), config, config.iterations)
+    for name, wrong in zip(("front", "side"), solution.wrong, strict=True):
+        job.measure(**{f"{name}_outline_mm": round(wrong * 1e3, 2)})
+        if wrong * 1e3 > config.max_wrong_mm:
+            raise AvatarError(
+                f"the {name} outline lies {wrong * 1e3:.0f} mm from any body's (at most {config.max_wrong_mm:g})",
+                where=str(getattr(silhouettes, name)),
+                hint="tight clothes, arms held off the body, nothing else in the picture",
+            )
+    return _report(space, solution, job)
 
 
-def _otsu(values: FloatArray) -> float:
-    counts, edges = np.histogram(values, bins=256)
-    centers = (edges[1:] + edges[:-1]) / 2
-    low = np.cumsum(counts)
-    high = low[-1] - low
-    sums = np.cumsum(counts * centers)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        between = low * high * (sums / low - (sums[-1] - sums) / high) ** 2
-    return float(centers[int(np.nanargmax(between))])
+def _stand(
+    space: ShapeSpace, front: NDArray[np.bool_], side: NDArray[np.bool_], evidence: Evidence, config: SilhouettesConfig
+) -> Solution:
+    """Find out how the person stands in both views: arms, and which side is seen."""
+
+    def rough(*views: View) -> Solution:
+        # a hand held before the belly must not pass for a belly: the arms are found while the shape is stiff
+        return _advance(space, views, evidence, np.ones(len(space.base.vertices)), config, _ROUGH_STEPS, _STIFF)
+
+    ahead = ImageOutline(front)
+    facing = min(
+        (rough(_place(space, ahead, front, 0.0, named_pose(space.base, name).pose, evidence)) for name in _POSES),
+        key=lambda found: found.wrong[0],
+    )
+    across = ImageOutline(side)
+    return min(
+        (
+            rough(
+                facing.views[0],
+                _place(space, across, side, yaw, _arms_ahead(space, facing.views[0].start, *angles), evidence),
+            )
+            for yaw in (np.pi / 2, -np.pi / 2)
+            for angles in _ARMS_AHEAD_RAD
+        ),
+        key=lambda found: sum(found.wrong),
+    )
+
+
+def _arms_ahead(space: ShapeSpace, pose: FloatArray, swing: float, bend: float) -> FloatArray:
+    """Return the pose with both arms swung forward and their elbows bent by so much [rad]."""
+    pose = pose.copy()
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        shoulder, elbow = (space.base.joint_names.index(f"{side}_{joint}") for joint in ("shoulder", "elbow"))
+        pose[shoulder] = (Rotation.from_rotvec([-swing, 0.0, 0.0]) * Rotation.from_rotvec(pose[shoulder])).as_rotvec()
+        x, y, _ = arm_axis()
+        pose[elbow] = bend * np.array([y, -sign * x, 0.0])
+    return pose
+
+
+def _place(
+    space: ShapeSpace, outline: ImageOutline, mask: NDArray[np.bool_], yaw: float, pose: FloatArray, evidence: Evidence
+) -> View:
+    """Place the mean body, scaled to the stature, behind an outline."""
+    rows, columns = np.nonzero(mask)
+    height, width = mask.shape
+    camera = Camera((rows.max() + 1 - rows.min()) * evidence.distance / evidence.stature, width, height)
+    scale = evidence.stature / float(np.ptp(space.base.bind_vertices[:, 1]))
+    fit = first_fit(space, Start(yaw, scale, np.zeros(3), "", 0.0), pose)
+    metres = evidence.distance / camera.focal
+    middle = np.array([np.median(columns), rows.max() + 0.5]) - camera.middle
+    place = np.array([middle[0] * metres, -middle[1] * metres, -evidence.distance])
+    return View(outline, fit.pose, replace(fit, translation=fit.translation + place), camera)
+
+
+def _advance(
+    space: ShapeSpace,
+    views: tuple[View, ...],
+    evidence: Evidence,
+    trust: FloatArray,
+    config: SilhouettesConfig,
+    steps: int,
+    stiff: float = 1.0,
+) -> Solution:
+    reach = _REACH_M
+    for _ in range(steps):
+        solution = step(space, views, evidence, trust, reach, config.outline_sigma_mm * 1e-3, _INDEPENDENT, stiff)
+        views = solution.views
+        reach = max(reach * 0.85, _LAST_REACH_M)
+    return solution
+
+
+def _report(space: ShapeSpace, solution: Solution, job: Job) -> Avatar:
+    body = space.avatar(solution.parameters)
+    tape = Tape(body)
+    for name, share in _OPEN_SHARE.items():
+        reading = tape.read(DEFINITIONS[name], body.bind_vertices)
+        slope = np.einsum("nk,pnk->p", reading.gradient, space.fields[:, reading.vertices])
+        sigma = float(np.sqrt(slope @ solution.covariance @ slope + (share * reading.value) ** 2))
+        job.measure(**{f"{name}_m": round(reading.value, 4), f"{name}_interval_mm": round(1.96 * sigma * 1e3, 1)})
+    job.note("girths behind two outlines are intervals, not points; measure by tape where it matters")
+    return body

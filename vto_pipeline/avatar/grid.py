@@ -227,7 +227,7 @@ def _leg(grid: Grid, plan: BodyPlan, above: NDArray[np.int64]) -> None:
     crotch = grid.add(path, _FREE)
     for i in crotch:
         grid.points[i][0], grid.on_mirror[i] = 0.0, True
-    grid.rows["crotch"] = crotch
+    grid.rows["crotch"], grid.rows["seam"] = crotch, above
     ring = np.concatenate([above, crotch])
     count = len(ring)
     angle = np.concatenate([np.linspace(0, np.pi, HALF + 1), np.pi + share[:, 0] * np.pi])

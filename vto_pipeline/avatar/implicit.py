@@ -8,13 +8,15 @@ from scipy.interpolate import PchipInterpolator
 from vto_pipeline.avatar.body_plan import ARM_ANGLE_RAD, BodyPlan
 from vto_pipeline.model.arrays import FloatArray
 
-_CROTCH_BLEND_M = 0.035
+_CROTCH_BLEND_M, _HIP_BLEND_M = 0.012, 0.045
+_HIP_M = 0.09
+"""How far from the median plane a leg joins the trunk softly, as hip and groin do; no web may hang between thighs."""
 _SHOULDER_BLEND_M = 0.04
 _NECK_BLEND_M = 0.03
 _ANKLE_BLEND_M = 0.03
 _SOLE_ROUNDING_M = 0.012
 _FOLD_M = 0.005
-_LUMP_FOLD_M = 0.03
+_LUMP_FOLD_M = 0.015
 
 
 def arm_axis() -> FloatArray:
@@ -39,7 +41,8 @@ def signed_field(plan: BodyPlan, points: FloatArray) -> FloatArray:
     foot = np.column_stack([plan.foot[:, :3], plan.foot[:, 3], -plan.foot[:, 3] * 0.5, np.full(len(plan.foot), 2.2)])
     leg = smooth_min(_tube(plan.leg[::-1], y, x, z), _tube(foot, z, x, y), _ANKLE_BLEND_M)
     leg = smooth_max(leg, -y, _SOLE_ROUNDING_M)
-    body = smooth_min(body, leg, _CROTCH_BLEND_M)
+    outside = np.minimum(x / _HIP_M, 1.0)
+    body = smooth_min(body, leg, _CROTCH_BLEND_M + (_HIP_BLEND_M - _CROTCH_BLEND_M) * outside**2 * (3 - 2 * outside))
     along = (x - plan.shoulder[0]) * arm_axis()[0] + (y - plan.shoulder[1]) * arm_axis()[1]
     across = -(x - plan.shoulder[0]) * arm_axis()[1] + (y - plan.shoulder[1]) * arm_axis()[0]
     ones = np.ones(len(plan.arm))
@@ -54,7 +57,7 @@ def gradient(plan: BodyPlan, points: FloatArray, step: float = 1e-4) -> FloatArr
     return np.stack(ends, axis=1) / (2 * step)
 
 
-def smooth_min(a: FloatArray, b: FloatArray, width: float) -> FloatArray:
+def smooth_min(a: FloatArray, b: FloatArray, width: FloatArray | float) -> FloatArray:
     """Union of two fields, rounded where they differ by less than `width` [m] (Quilez, polynomial smooth minimum)."""
     overlap = np.maximum(width - np.abs(a - b), 0.0)
     return np.minimum(a, b) - overlap**2 / (4 * width)

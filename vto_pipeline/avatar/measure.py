@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from vto_pipeline.avatar.definitions import DEFINITIONS
 from vto_pipeline.avatar.tape import Tape
 from vto_pipeline.model.arrays import FloatArray
@@ -16,7 +18,8 @@ def measure(body: Avatar | TriangleMesh) -> Measurements:
         body: An avatar, or a mesh of a body in metres, +Y up.
 
     Returns:
-        All of `definitions.DEFINITIONS`; limbs as the mean of both sides.
+        All of `definitions.DEFINITIONS`; limbs as the mean of both sides. Each with its standard uncertainty: what the
+        definition leaves open, and what the body itself was not known by.
 
     Raises:
         AvatarError: the mesh is not a body that can be registered.
@@ -26,11 +29,12 @@ def measure(body: Avatar | TriangleMesh) -> Measurements:
 
         body = fit_scan(body)
     tape = Tape(body)
-    values = {}
+    values, sigmas = {}, {}
     for name, definition in DEFINITIONS.items():
         left, right = (tape.read(definition, body.bind_vertices, side).value for side in ("left", "right"))
         values[name] = (left + right) / 2
-    return Measurements(values, sex=sex_name(body.sex))
+        sigmas[name] = math.hypot(tape.uncertainty(definition, body.bind_vertices), body.sigmas.get(name, 0.0))
+    return Measurements(values, sigmas, sex_name(body.sex))
 
 
 def fit_levels(avatar: Avatar) -> dict[str, float]:

@@ -14,12 +14,15 @@ from pathlib import Path
 import numpy as np
 
 from vto_pipeline.avatar.definitions import definition
-from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.body import Measurements
 
+_FREEDOM = 10.0
+"""Degrees of freedom of the t distribution; assumed: three spreads out, expectations are a third less sure."""
 _SAME = (1.0, 1.0, 0.0)
 # ours: (ANSUR variables with shares), (female factor, male factor, spread of the factor). A factor other than 1 bridges
-# two definitions (flexed and relaxed arm, navel and natural waist, above and at the knee) and is our assumption.
+# two definitions (flexed and relaxed arm, navel and natural waist, above and at the knee, crotch and fold of the seat)
+# and is our assumption.
 _FROM_ANSUR: dict[str, tuple[dict[str, float], tuple[float, float, float]]] = {
     "stature": ({"stature": 1.0}, _SAME),
     "mass": ({"weightkg": 1.0}, _SAME),
@@ -48,6 +51,7 @@ _FROM_ANSUR: dict[str, tuple[dict[str, float], tuple[float, float, float]]] = {
     "navel_height": ({"waistheightomphalion": 1.0}, _SAME),
     "hip_height": ({"buttockheight": 1.0}, _SAME),
     "inside_leg": ({"crotchheight": 1.0}, _SAME),
+    "thigh_height": ({"crotchheight": 1.0}, (0.95, 0.95, 0.025)),
     "knee_height": ({"kneeheightmidpatella": 1.0}, _SAME),
     "chest_depth": ({"chestdepth": 1.0}, _SAME),
     "waist_breadth": ({"waistbreadth": 1.0}, _SAME),
@@ -72,14 +76,28 @@ class Population:
     covariance: FloatArray
 
     def given(self, values: dict[str, float], sigmas: dict[str, float]) -> Population:
-        """Return what is left to know once some are measured, each with its own uncertainty (0 when absent)."""
-        known = [name for name in self.names if name in values]
-        at = np.array([self.names.index(name) for name in known], dtype=int)
-        noise = np.diag([sigmas.get(name, 0.0) ** 2 + 1e-8 for name in known])
-        gain = np.linalg.solve(self.covariance[np.ix_(at, at)] + noise, self.covariance[at]).T
-        wrong = np.array([values[name] for name in known]) - self.mean[at]
+        """Return what is left to know once some are measured, each with its own uncertainty (0 when absent).
+
+        A body far from those surveyed is less surely like them: the spread is that of a multivariate t (Ding 2016, On
+        the conditional distribution of the multivariate t distribution), never less than the Gaussian's.
+        """
+        at, wrong, spread = self._known(values, sigmas)
+        gain = np.linalg.solve(spread, self.covariance[at]).T
         covariance = self.covariance - gain @ self.covariance[at]
+        covariance *= max(1.0, (_FREEDOM + self.distance(values, sigmas) ** 2) / (_FREEDOM + len(at)))
         return Population(self.names, self.mean + gain @ wrong, (covariance + covariance.T) / 2)
+
+    def distance(self, values: dict[str, float], sigmas: dict[str, float]) -> float:
+        """Return the Mahalanobis distance of measured values from the mean."""
+        _, wrong, spread = self._known(values, sigmas)
+        return float(np.sqrt(wrong @ np.linalg.solve(spread, wrong)))
+
+    def _known(self, values: dict[str, float], sigmas: dict[str, float]) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Which are measured, how far they are from the mean, and their covariance with their own noise."""
+        known = [name for name in self.names if name in values]
+        at = np.array([self.names.index(name) for name in known], dtype=np.int32)
+        noise = np.diag([sigmas.get(name, 0.0) ** 2 + 1e-8 for name in known])
+        return at, np.array([values[name] for name in known]) - self.mean[at], self.covariance[np.ix_(at, at)] + noise
 
 
 @lru_cache(maxsize=3)

@@ -1,4 +1,8 @@
-"""Pose and movement: linear blend skinning over the template's skeleton."""
+"""Pose and movement: skinning over the template's skeleton.
+
+A body is posed with dual quaternions, under which a twisted forearm keeps its girth. The linear blend, whose derivative
+is simple, serves where a pose is searched for.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +13,19 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from vto_pipeline.avatar.body_plan import ARM_ANGLE_RAD
 from vto_pipeline.errors import InputError
+from vto_pipeline.geometry.intersections import self_intersections
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Avatar, MovingBody
 
-_ARM_BELOW_HORIZONTAL_RAD = {"a_pose": ARM_ANGLE_RAD, "t_pose": 0.0, "arms_down": np.deg2rad(78.0)}
+_ARM_BELOW_HORIZONTAL_RAD = {
+    "a_pose": ARM_ANGLE_RAD,
+    "t_pose": 0.0,
+    "arms_down": np.deg2rad(78.0),
+    "sitting": ARM_ANGLE_RAD,
+}
+
+
+_RAISED_RAD = np.deg2rad([0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0])
 
 
 def pose_avatar(avatar: Avatar, pose: FloatArray, translation: FloatArray) -> Avatar:
@@ -23,10 +36,10 @@ def pose_avatar(avatar: Avatar, pose: FloatArray, translation: FloatArray) -> Av
         pose: Rotation vector of each joint relative to the bind pose [rad], shape (J, 3), in the parent's frame.
         translation: Of the root [m], shape (3,).
 
-    Linear blend skinning (Magnenat-Thalmann et al. 1988).
     """
     rotation, offset = joint_transforms(avatar.joints, avatar.parents, pose)
-    vertices = skin(avatar.bind_vertices, avatar.weights, rotation, offset) + translation
+    turn, place = blend(avatar.weights, rotation, offset)
+    vertices = np.einsum("vij,vj->vi", turn, avatar.bind_vertices) + place + translation
     return replace(avatar, pose=pose, translation=np.asarray(translation, dtype=float), vertices=vertices)
 
 
@@ -44,31 +57,89 @@ def joint_transforms(joints: FloatArray, parents: np.ndarray, pose: FloatArray) 
     return rotation, offset
 
 
+def blend(weights: FloatArray, rotation: FloatArray, offset: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return what happens to each vertex, x -> R x + t, shapes (V, 3, 3) and (V, 3): always a rigid motion.
+
+    Dual quaternion linear blending (Kavan et al. 2007, eq. 18).
+
+    Args:
+        weights: Shape (V, J).
+        rotation: Of the joints, shape (J, 3, 3).
+        offset: Of the joints [m], shape (J, 3).
+    """
+    real = Rotation.from_matrix(rotation).as_quat()
+    x, y, z, w = real.T
+    tx, ty, tz = offset.T
+    dual = np.stack(  # half of translation times rotation
+        [
+            tx * w + ty * z - tz * y,
+            ty * w + tz * x - tx * z,
+            tz * w + tx * y - ty * x,
+            -tx * x - ty * y - tz * z,
+        ],
+        axis=1,
+    )
+    # q and -q are one rotation: take those that lie on the side of the vertex's main joint
+    side = np.where(real @ real.T < 0, -1.0, 1.0)
+    shares = weights * side[np.argmax(weights, axis=1)]
+    mixed, moved = shares @ real, shares @ dual
+    length = np.linalg.norm(mixed, axis=1, keepdims=True)
+    mixed, moved = mixed / length, moved / length
+    v, s, d, e = mixed[:, :3], mixed[:, 3:], moved[:, :3], moved[:, 3:]
+    return Rotation.from_quat(mixed).as_matrix(), s * d - e * v + np.cross(v, d)
+
+
 def skin(vertices: FloatArray, weights: FloatArray, rotation: FloatArray, offset: FloatArray) -> FloatArray:
-    """Return the vertices moved by the blend of their joints, shape (V, 3)."""
+    """Return the vertices moved by the linear blend of their joints (Magnenat-Thalmann et al. 1988), shape (V, 3)."""
     blended = (weights @ rotation.reshape(len(rotation), 9)).reshape(-1, 3, 3)
     return np.einsum("vij,vj->vi", blended, vertices) + weights @ offset
 
 
-def named_pose(avatar: Avatar, name: str) -> Avatar:
+def named_pose(avatar: Avatar, name: str, raised: float = 0.0) -> Avatar:
     """Return the avatar in a standard pose, feet on the floor.
 
     Args:
         avatar: Any of our bodies.
-        name: "a_pose" (arms 45 degrees down), "t_pose" (level), "arms_down" (hanging, clear of the hips).
+        name: "a_pose" (arms 45 degrees down), "t_pose" (level), "arms_down" (hanging), "sitting" (thighs level,
+            shins upright, arms as in the A-pose).
+        raised: How much higher the arms are held [rad].
 
     Raises:
         InputError: an unknown name.
     """
     if name not in _ARM_BELOW_HORIZONTAL_RAD:
         raise InputError(f"pose is {name!r}; wanted one of {', '.join(sorted(_ARM_BELOW_HORIZONTAL_RAD))}")
-    turn = ARM_ANGLE_RAD - _ARM_BELOW_HORIZONTAL_RAD[name]
+    turn = ARM_ANGLE_RAD - _ARM_BELOW_HORIZONTAL_RAD[name] + raised
     pose = np.zeros((len(avatar.joint_names), 3))
     # the shoulder girdle carries a fifth of the arm's swing
     for side, sign in (("left", 1.0), ("right", -1.0)):
         pose[avatar.joint_names.index(f"{side}_clavicle"), 2] = sign * 0.2 * turn
         pose[avatar.joint_names.index(f"{side}_shoulder"), 2] = sign * 0.8 * turn
-    return pose_avatar(avatar, pose, np.zeros(3))
+        if name == "sitting":
+            pose[avatar.joint_names.index(f"{side}_hip"), 0] = -np.pi / 2
+            pose[avatar.joint_names.index(f"{side}_knee"), 0] = np.pi / 2
+    posed = pose_avatar(avatar, pose, np.zeros(3))
+    return pose_avatar(avatar, pose, np.array([0.0, -posed.vertices[:, 1].min(), 0.0]))
+
+
+def clear_pose(avatar: Avatar, name: str) -> Avatar:
+    """Return a named pose with the arms raised until they pass through nothing: what cloth can be draped on.
+
+    Folds at the groin of a sitting body may remain.
+
+    Args:
+        avatar: Any of our bodies.
+        name: As for `named_pose`.
+    """
+    best, fewest = named_pose(avatar, name), -1
+    for raised in _RAISED_RAD:
+        posed = named_pose(avatar, name, raised)
+        crossing = len(self_intersections(posed.mesh))
+        if fewest < 0 or crossing < fewest:
+            best, fewest = posed, crossing
+        if crossing == 0:
+            break
+    return best
 
 
 def morph(source: Avatar, target: Avatar, count: int) -> MovingBody:

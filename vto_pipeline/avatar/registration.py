@@ -38,11 +38,13 @@ class Fit:
         parameters: Of the shape space, shape (P,).
         pose: Rotation vectors, shape (J, 3).
         translation: Shape (3,).
+        expected: Parameters about which people vary: of a body as large as the scan, shape (P,).
     """
 
     parameters: FloatArray
     pose: FloatArray
     translation: FloatArray
+    expected: FloatArray
 
 
 def first_fit(space: ShapeSpace, start: Start, pose: FloatArray) -> Fit:
@@ -58,7 +60,7 @@ def first_fit(space: ShapeSpace, start: Start, pose: FloatArray) -> Fit:
     pelvis = space.joints(parameters)[0]
     turn = Rotation.from_rotvec(pose[0]).as_matrix()
     # the guess turns about the origin, the skeleton about the pelvis
-    return Fit(parameters, pose, start.translation + turn @ pelvis - pelvis)
+    return Fit(parameters, pose, start.translation + turn @ pelvis - pelvis, parameters)
 
 
 def model(space: ShapeSpace, fit: Fit) -> FloatArray:
@@ -92,8 +94,8 @@ def refine(space: ShapeSpace, fit: Fit, pairs: Pairs, noise: float) -> Fit:
     above = np.stack([np.eye(3) if parent < 0 else rotation[parent] for parent in space.base.parents])
     # the joints turn in world axes: so must the pose that is drawn to zero
     bent = np.einsum("jab,jb->ja", above, fit.pose)
-    straight = np.concatenate([space.whitener @ fit.parameters, (bent / sigma[:, None]).ravel()])
-    slope = _slope(space, fit, pairs) * weight[:, None]
+    straight = np.concatenate([space.whitener @ (fit.parameters - fit.expected), (bent / sigma[:, None]).ravel()])
+    slope = derivatives(space, fit, pairs) * weight[:, None]
     normal = slope.T @ slope + prior.T @ prior
     right = -slope.T @ (wrong * weight) - prior.T @ straight
     move = np.linalg.solve(normal + 1e-9 * np.eye(len(normal)), right)
@@ -106,7 +108,7 @@ def refine(space: ShapeSpace, fit: Fit, pairs: Pairs, noise: float) -> Fit:
     return replace(fit, parameters=fit.parameters + move[:count], pose=pose, translation=fit.translation + move[-3:])
 
 
-def _slope(space: ShapeSpace, fit: Fit, pairs: Pairs) -> FloatArray:
+def derivatives(space: ShapeSpace, fit: Fit, pairs: Pairs) -> FloatArray:
     """Derivative of each pair's distance by shape, joint turns in world axes, translation: (N, P + 3 J + 3)."""
     base = space.base
     joints = space.joints(fit.parameters)

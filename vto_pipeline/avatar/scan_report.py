@@ -17,7 +17,7 @@ EXPLAINED_M = 0.010
 CORE = 0.3
 """A vertex belongs to trunk and limbs when it belongs less than this to head, hands and feet."""
 _TRUNK = 0.8
-_MIN_TRUNK = 0.3
+_MIN_TRUNK, _MIN_LIMB = 0.3, 0.5
 _POINTS = 5000
 
 
@@ -57,6 +57,11 @@ def report(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray, job: Job
             )
     job.measure(explained_share=round(float(explained.mean()), 3))
     job.measure(trunk_covered=round(_trunk_covered(scan, space, vertices), 3))
+    for limb, share in _limbs_covered(scan, space, vertices).items():
+        if share < _MIN_LIMB:
+            job.warn(
+                f"{share:.0%} of the {limb} is in the scan: its measurements are those of a likely body of this size"
+            )
 
 
 def ends(space: ShapeSpace) -> FloatArray:
@@ -66,6 +71,18 @@ def ends(space: ShapeSpace) -> FloatArray:
     ]
     share: FloatArray = space.base.weights[:, joints].sum(axis=1)
     return share
+
+
+def _limbs_covered(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray) -> dict[str, float]:
+    """Return arm or leg -> the share of it that the scan shows, without hands and feet."""
+    names = space.base.joint_names
+    covered = {}
+    for side in ("left", "right"):
+        for limb, joints in {"arm": ("shoulder", "elbow"), "leg": ("hip", "knee")}.items():
+            own = space.base.weights[:, [names.index(f"{side}_{joint}") for joint in joints]].sum(axis=1) > _TRUNK
+            seen = closest_points(vertices[own], scan.vertices, scan.faces)[2]
+            covered[f"{side} {limb}"] = float((seen < EXPLAINED_M).mean())
+    return covered
 
 
 def _trunk_covered(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray) -> float:

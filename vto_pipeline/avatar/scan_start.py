@@ -1,4 +1,4 @@
-"""Where to begin a registration: a cleaned scan, and the facing, place, size and arm pose that explain it best."""
+"""Where to begin a registration: the axis, facing, place, size and arm pose that explain a scan best."""
 
 from __future__ import annotations
 
@@ -10,19 +10,20 @@ from scipy.spatial import cKDTree
 
 from vto_pipeline.avatar.pose import named_pose
 from vto_pipeline.avatar.template import template
+from vto_pipeline.avatar.upright import turns_upright, without_floor
 from vto_pipeline.errors import AvatarError
 from vto_pipeline.geometry.sampling import sample_surface
-from vto_pipeline.geometry.topology import face_components, submesh
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
-_PROBES = 700
-_SMALL_PIECE = 0.02
+_PROBES = 300
 _CAP_M = 0.15
-_FLAT_M = 0.12
-_FULL_BODY_M = (1.30, 2.30)
-_MIN_HEIGHT_M = 0.35
+_SURELY_WHOLE_M, _CHILD_M = 1.30, 0.80
+"""A scan this tall is of a whole body; one less tall is of a child or of a part; a smaller one is of a part."""
+_SURE_M = 0.035
+"""A body that is matched so well by the first guess stands along +Y."""
+_OTHER_AXIS = 1.25
 _PART_SCALES = (0.92, 1.0, 1.08)
 _PART_BOTTOMS = np.arange(0.0, 1.25, 0.04)
 """At which height of the template a partial scan may end below [m]."""
@@ -47,39 +48,39 @@ class Start:
     score: float
 
 
-def clean(scan: TriangleMesh, job: Job) -> TriangleMesh:
-    """Return the scan without crumbs and floor pieces.
+def upright_starts(scan: TriangleMesh, job: Job) -> tuple[TriangleMesh, list[Start]]:
+    """Return the scan with +Y up and without floor, and the guesses for it, best first.
 
-    Raises:
-        AvatarError: what is left is too small for a body.
+    The file's own +Y is kept unless another axis explains the scan clearly better.
+
+    Args:
+        scan: In metres.
+        job: Told of a turn.
     """
-    count, piece = face_components(scan)
-    corners = scan.vertices[scan.faces]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-    total = np.bincount(piece, area, count)
-    high, low = np.full(count, -np.inf), np.full(count, np.inf)
-    np.maximum.at(high, piece, corners[:, :, 1].max(axis=1))
-    np.minimum.at(low, piece, corners[:, :, 1].min(axis=1))
-    good = (total > _SMALL_PIECE * total.max()) & (high - low > _FLAT_M)
-    if not good.any():
-        raise AvatarError("the scan holds no piece tall enough for a body", hint="is the unit metres and +Y up?")
-    if not good.all():
-        job.note(f"{int((~good).sum())} of {count} pieces of the scan left out: crumbs or flat pieces such as a floor")
-    kept = submesh(scan, good[piece])[0]
-    height = float(np.ptp(kept.vertices[:, 1]))
-    if not _MIN_HEIGHT_M < height < _FULL_BODY_M[1]:
-        raise AvatarError(
-            f"the scan is {height:.2f} m tall; a body or a dress form is {_MIN_HEIGHT_M} to {_FULL_BODY_M[1]} m",
-            hint="check the unit, and that +Y is up",
-        )
-    return kept
+    best: tuple[float, str, TriangleMesh, list[Start]] | None = None
+    for name, turn in turns_upright(scan).items():
+        stands = without_floor(TriangleMesh(scan.vertices @ turn.T, scan.faces))
+        guesses = starts(stands)
+        score = guesses[0].score * (1.0 if name == "+Y" else _OTHER_AXIS)
+        if best is None or score < best[0]:
+            best = (score, name, stands, guesses)
+        if name == "+Y" and score < _SURE_M:
+            break
+    if best is None:
+        raise AvatarError("the scan is in no direction as tall as a body or a form", hint="check the unit")
+    _, name, stands, guesses = best
+    if len(stands.faces) < len(scan.faces):
+        job.note("a floor that had grown together with the feet is cut off")
+    if name != "+Y":
+        job.note(f"{name} of the scan is up: the avatar stands in axes turned so that it is +Y")
+    return stands, guesses
 
 
 def starts(scan: TriangleMesh) -> list[Start]:
     """Return the best guess for each of four facings, best first.
 
     Args:
-        scan: Cleaned.
+        scan: In metres, +Y up.
     """
     probes, _, _ = sample_surface(scan, _PROBES, 0)
     middle = probes.mean(axis=0)
@@ -119,9 +120,11 @@ def _best(probes: FloatArray, yaw: float) -> Start:
 def _sizes(points: FloatArray, height: float, stature: float) -> list[tuple[float, float]]:
     """Sizes and lifts to try: of a whole body the height says both, of a part neither."""
     low = float(points[:, 1].min())
-    if height > _FULL_BODY_M[0]:
-        return [(height / stature, low)]
-    return [(scale, lift) for scale in _PART_SCALES for lift in low - _PART_BOTTOMS * scale]
+    whole = [(height / stature, low)]
+    if height > _SURELY_WHOLE_M:
+        return whole
+    parts = [(scale, lift) for scale in _PART_SCALES for lift in low - _PART_BOTTOMS * scale]
+    return parts + (whole if height > _CHILD_M else [])
 
 
 def _about_y(angle: float) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""Carry a displaced body back to the bind pose, sound in both poses: no face turned over, none through another."""
+"""Carry a displaced body back to its bind pose, sound in both poses: no face turned over, none through another."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from vto_pipeline.avatar.displacement import untangle
-from vto_pipeline.avatar.pose import joint_transforms, pose_avatar
+from vto_pipeline.avatar.pose import blend, joint_transforms, pose_avatar
 from vto_pipeline.avatar.registration import Fit
 from vto_pipeline.avatar.shape import ShapeSpace
+from vto_pipeline.avatar.stance import Stance
 from vto_pipeline.avatar.template import JOINTS, membership
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Avatar
@@ -32,29 +33,41 @@ def part_thighs(space: ShapeSpace, fit: Fit, vertices: FloatArray) -> FloatArray
     return parted
 
 
-def settle(space: ShapeSpace, fit: Fit, posed: FloatArray, vertices: FloatArray) -> tuple[Avatar, int]:
+def settle(space: ShapeSpace, fit: Fit, stands: Stance, posed: FloatArray, vertices: FloatArray) -> tuple[Avatar, int]:
     """Carry the displaced vertices back to the bind pose, and mend tangled faces in both poses.
+
+    Args:
+        space: The shape space.
+        fit: Pose and shape of the body before its displacement.
+        stands: The skeleton at rest that the body shall have.
+        posed: The body before its displacement [m], shape (V, 3).
+        vertices: The displaced body.
 
     Returns:
         The body, and how many faces are still tangled in either pose.
     """
     faces, weights = space.base.faces, space.base.weights
-    joints, straight = space.joints(fit.parameters), space.vertices(fit.parameters)
-    rotation, offset = joint_transforms(joints, space.base.parents, fit.pose)
-    blended = (weights @ rotation.reshape(len(rotation), 9)).reshape(-1, 3, 3)
-    place = weights @ offset + fit.translation
+    rotation, offset = joint_transforms(stands.joints, space.base.parents, stands.pose)
+    turn, place = blend(weights, rotation, offset)
+    place = place + stands.translation
+
+    def at_rest(points: FloatArray) -> FloatArray:
+        rest: FloatArray = np.einsum("vba,vb->va", turn, points - place)
+        return rest
+
+    straight = at_rest(posed)
     for _ in range(_SETTLE_ROUNDS):
         vertices, bad = untangle(posed, vertices, faces)
-        bind: FloatArray = np.linalg.solve(blended, (vertices - place)[:, :, None])[:, :, 0].astype(np.float64)
+        bind = at_rest(vertices)
         mended, bad_bind = untangle(straight, bind, faces)
-        vertices = np.einsum("vab,vb->va", blended, mended) + place
+        vertices = np.einsum("vab,vb->va", turn, mended) + place
         if np.array_equal(mended, bind):
             break
     floor = np.array([0.0, mended[:, 1].min(), 0.0])
     body = replace(
         space.base,
         bind_vertices=mended - floor,
-        joints=joints - floor,
+        joints=stands.joints - floor,
         parameters=dict(zip(space.names, fit.parameters.tolist(), strict=True)),
     )
-    return pose_avatar(body, fit.pose, fit.translation + floor), bad + bad_bind
+    return pose_avatar(body, stands.pose, stands.translation + floor), bad + bad_bind

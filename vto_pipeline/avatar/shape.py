@@ -24,9 +24,15 @@ from vto_pipeline.model.body import Avatar
 SEX_SHARE = {"female": 0.0, "neutral": 0.5, "male": 1.0}
 """What people call a body -> its place between the two templates."""
 
-_TRUNK_KNOTS = ("hip", "high_hip", "waist", "underbust", "chest", "shoulder")
+_SEGMENTS = ("foot", "shank", "thigh", "seat", "belly", "midriff", "ribs", "chest", "shoulder", "neck", "head")
+_STRETCH, _SLIDE_M = 0.06, 0.008
+"""Spread of a segment's height among people, where long and where short."""
+_KINK_M = 0.02
+_TRUNK_KNOTS = ("hip", "high_hip", "navel", "waist", "underbust", "chest", "shoulder")
 _LEG_KNOTS = ("ankle", "calf", "knee", "midthigh", "thigh")
-_NEIGHBOUR_CORRELATION = 0.8
+_TRUNK_CHANGES = ("breadth", "depth", "shift", "fullness")
+_ALIKE_M = 0.25
+"""How far along the body its thickness varies together."""
 _ARM_KNOTS = ("armpit", "upper_arm", "elbow", "forearm", "wrist", "hand")
 
 
@@ -88,22 +94,42 @@ def shape_space(sex: float) -> ShapeSpace:
         base,
         names,
         sigmas,
-        np.linalg.inv(np.linalg.cholesky(_covariance(names, sigmas))),
+        np.linalg.inv(np.linalg.cholesky(_covariance(sex, names, sigmas))),
         np.stack([skin[name][1] for name in names]),
         np.stack([bone[name][1] for name in names]),
     )
 
 
-def _covariance(names: tuple[str, ...], sigmas: FloatArray) -> FloatArray:
-    chains = [[f"{knot}_{what}" for knot in _TRUNK_KNOTS] for what in ("breadth", "depth", "shift", "fullness")]
-    chains += [[f"{knot}_girth" for knot in _LEG_KNOTS], [f"{knot}_scale" for knot in _ARM_KNOTS]]
+def _covariance(sex: float, names: tuple[str, ...], sigmas: FloatArray) -> FloatArray:
+    """Neighbours along trunk and limbs vary together: a Matern 3/2 process (Rasmussen & Williams 2006, eq. 4.17)."""
+    chains = [(_trunk_heights(sex), [f"{knot}_{what}" for knot in _TRUNK_KNOTS]) for what in _TRUNK_CHANGES]
+    chains += [(_leg_heights(sex), [f"{knot}_girth" for knot in _LEG_KNOTS])]
+    chains += [(_arm_stations(sex), [f"{knot}_scale" for knot in _ARM_KNOTS])]
     likeness = np.eye(len(names))
-    for chain in chains:
-        place = np.array([names.index(name) for name in chain])
-        likeness[np.ix_(place, place)] = _NEIGHBOUR_CORRELATION ** np.abs(
-            np.subtract.outer(range(len(chain)), range(len(chain)))
-        )
+    for place, chain in chains:
+        at = np.array([names.index(name) for name in chain])
+        apart = np.sqrt(3) * np.abs(np.subtract.outer(place, place)) / _ALIKE_M
+        likeness[np.ix_(at, at)] = (1 + apart) * np.exp(-apart)
     return likeness * np.outer(sigmas, sigmas)
+
+
+def _trunk_heights(sex: float) -> FloatArray:
+    low = [_blend(sex, FEMALE.levels[name], MALE.levels[name]) for name in _TRUNK_KNOTS[:-1]]
+    return np.array([*low, _blend(sex, FEMALE.shoulder[1], MALE.shoulder[1])])
+
+
+def _leg_heights(sex: float) -> FloatArray:
+    ankle, calf, knee, thigh = (
+        _blend(sex, FEMALE.levels[name], MALE.levels[name]) for name in ("ankle", "calf", "knee", "thigh")
+    )
+    return np.array([ankle, calf, knee, (knee + thigh) / 2, thigh])
+
+
+def _arm_stations(sex: float) -> FloatArray:
+    elbow, wrist, tip = (
+        _blend(sex, getattr(FEMALE, name), getattr(MALE, name)) for name in ("elbow", "wrist", "fingertip")
+    )
+    return np.array([0.05, 0.16, elbow, elbow + 0.06, wrist, (wrist + tip) / 2])
 
 
 def _fields(sex: float, points: FloatArray, arm: FloatArray, leg: FloatArray) -> dict[str, tuple[float, FloatArray]]:
@@ -130,26 +156,15 @@ def _fields(sex: float, points: FloatArray, arm: FloatArray, leg: FloatArray) ->
         """A trunk's field, by which arms are carried along as the shoulder joint is."""
         return trunk * of_place + arm * at_shoulder
 
-    stops = [
-        0.0,
-        level["ankle"],
-        level["knee"],
-        level["crotch"],
-        level["waist"],
-        neck_base,
-        level["neck"] + 0.02,
-        crown,
-    ]
-    for name, low, high in zip(
-        ("foot", "shank", "thigh", "pelvis", "thorax", "neck", "head"), stops, stops[1:], strict=False
-    ):
-        add(
-            f"{name}_height",
-            0.06,
-            dy=carried(np.clip(y, low, high) - low, float(np.clip(shoulder[1], low, high) - low)),
-        )
+    # below the floor, so that the sole is stretched as the foot is
+    stops = [-_KINK_M, level["ankle"], level["knee"], level["crotch"], level["hip"], level["navel"], level["waist"]]
+    stops += [level["chest"], shoulder[1], neck_base, level["neck"] + 0.02, crown]
+    for name, low, high in zip(_SEGMENTS, stops, stops[1:], strict=False):
+        sigma = max(_STRETCH, _SLIDE_M / (high - low))
+        at_shoulder = float(_stretched(shoulder[1:2], low, high)[0])
+        add(f"{name}_height", sigma, dy=carried(_stretched(y, low, high), at_shoulder))
 
-    _add_trunk(add, carried, level, shoulder, neck_base, x, y, z)
+    _add_trunk(add, carried, level, _trunk_heights(sex), shoulder, neck_base, x, y, z)
     _add_legs(add, sex, level, leg, x, y, z)
     _add_arms(add, sex, arm, np.stack([x, y, z], axis=1) - shoulder)
     tall = level["neck"] + 0.01
@@ -165,14 +180,14 @@ def _add_trunk(  # type: ignore[no-untyped-def]
     add,
     carried,
     level: dict[str, float],
+    heights: FloatArray,
     shoulder: FloatArray,
     neck_base: float,
     x: FloatArray,
     y: FloatArray,
     z: FloatArray,
 ) -> None:
-    heights = [level[name] for name in _TRUNK_KNOTS[:-1]] + [shoulder[1]]
-    middle = np.interp(y, [*heights, neck_base], [-0.02, 0.0, 0.008, 0.004, 0.0, -0.025, -0.02])
+    middle = np.interp(y, [*heights, neck_base], [-0.02, 0.0, 0.006, 0.008, 0.004, 0.0, -0.025, -0.02])
     knots = np.array([level["thigh"] - 0.04, *heights, level["neck"]])
     up = _ramp(y, level["chest"], shoulder[1])
     outward = _ramp(x, 0.05, shoulder[0])
@@ -205,15 +220,15 @@ def _add_legs(  # type: ignore[no-untyped-def]
     center, radius = np.interp(y, axis[:, 0], axis[:, 1]), np.interp(y, axis[:, 0], axis[:, 2])
     depth = np.interp(y, axis[:, 0], (axis[:, 3] + axis[:, 4]) / 2)
     apart = _ramp(x, 0.0, 0.05)
-    heights = [level["ankle"], level["calf"], level["knee"], (level["knee"] + level["thigh"]) / 2, level["thigh"]]
-    rings = _cardinal(np.array([0.3 * level["ankle"], *heights, level["hip"] + 0.02]), y) * leg[:, None]
+    knots = np.array([0.3 * level["ankle"], *_leg_heights(sex), level["hip"] + 0.02])
+    rings = _cardinal(knots, y) * leg[:, None]
     for k, name in enumerate(_LEG_KNOTS, start=1):
         ring = rings[:, k]
         # the gap between the thighs stays: they grow outwards
         outwards = radius * ring if name in ("midthigh", "thigh") else 0.0
         add(f"{name}_girth", 0.09, dx=((x - center) * ring + outwards) * apart, dz=(z - depth) * ring)
     low = level["crotch"] - 0.02
-    add("crotch", 0.015, dy=_bell(x, 0.0, 0.05) * _bell(y, low, 0.06))
+    add("crotch", 0.020, dy=_bell(x, 0.0, 0.05) * _bell(y, low, 0.06))
     add("stance", 0.02, dx=(1 - _ramp(y, level["ankle"], level["hip"])) * leg)
     foot = _ramp(-y, -level["ankle"], -0.4 * level["ankle"])
     add("foot_length", 0.05, dz=(z + 0.03) * foot)
@@ -230,8 +245,7 @@ def _add_arms(add, sex: float, arm: FloatArray, from_shoulder: FloatArray) -> No
     for name, low, high in (("upper_arm", 0.09, elbow), ("forearm", elbow, wrist), ("hand", wrist, tip)):
         stretch = (np.clip(along, low, high) - low) * arm
         add(f"{name}_length", 0.06, dx=stretch * axis[0], dy=stretch * axis[1])
-    knots = np.array([-0.05, 0.05, 0.16, elbow, elbow + 0.06, wrist, (wrist + tip) / 2, tip + 0.10])
-    rings = _cardinal(knots, along) * arm[:, None]
+    rings = _cardinal(np.array([-0.05, *_arm_stations(sex), tip + 0.10]), along) * arm[:, None]
     for k, name in enumerate(_ARM_KNOTS, start=1):
         dx, dy, dz = (radial * rings[:, k, None]).T
         add(f"{name}_scale", 0.10, dx=dx, dy=dy, dz=dz)
@@ -245,6 +259,15 @@ def _ramp(value: FloatArray, low: float, high: float) -> FloatArray:
     """0 below, 1 above, smooth between."""
     t = np.clip((value - low) / (high - low), 0.0, 1.0)
     return t * t * (3 - 2 * t)
+
+
+def _stretched(value: FloatArray, low: float, high: float) -> FloatArray:
+    """Integral of 1 between low and high, 0 elsewhere, rounded over `_KINK_M` at both ends."""
+
+    def rising(t: FloatArray) -> FloatArray:
+        return np.where(np.abs(t) < _KINK_M, (t + _KINK_M) ** 2 / (4 * _KINK_M), np.maximum(t, 0.0))
+
+    return rising(value - low) - rising(value - high)
 
 
 def _cardinal(knots: FloatArray, value: FloatArray) -> FloatArray:

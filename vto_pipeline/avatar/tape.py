@@ -7,19 +7,23 @@ the body.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from vto_pipeline.avatar.definitions import Definition
-from vto_pipeline.avatar.template import columns, membership
+from vto_pipeline.avatar.template import beyond_armscye, columns, membership, template
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.body import Avatar
 
-DENSITY_KG_M3 = 985.0
-"""Of a living body with air in its lungs; between 960 (fat) and 1070 (lean)."""
+DENSITY_KG_M3 = 1000.0
+"""Of a living body with 2 to 3 l of air in its lungs: tissue of 1020 (fat) to 1070 (lean) kg/m3 (Siri 1961)."""
+DENSITY_SPREAD = 0.02
+LANDMARK_M = 0.005
+"""How well people agree on where a landmark is; our assumption, for lack of a published figure per landmark."""
+RESOLUTION_M = 0.001
 _ARM_ROWS = ("upper_arm", "elbow", "forearm", "wrist")
 _LEG_ROWS = ("thigh", "knee", "calf", "ankle")
 
@@ -71,7 +75,23 @@ class Tape:
             return Reading(
                 float(vertices[ends[0], 1] - vertices[ends[1], 1]), ends, np.array([[0, 1.0, 0], [0, -1.0, 0]])
             )
-        points = self._section(what.place, vertices, side)
+        return self._across(what, vertices, side)
+
+    def uncertainty(self, what: Definition, vertices: FloatArray) -> float:
+        """Return what the definition leaves open [m, kg]: how the value follows the landmarks and levels it rests on.
+
+        Whoever places a landmark again, misses it by `LANDMARK_M`; girths follow their slope along the body.
+        """
+        if what.kind == "mass":
+            return DENSITY_SPREAD * self.read(what, vertices).value
+        if what.kind in ("girth", "breadth", "depth"):
+            ends = [self._across(what, vertices, "left", shift).value for shift in (LANDMARK_M, -LANDMARK_M)]
+            return float(np.hypot(ends[0] - ends[1], RESOLUTION_M) / 2)
+        # from the floor one end is uncertain, between landmarks both are
+        return LANDMARK_M * (1.0 if what.kind == "height" else float(np.sqrt(2.0)))
+
+    def _across(self, what: Definition, vertices: FloatArray, side: str, shift: float = 0.0) -> Reading:
+        points = self._section(what.place, vertices, side, shift)
         return points.hull() if what.kind == "girth" else points.extent(0 if what.kind == "breadth" else 2)
 
     def _row(self, name: str, side: str) -> IntArray:
@@ -99,35 +119,25 @@ class Tape:
         value = float(vertices[top, 1].mean() - vertices[sole, 1])
         return Reading(value, np.append(top, sole).astype(np.int64), gradient)
 
-    def _section(self, place: str, vertices: FloatArray, side: str) -> Section:
+    def _section(self, place: str, vertices: FloatArray, side: str, shift: float) -> Section:
         row = self._row(place, side)
         if place in _ARM_ROWS:
             ends = [vertices[self._row(name, side)].mean(axis=0) for name in ("upper_arm", "wrist")]
-            normal, edges = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0]), self._edges[f"{side}_arm"]
+            normal, edges = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0]), _edges()[f"{side}_arm"]
         elif place in _LEG_ROWS:
-            normal, edges = np.array([0.0, 1.0, 0.0]), self._edges[f"{side}_leg"]
+            normal, edges = np.array([0.0, 1.0, 0.0]), _edges()[f"{side}_leg"]
         else:
-            normal, edges = np.array([0.0, 1.0, 0.0]), self._edges["trunk"]
-        return Section(vertices, row, normal, edges)
-
-    @cached_property
-    def _edges(self) -> dict[str, NDArray[np.int64]]:
-        faces = self._body.faces.astype(np.int64)
-        pairs = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-        edges = np.unique(pairs, axis=0)
-        arm, leg, x = membership("arm"), membership("leg"), self._body.bind_vertices[:, 0]
-        parts = {"trunk": arm < 0.5}
-        for side, sign in (("left", 1), ("right", -1)):
-            parts[f"{side}_arm"] = (arm > 0.5) & (sign * x > 0)
-            parts[f"{side}_leg"] = (leg > 0.2) & (sign * x >= 0)
-        return {name: edges[inside[edges].all(axis=1)] for name, inside in parts.items()}
+            normal, edges = np.array([0.0, 1.0, 0.0]), _edges()["trunk"]
+        return Section(vertices, row, normal, edges, shift)
 
 
 class Section:
-    """The points where a plane through a row's middle cuts the edges of a part."""
+    """The points where a plane through a row's middle, or `shift` [m] beside it, cuts the edges of a part."""
 
-    def __init__(self, vertices: FloatArray, row: IntArray, normal: FloatArray, edges: NDArray[np.int64]) -> None:
-        self._normal, self._row, self._level = normal, row, vertices[row].mean(axis=0) @ normal
+    def __init__(
+        self, vertices: FloatArray, row: IntArray, normal: FloatArray, edges: NDArray[np.int64], shift: float = 0.0
+    ) -> None:
+        self._normal, self._row, self._level = normal, row, vertices[row].mean(axis=0) @ normal + shift
         height = vertices @ normal - self._level
         self._edges = edges[(height[edges[:, 0]] < 0) != (height[edges[:, 1]] < 0)]
         below, above = height[self._edges].T
@@ -183,3 +193,17 @@ def _mass(vertices: FloatArray, faces: IntArray) -> Reading:
         np.add.at(gradient, corner, slope / 6)
     volume = float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
     return Reading(DENSITY_KG_M3 * volume, np.arange(len(vertices)), DENSITY_KG_M3 * gradient)
+
+
+@cache
+def _edges() -> dict[str, NDArray[np.int64]]:
+    """Return part -> its edges, shape (E, 2): trunk, and arm and leg of each side."""
+    body = template()
+    faces, leg, x = body.faces.astype(np.int64), membership("leg"), body.bind_vertices[:, 0]
+    pairs = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    edges = np.unique(pairs, axis=0)
+    parts = {"trunk": ~beyond_armscye()}
+    for side, sign in (("left", 1), ("right", -1)):
+        parts[f"{side}_arm"] = beyond_armscye() & (sign * x > 0)
+        parts[f"{side}_leg"] = (leg > 0.2) & (sign * x >= 0)
+    return {name: edges[inside[edges].all(axis=1)] for name, inside in parts.items()}

@@ -45,9 +45,9 @@ _BEND_M = {
     "chest": 0.07,
     "neck": 0.03,
     "head": 0.035,
-    "elbow": 0.04,
+    "elbow": 0.07,
     "wrist": 0.025,
-    "knee": 0.05,
+    "knee": 0.09,
     "ankle": 0.03,
 }
 """Half the length over which a joint's bend is spread."""
@@ -100,6 +100,15 @@ def parent_name(name: str) -> str:
 def membership(limb: str) -> FloatArray:
     """Return how much each vertex belongs to the arms or the legs ("arm", "clavicle", "leg"), 0 to 1, shape (V,)."""
     return _whole(_data()[limb].astype(np.float64), np.array(1.0))
+
+
+@cache
+def beyond_armscye() -> NDArray[np.bool_]:
+    """Return which vertices lie on the arms' side of the armscyes, shape (V,): where a tape round the chest stops."""
+    data = _data()
+    arm = np.zeros(len(data["mirror"]))
+    arm[data["row_arm"]] = 1.0
+    return _whole(arm, np.array(1.0)) > 0
 
 
 @cache

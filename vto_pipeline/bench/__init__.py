@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from vto_pipeline.bench.bench import Bench
+from vto_pipeline.report.body_plot import draw_body
 from vto_pipeline.report.collision_plot import draw_collision
 from vto_pipeline.report.plots import Curves, draw_curves
 from vto_pipeline.report.scaling_plot import draw_scaling
@@ -53,6 +54,11 @@ BENCHES = {
         "queries, broad phase, self-contact, friction: what is missed, what is left, how long it takes",
         "vto_pipeline.bench.collision",
         draw_collision,
+    ),
+    "body": Bench(
+        "bodies from scans, tape and outlines: error against run time, and the noise floor beside ISO 20685",
+        "vto_pipeline.bench.body",
+        draw_body,
     ),
     "scaling": Bench(
         "run time at equal error from 1k vertices up, kernels, threads", "vto_pipeline.bench.scaling", draw_scaling

@@ -37,12 +37,13 @@ def write_arrays(path: Path, arrays: Mapping[str, Any], *, compress: bool = Fals
                 npy.write_array(stream, np.asarray(arrays[name], order="C"), version=(1, 0), allow_pickle=False)
 
 
-def read_arrays(path: Path, required: Collection[str] = ()) -> Arrays:
-    """Read all arrays of an .npz file.
+def read_arrays(path: Path, required: Collection[str] = (), only: Collection[str] | None = None) -> Arrays:
+    """Read arrays of an .npz file.
 
     Args:
         path: The file.
         required: Names that must be there.
+        only: Names to read where they are there; the others are not looked at. None: all.
 
     Raises:
         InputError: missing or too large; FormatError: not an archive of plain arrays, or a name is missing.
@@ -54,7 +55,7 @@ def read_arrays(path: Path, required: Collection[str] = ()) -> Arrays:
         if promised > _LIMIT_BYTES:
             raise FormatError(f"unpacks to {promised} bytes; the limit is {_LIMIT_BYTES}", where=str(path))
         with np.load(path, allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in stored.files}
+            arrays = {name: stored[name] for name in stored.files if only is None or name in only}
     except (zipfile.BadZipFile, ValueError, EOFError, KeyError, OSError, NotImplementedError) as e:
         raise FormatError(f"not an archive of plain arrays: {e}", where=str(path)) from None
     missing = sorted(set(required) - set(arrays))

@@ -33,6 +33,8 @@ def write_avatar(path: Path, avatar: Avatar) -> None:
             "loop_vertices": np.concatenate([np.empty(0, np.int32), *loops]),
             "parameter_names": _strings(avatar.parameters),
             "parameter_values": np.array(list(avatar.parameters.values()), dtype=np.float64),
+            "sigma_names": _strings(avatar.sigmas),
+            "sigma_values": np.array(list(avatar.sigmas.values()), dtype=np.float64),
         },
     )
 
@@ -74,12 +76,15 @@ def _avatar(arrays: Arrays, path: Path) -> Avatar:
             sex=float(arrays["sex"]),
             landmarks=dict(zip(map(str, arrays["landmark_names"]), map(int, arrays["landmark_vertices"]), strict=True)),
             loops=dict(zip(map(str, arrays["loop_names"]), loops[: len(arrays["loop_names"])], strict=True)),
-            parameters=dict(
-                zip(map(str, arrays["parameter_names"]), map(float, arrays["parameter_values"]), strict=True)
-            ),
+            parameters=_named(arrays, "parameter"),
+            sigmas=_named(arrays, "sigma") if "sigma_names" in arrays else {},
         )
     except (KeyError, TypeError, ValueError) as e:
         raise FormatError(f"not an avatar: {e!r}", where=str(path)) from None
+
+
+def _named(arrays: Arrays, kind: str) -> dict[str, float]:
+    return dict(zip(map(str, arrays[f"{kind}_names"]), map(float, arrays[f"{kind}_values"]), strict=True))
 
 
 def _strings(values: Any) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
@@ -13,6 +14,7 @@ from vto_pipeline.errors import FormatError, InputError
 from vto_pipeline.io.documents import Document, check_schema, load_yaml, read_json, suggest, write_json
 from vto_pipeline.io.files import check_folder, listed
 from vto_pipeline.io.images import SUFFIXES, check_images
+from vto_pipeline.io.size_letters import chest_range
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Measurements
 from vto_pipeline.model.frames import Silhouettes
@@ -24,14 +26,27 @@ head_girth neck_girth neck_base_girth chest_girth bust_girth underbust_girth
 waist_girth navel_girth high_hip_girth hip_girth max_hip_girth
 armscye_girth upper_arm_girth elbow_girth forearm_girth wrist_girth thigh_girth knee_girth calf_girth ankle_girth
 chest_depth waist_breadth waist_depth hip_breadth hip_depth
-stature back_neck_height shoulder_height chest_height waist_height navel_height hip_height knee_height torso_height
-inside_leg
+stature back_neck_height shoulder_height chest_height waist_height navel_height hip_height thigh_height knee_height
+torso_height inside_leg
 shoulder_length back_shoulder_width across_back_shoulder_width back_width across_front_width scye_depth
 back_neck_to_waist back_neck_to_waist_level back_neck_to_navel front_neck_to_waist back_neck_to_wrist outer_arm_length
 mass
 """
 MEASUREMENT_NAMES = frozenset(_NAMES.split())
 """Names of ISO 8559-1 in snake case, and mass."""
+
+# titles of ISO 8559-1 that differ from our names
+_TITLES = {
+    "maximum_hip_girth": "max_hip_girth",
+    "scye_depth_length": "scye_depth",
+    "back_neck_point_to_waist": "back_neck_to_waist",
+    "back_neck_point_to_waist_level": "back_neck_to_waist_level",
+    "front_neck_point_to_waist": "front_neck_to_waist",
+    "back_neck_point_to_wrist_length": "back_neck_to_wrist",
+    "across_back_shoulder_width_through_the_back_neck_point": "across_back_shoulder_width",
+    "inside_leg_length": "inside_leg",
+    "body_mass": "mass",
+}
 
 _RANGES = {"mass": (10.0, 400.0), "stature": (0.5, 2.6)}  # kg, m
 _TORSO = frozenset({"chest_girth", "bust_girth", "waist_girth", "hip_girth", "max_hip_girth"})
@@ -45,7 +60,8 @@ class MeasurementsFile(Config):
 
     sex: Literal["female", "male", "neutral"] = Field("neutral", description="Of the customer.")
     unit: Unit = Field("cm", description="Of every length; mass is always in kg.")
-    measurements: dict[str, float] = Field(min_length=1, description="ISO 8559-1 name -> value.")
+    size: str | None = Field(None, description="Letter of EN 13402-3: the middle of its chest or bust girth.")
+    measurements: dict[str, float] = Field({}, description="ISO 8559-1 name -> value.")
     sigmas: dict[str, float] = Field({}, description="Name -> standard uncertainty, in the same unit.")
 
 
@@ -60,19 +76,23 @@ def read_measurements(source: Path | Mapping[str, Any]) -> Measurements:
     """Read measurements from a YAML or JSON file, or from a mapping of the same keys.
 
     Raises:
-        InputError: an unknown key or name (with its line and a suggestion), or a value no body has, as in a wrong unit.
+        InputError: an unknown key or name (with its line and a suggestion), a value no body has, as in a wrong unit, a
+            size that is unknown or that the chest contradicts, or nothing at all.
     """
     document = _document(source)
     stored: MeasurementsFile = check_schema(document, MeasurementsFile, error=InputError)
+    if not stored.measurements and stored.size is None:
+        raise InputError("neither measurements nor size is given", where=str(document.path))
     for section in ("measurements", "sigmas"):
         for name in getattr(stored, section):
-            if name not in MEASUREMENT_NAMES:
+            if _snake(name) not in MEASUREMENT_NAMES:
                 problem = f"{section}.{name}: unknown measurement (got {getattr(stored, section)[name]})"
                 hint = suggest(name, MEASUREMENT_NAMES)
                 raise InputError(problem, where=document.where((section, name)), hint=hint)
 
     def to_si(values: Mapping[str, float]) -> dict[str, float]:
-        return {name: value * (1.0 if name == "mass" else LENGTH_M[stored.unit]) for name, value in values.items()}
+        named = {_snake(name): value for name, value in values.items()}
+        return {name: value * (1.0 if name == "mass" else LENGTH_M[stored.unit]) for name, value in named.items()}
 
     values = to_si(stored.measurements)
     for name, value in values.items():
@@ -81,8 +101,32 @@ def read_measurements(source: Path | Mapping[str, Any]) -> Measurements:
             unit = "kg" if name == "mass" else "m"
             problem = f"measurements.{name}: {value:.4g} {unit} is not a body's; wanted {low} to {high} {unit}"
             hint = f"lengths are read in {stored.unit}: set unit: to m, cm, mm or in"
-            raise InputError(problem, where=document.where(("measurements", name)), hint=hint)
+            written = next(key for key in stored.measurements if _snake(key) == name)
+            raise InputError(problem, where=document.where(("measurements", written)), hint=hint)
+    if stored.size is not None:
+        values = _of_size(stored.size, stored.sex, values, document)
     return Measurements(values, to_si(stored.sigmas), stored.sex)
+
+
+def _snake(name: str) -> str:
+    """As ISO 8559-1 prints it ("Back neck point to waist") or in snake case -> our name."""
+    written = "_".join(re.findall("[a-z0-9]+", name.lower()))
+    return _TITLES.get(written, written)
+
+
+def _of_size(letter: str, sex: str, values: dict[str, float], document: Document) -> dict[str, float]:
+    """Add the chest of a letter size, or check it against the chest that is given."""
+    try:
+        low, high = chest_range(letter, sex)
+    except InputError as e:
+        raise InputError(e.problem, where=document.where(("size",)), hint=e.hint) from None
+    given = values.get("chest_girth", values.get("bust_girth"))
+    if given is None:
+        return {**values, "chest_girth": (low + high) / 2}
+    if not low <= given <= high:
+        problem = f"size {letter} is a chest of {low:.2f} to {high:.2f} m, but a chest of {given:.3f} m is given"
+        raise InputError(problem, where=document.where(("size",)), hint="leave out one of the two")
+    return values
 
 
 def write_measurements(path: Path, measurements: Measurements) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from vto_pipeline.errors import FormatError
 from vto_pipeline.io.arrays import Arrays
 from vto_pipeline.io.gltf_document import GltfDocument, open_gltf
+from vto_pipeline.io.gltf_skin import Skin, read_skin, read_weights
 from vto_pipeline.model.arrays import FloatArray
 
 _TRIANGLES = 4
@@ -18,13 +19,16 @@ _NODES = 10_000  # visits: a node may be reached by many parents in a broken fil
 
 
 def parse_gltf(name: str) -> Arrays:
-    """Read the triangles of the default scene; skins, morph targets, textures and animations are left.
+    """Read the triangles of the default scene; morph targets, textures and animations are left.
+
+    A skinned part stands as its skeleton at rest holds it.
 
     Args:
         name: Path of a .gltf or .glb file.
 
     Returns:
         vertices (V, 3), placed by their nodes; faces (F, 3); colors (V, 3) uint8, where every part has them; notes.
+        Where every part hangs on one skin also joint_names, joints (J, 3), parents (J,), weights (V, J).
 
     Raises:
         FormatError: the file breaks the format, or has no triangles.
@@ -33,15 +37,28 @@ def parse_gltf(name: str) -> Arrays:
     vertices, faces, notes = [], [], []
     colors: list[np.ndarray] = []
     count = 0
-    for transform, mesh in _placed_meshes(document):
-        for primitive in mesh.get("primitives", []):
+    worlds = dict(_placed_nodes(document))
+    skins: dict[int, Skin] = {}
+    weights: list[np.ndarray] = []
+    for index, transform in worlds.items():
+        node = document.item("nodes", index)
+        if "mesh" not in node:
+            continue
+        skin = skins.setdefault(node["skin"], read_skin(document, node["skin"], worlds)) if "skin" in node else None
+        for primitive in document.item("meshes", node["mesh"]).get("primitives", []):
             if primitive.get("mode", _TRIANGLES) != _TRIANGLES:
                 notes.append("left out a part that is not a list of triangles")
                 continue
             points, triangles, color = _primitive(document, primitive)
-            if np.linalg.det(transform[:3, :3]) < 0:  # a mirror turns the triangles inside out
-                triangles = triangles[:, ::-1]
-            vertices.append(points @ transform[:3, :3].T + transform[:3, 3])
+            if skin is None:
+                if np.linalg.det(transform[:3, :3]) < 0:  # a mirror turns the triangles inside out
+                    triangles = triangles[:, ::-1]
+                points = points @ transform[:3, :3].T + transform[:3, 3]
+            else:  # the node's own transform does not count
+                shares = read_weights(document, primitive.get("attributes", {}), len(points), len(skin.joints))
+                points = skin.place(points, shares)
+                weights.append(shares)
+            vertices.append(points)
             faces.append(triangles + count)
             colors += [] if color is None else [color]
             count += len(points)
@@ -52,6 +69,14 @@ def parse_gltf(name: str) -> Arrays:
     arrays: Arrays = {"vertices": np.concatenate(vertices), "faces": np.concatenate(faces)}
     if len(colors) == len(faces):
         arrays["colors"] = np.concatenate(colors)
+    if len(skins) == 1 and len(weights) == len(faces):
+        (skin,) = skins.values()
+        arrays |= {
+            "joint_names": np.array(skin.names, dtype=np.str_),
+            "joints": skin.joints,
+            "parents": skin.parents,
+            "weights": np.concatenate(weights),
+        }
     return {**arrays, "notes": np.array(notes, dtype=np.str_)}
 
 
@@ -88,8 +113,8 @@ def encode_srgb(linear: np.ndarray) -> np.ndarray:
     return np.round(curved * 255).astype(np.uint8)
 
 
-def _placed_meshes(document: GltfDocument) -> Iterator[tuple[FloatArray, Mapping[str, Any]]]:
-    """World transform (4, 4) and mesh of every node of the default scene that has one."""
+def _placed_nodes(document: GltfDocument) -> Iterator[tuple[int, FloatArray]]:
+    """Index and world transform (4, 4) of every node of the default scene."""
     scenes = document.items("scenes")
     if scenes:
         roots = document.item("scenes", document.json.get("scene", 0)).get("nodes", [])
@@ -104,8 +129,7 @@ def _placed_meshes(document: GltfDocument) -> Iterator[tuple[FloatArray, Mapping
             raise FormatError("the nodes form a loop, or are too many", where=str(document.path))
         node = document.item("nodes", index)
         world = above @ _local(node, document.path)
-        if "mesh" in node:
-            yield world, document.item("meshes", node["mesh"])
+        yield index, world
         stack += [(child, world, (*path, index)) for child in reversed(node.get("children", []))]
 
 

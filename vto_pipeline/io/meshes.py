@@ -16,10 +16,12 @@ from vto_pipeline.io.arrays import Arrays
 from vto_pipeline.io.files import check_file, replacing
 from vto_pipeline.io.gltf_read import parse_gltf
 from vto_pipeline.io.lengths import to_metres
+from vto_pipeline.io.makehuman import BASE, parse_makehuman
 from vto_pipeline.io.obj import parse_obj
 from vto_pipeline.io.off import parse_off
 from vto_pipeline.io.ply import parse_ply
 from vto_pipeline.io.sandbox import run_limited
+from vto_pipeline.io.smpl import parse_smpl
 from vto_pipeline.io.stl import parse_stl
 from vto_pipeline.io.tidy import check_sound, drop_needless, join_corners
 from vto_pipeline.model.job import Job
@@ -32,6 +34,7 @@ PARSERS: dict[str, Callable[[str], Arrays]] = {
     ".off": parse_off,
     ".glb": parse_gltf,
     ".gltf": parse_gltf,
+    ".npz": parse_smpl,
 }
 """Suffix -> parser."""
 
@@ -42,7 +45,7 @@ def read_mesh(path: Path, *, unit: str | None = None, job: Job | None = None) ->
     """Read a mesh made by anyone: parsed in a limited child process, checked, cleaned, scaled to metres.
 
     Args:
-        path: PLY, OBJ, STL, OFF, glTF or GLB.
+        path: PLY, OBJ, STL, OFF, glTF or GLB; a body model (.npz) or a MakeHuman folder at rest.
         unit: Unit of length in the file, a key of `units.LENGTH_M`; None: guessed from the size.
         job: Told of the guessed unit and of every change.
 
@@ -52,9 +55,9 @@ def read_mesh(path: Path, *, unit: str | None = None, job: Job | None = None) ->
     Raises:
         InputError: no such file, or no unit fits; FormatError: the file breaks its format or holds no sound mesh.
     """
-    path = check_file(Path(path), PARSERS, _LIMIT_BYTES)
+    path = Path(path)
+    arrays = parse(path)
     suffix = path.suffix.lower()
-    arrays = run_limited(PARSERS[suffix], str(path.resolve()), where=str(path))
     notes = [str(note) for note in arrays.pop("notes", np.empty(0))]
     if not len(arrays.get("faces", ())):
         problem = f"there are {len(arrays['vertices'])} points and no faces; wanted a mesh"
@@ -77,6 +80,19 @@ def read_mesh(path: Path, *, unit: str | None = None, job: Job | None = None) ->
         return TriangleMesh(vertices, arrays["faces"], arrays.get("colors"))
     except InputError as e:
         raise FormatError(e.problem, where=str(path), hint=e.hint) from None
+
+
+def parse(path: Path) -> Arrays:
+    """What a parser finds in a file, or in a folder of MakeHuman's, in a limited child process.
+
+    Raises:
+        InputError: no such file; FormatError: the file breaks its format.
+    """
+    path = Path(path)
+    if (path / BASE).is_file():
+        return run_limited(parse_makehuman, str(path.resolve()), where=str(path))
+    path = check_file(path, PARSERS, _LIMIT_BYTES)
+    return run_limited(PARSERS[path.suffix.lower()], str(path.resolve()), where=str(path))
 
 
 def read_own_mesh(path: Path) -> TriangleMesh:

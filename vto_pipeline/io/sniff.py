@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 
 from vto_pipeline.errors import InputError
-from vto_pipeline.io import clouds, images, meshes
+from vto_pipeline.io import clouds, images, makehuman, meshes
 from vto_pipeline.io.documents import load_yaml
 from vto_pipeline.io.files import listed
 from vto_pipeline.io.ply_header import read_header
 
 _WANTED = (
-    "a folder of photos, of depth frames, or of front and side pictures; a point cloud, a mesh, a measurements file, "
-    "or an avatar"
+    "a folder of photos, of depth frames, of front and side pictures, or of MakeHuman; a point cloud, a mesh, a body "
+    "model, a measurements file, or an avatar"
 )
 
 
@@ -40,6 +41,8 @@ def find_kind(path: Path) -> tuple[str, str]:
 def _folder(path: Path) -> tuple[str, str] | None:
     if (path / "intrinsics.json").is_file() and (path / "depth").is_dir():
         return "depth", "it holds intrinsics.json and depth/"
+    if (path / makehuman.BASE).is_file():
+        return "surface", f"it holds MakeHuman's {makehuman.BASE}"
     pictures = listed(path, images.SUFFIXES)
     if {"front", "side"} <= {p.stem.lower() for p in pictures} and (path / "stature.yaml").is_file():
         return "silhouettes", "it holds front and side pictures and stature.yaml"
@@ -51,6 +54,8 @@ def _folder(path: Path) -> tuple[str, str] | None:
 def _file(path: Path) -> tuple[str, str] | None:
     suffix = path.suffix.lower()
     if suffix == ".npz":
+        if "v_template.npy" in _members(path):
+            return "surface", "it is an .npz archive of a body model"
         return "avatar", "it is an .npz archive"
     if suffix in (".yaml", ".yml", ".json"):
         data = load_yaml(path, error=InputError).data
@@ -66,6 +71,14 @@ def _file(path: Path) -> tuple[str, str] | None:
     if suffix in meshes.PARSERS:
         return "surface", f"{suffix} files hold meshes"
     return None
+
+
+def _members(path: Path) -> list[str]:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return archive.namelist()
+    except (zipfile.BadZipFile, OSError):
+        return []
 
 
 def _ply(path: Path) -> tuple[str, str]:

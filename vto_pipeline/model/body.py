@@ -50,6 +50,7 @@ class Avatar:
         landmarks: Name -> vertex index.
         loops: Name -> closed loop of vertex indices.
         parameters: Name -> value of the shape parameters, for the record.
+        sigmas: Measurement name -> standard uncertainty with which the body has it [m, kg]; absent where unknown.
     """
 
     bind_vertices: FloatArray
@@ -65,6 +66,7 @@ class Avatar:
     landmarks: Mapping[str, int] = field(default_factory=dict)
     loops: Mapping[str, IntArray] = field(default_factory=dict)
     parameters: Mapping[str, float] = field(default_factory=dict)
+    sigmas: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         count, bones = len(self.bind_vertices), len(self.joint_names)
@@ -83,6 +85,47 @@ class Avatar:
     @property
     def mesh(self) -> TriangleMesh:
         """The posed body."""
+        return TriangleMesh(self.vertices, self.faces)
+
+
+@dataclass(frozen=True)
+class SkinnedBody:
+    """A body of somebody else's topology with its skeleton, as its maker left it; register ours to its mesh to use it.
+
+    Args:
+        vertices: At rest [m], shape (V, 3).
+        faces: Shape (F, 3).
+        joint_names: J names.
+        joints: Joint centres at rest [m], shape (J, 3).
+        parents: Index of each joint's parent, -1 for a root, shape (J,).
+        weights: Skinning weights, rows sum to 1, shape (V, J).
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    joint_names: tuple[str, ...]
+    joints: FloatArray
+    parents: IntArray
+    weights: FloatArray
+
+    def __post_init__(self) -> None:
+        count, bones = len(self.vertices), len(self.joint_names)
+        for name, shape, dtype in (
+            ("vertices", (count, 3), "f8"),
+            ("faces", (None, 3), "i4"),
+            ("joints", (bones, 3), "f8"),
+            ("parents", (bones,), "i4"),
+            ("weights", (count, bones), "f8"),
+        ):
+            object.__setattr__(self, name, freeze(f"skinned body {name}", getattr(self, name), shape, dtype))
+        if bones == 0 or (self.weights < 0).any() or (abs(self.weights.sum(axis=1) - 1) > 1e-6).any():
+            raise InputError("skinned body: every vertex needs weights of at least 0 that sum to 1")
+        if (self.parents < -1).any() or (self.parents >= bones).any():
+            raise InputError(f"skinned body: a parent is outside -1..{bones - 1}")
+
+    @property
+    def mesh(self) -> TriangleMesh:
+        """The body at rest."""
         return TriangleMesh(self.vertices, self.faces)
 
 

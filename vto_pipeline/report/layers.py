@@ -13,10 +13,11 @@ from vto_pipeline.model.body import Avatar
 from vto_pipeline.model.garment import SurfaceLabels
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.render import GlbPart
+from vto_pipeline.report.body_loops import loop_ribbons
 from vto_pipeline.report.render_colors import join_parts
 from vto_pipeline.report.scales import CLEARANCE, SCAN, STRETCH, Key, Ramp
 
-_SKIN, _CLOTH, _FORM, _MARK = "#d6b59c", "#6a8fc0", "#b9b5ad", "#d62728"
+_SKIN, _CLOTH, _FORM, _MARK, _TAPE = "#d6b59c", "#6a8fc0", "#b9b5ad", "#d62728", "#2f4b7c"
 _GROUPS = ("garment", "body", "marks", "scan")
 _PLAIN = (  # artifact, name, group, colour where it has none of its own
     ("render_mesh", "Garment", "garment", _CLOTH),
@@ -60,6 +61,9 @@ def list_layers(parts: Mapping[str, Any]) -> list[Layer]:
         if artifact in parts:
             mesh = _surface(parts[artifact])
             layers.append(Layer(name, mesh, group, color if mesh.colors is None else mesh.colors))
+    avatar = parts.get("avatar")
+    if isinstance(avatar, Avatar) and avatar.loops:
+        layers.append(Layer("Where it was measured", loop_ribbons(avatar), "marks", _TAPE))
     if "draped" in parts and "fit_maps" in parts:
         maps, draped = parts["fit_maps"], parts["draped"]
         layers.append(Layer("Stretch", draped, "garment", STRETCH.paint(100 * (maps["stretch"] - 1)), STRETCH))

@@ -11,7 +11,7 @@ from vto_pipeline.avatar.from_measurements import MeasurementsConfig, fit_measur
 from vto_pipeline.avatar.from_scan import ScanConfig, fit_scan
 from vto_pipeline.avatar.from_silhouettes import SilhouettesConfig, fit_silhouettes
 from vto_pipeline.avatar.measure import landmarks, measure
-from vto_pipeline.avatar.pose import named_pose
+from vto_pipeline.avatar.pose import clear_pose
 from vto_pipeline.io.images import read_image
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.settings import Config
@@ -24,7 +24,7 @@ Outputs = Mapping[str, Any]
 class PoseConfig(Config):
     """Settings of the pose."""
 
-    pose: Literal["as_fitted", "a_pose", "t_pose", "arms_down"] = Field(
+    pose: Literal["as_fitted", "a_pose", "t_pose", "arms_down", "sitting"] = Field(
         "as_fitted", description="How the avatar stands; as_fitted keeps the pose of the scan or of the template."
     )
 
@@ -57,7 +57,7 @@ def _pose(inputs: Inputs, settings: PoseConfig, job: Job) -> Outputs:
     if settings.pose == "as_fitted":
         job.leave_out("posing", "the avatar keeps the pose it was fitted in")
         return {"avatar": avatar}
-    return {"avatar": named_pose(avatar, settings.pose)}
+    return {"avatar": clear_pose(avatar, settings.pose)}
 
 
 def _measure(inputs: Inputs, settings: Config, job: Job) -> Outputs:

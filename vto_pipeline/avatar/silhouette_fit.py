@@ -1,0 +1,244 @@
+"""Shape, poses and cameras that explain two outlines: Gauss-Newton on both at once.
+
+The person may have moved between the pictures: each view has its own pose, place and camera; the shape is shared. What
+the outlines leave open the population fills in (Boisvert et al. 2013 do the same with another model).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from vto_pipeline.avatar.correspondence import Pairs, robust
+from vto_pipeline.avatar.definitions import DEFINITIONS
+from vto_pipeline.avatar.outline import Camera, ImageOutline, model_outline
+from vto_pipeline.avatar.population import Population
+from vto_pipeline.avatar.pose import joint_transforms
+from vto_pipeline.avatar.registration import Fit, derivatives, model
+from vto_pipeline.avatar.shape import ShapeSpace
+from vto_pipeline.avatar.tape import Tape
+from vto_pipeline.model.arrays import FloatArray
+
+_POSE_SIGMA_RAD = {
+    "spine": 0.05,
+    "chest": 0.05,
+    "neck": 0.10,
+    "head": 0.10,
+    "clavicle": 0.10,
+    "shoulder": 0.40,
+    "elbow": 0.40,
+    "wrist": 0.20,
+    "hip": 0.12,
+    "knee": 0.08,
+    "ankle": 0.15,
+}
+"""Of a person who stands straight. A stoop that no view shows would make the picture's scale too large."""
+_ROOT_SIGMA_RAD = np.array([0.05, 0.10, 0.03])
+"""Of the whole body: how far the camera may be tilted, the person turned, the picture askew."""
+_STATURE_SIGMA_M = 0.003
+_DISTANCE_SPREAD = 0.08
+"""Relative. How strongly a picture converges depends on the distance so little that any misfit would settle it."""
+_MAX_MOVE = 2.0
+_CAP_M = 0.05
+_NORMAL_PX = 30.0
+"""A difference of one radian in direction counts as much as this distance, when outlines are matched."""
+
+
+@dataclass(frozen=True)
+class View:
+    """One picture and what is assumed of it.
+
+    Args:
+        outline: Of the person.
+        start: Nominal pose of the joints; the first is how the body stands to the camera, shape (J, 3).
+        fit: Where the model stands, in the camera's frame.
+        camera: Through which it is seen.
+    """
+
+    outline: ImageOutline
+    start: FloatArray
+    fit: Fit
+    camera: Camera
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What is known beside the outlines.
+
+    Args:
+        population: Of the measurements.
+        tape: Reads them.
+        stature: [m].
+        distance: Of the camera, expected [m].
+    """
+
+    population: Population
+    tape: Tape
+    stature: float
+    distance: float
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Where the fit stands.
+
+    Args:
+        views: Front and side.
+        parameters: Of the shape, shape (P,).
+        covariance: Of the parameters, shape (P, P).
+        wrong: Mean distance between the outlines before the step, per view, far points cut off [m].
+    """
+
+    views: tuple[View, ...]
+    parameters: FloatArray
+    covariance: FloatArray
+    wrong: tuple[float, ...]
+
+
+def step(
+    space: ShapeSpace,
+    views: tuple[View, ...],
+    evidence: Evidence,
+    trust: FloatArray,
+    reach: float,
+    noise: float,
+    independent: float,
+    stiff: float = 1.0,
+) -> Solution:
+    """Take one Gauss-Newton step over the shape and every view's pose, place and focal length.
+
+    Args:
+        space: The shape space.
+        views: Where to step from; all share their parameters.
+        evidence: Beside the outlines.
+        trust: How much each vertex counts, shape (V,).
+        reach: Distance at which a point begins to count little [m].
+        noise: Spread of an outline's distance [m].
+        independent: As how many independent points an outline counts.
+        stiff: How much more than it should the shape is drawn to the usual one.
+    """
+    count, joints = len(space.names), len(space.base.joints)
+    block = 3 * joints + 4
+    size = count + block * len(views)
+    normal, right = np.zeros((size, size)), np.zeros(size)
+    wrong = []
+    for k, view in enumerate(views):
+        slope, off, weight, apart = _rows(space, view, trust, reach)
+        wrong.append(apart)
+        scale = np.sqrt(weight * independent / weight.sum()) / noise
+        own, offs = _pose_prior(space, view, evidence)
+        place = np.r_[0:count, count + k * block : count + (k + 1) * block]
+        slope, off = slope * scale[:, None], off * scale
+        normal[np.ix_(place, place)] += slope.T @ slope
+        right[place] -= slope.T @ off
+        place = place[count:]
+        normal[np.ix_(place, place)] += own.T @ own
+        right[place] -= own.T @ offs
+    parameters = views[0].fit.parameters
+    usual = space.whitener @ (parameters - views[0].fit.expected)
+    for slope, off in (_tape_rows(space, parameters, evidence), (space.whitener, usual)):
+        normal[:count, :count] += stiff**2 * slope.T @ slope
+        right[:count] -= stiff**2 * slope.T @ off
+    normal += 1e-9 * np.eye(size)
+    move: FloatArray = np.linalg.solve(normal, right).astype(np.float64)
+    move *= min(
+        1.0, _MAX_MOVE / np.abs(move[:count] / space.sigmas).max(), 0.4 / np.abs(_turns(move, count, block)).max()
+    )
+    parameters = parameters + move[:count]
+    moved = tuple(
+        _moved(space, view, parameters, move[count + k * block : count + (k + 1) * block])
+        for k, view in enumerate(views)
+    )
+    return Solution(moved, parameters, np.linalg.inv(normal)[:count, :count].astype(np.float64), tuple(wrong))
+
+
+def _turns(move: FloatArray, count: int, block: int) -> FloatArray:
+    return move[count:].reshape(-1, block)[:, :-4]
+
+
+def _rows(
+    space: ShapeSpace, view: View, trust: FloatArray, reach: float
+) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """Derivatives, distances [m], weights: the model's rim in the picture's distance field and the reverse; their mean.
+
+    Distances count across the outline.
+    """
+    vertices = model(space, view.fit)
+    rim = model_outline(vertices, space.base.faces, view.camera)
+    metres = -view.fit.translation[2] / view.camera.focal
+    value, ahead = view.outline.distance(rim.at)
+    agree = (ahead * rim.normals).sum(axis=1) > 0.5
+    here = cKDTree(np.hstack([rim.at, _NORMAL_PX * rim.normals]))
+    seen, seen_normals = view.outline.points, view.outline.normals
+    _, nearest = here.query(np.hstack([seen, _NORMAL_PX * seen_normals]))
+    back = ((rim.at[nearest] - seen) * seen_normals).sum(axis=1)
+    away = np.linalg.norm(rim.at[nearest] - seen, axis=1) * metres
+    apart = (np.minimum(np.abs(value) * metres, _CAP_M).mean() + np.minimum(away, _CAP_M).mean()) / 2
+    fits = (seen_normals * rim.normals[nearest]).sum(axis=1) > 0.5
+    edges = np.concatenate([rim.edges, rim.edges[nearest]]).astype(np.int64)
+    normals = np.concatenate([ahead, seen_normals])
+    off = np.concatenate([value, back]) * metres
+    middle = vertices[edges].mean(axis=1)
+    weight = np.concatenate(
+        [
+            robust(np.abs(value) * metres, reach) * agree / max(len(value), 1),
+            robust(away, reach) * fits / max(len(back), 1),
+        ]
+    ) * trust[edges].mean(axis=1)
+    corners = np.concatenate([edges, edges[:, :1]], axis=1)
+    shares = np.tile([0.5, 0.5, 0.0], (len(edges), 1))
+    kept = weight > 1e-9
+    corners, shares, middle, normals, off, weight = (x[kept] for x in (corners, shares, middle, normals, off, weight))
+    directions = view.camera.pull_back(middle, normals) * metres
+    slope = derivatives(space, view.fit, Pairs(corners, shares, middle, directions, weight))
+    by_focal = ((view.camera.project(middle) - view.camera.middle) * normals).sum(axis=1) * metres
+    return np.hstack([slope, by_focal[:, None]]), off, weight, float(apart)
+
+
+def _pose_prior(space: ShapeSpace, view: View, evidence: Evidence) -> tuple[FloatArray, FloatArray]:
+    """Rows that draw the pose to the nominal one and the camera to its expected distance."""
+    base = space.base
+    joints = len(base.joints)
+    sigma = np.array([_POSE_SIGMA_RAD.get(name.rpartition("_")[2], 1.0) for name in base.joint_names])
+    sigmas = np.repeat(sigma[:, None], 3, axis=1)
+    sigmas[0] = _ROOT_SIGMA_RAD
+    rotation, _ = joint_transforms(space.joints(view.fit.parameters), base.parents, view.fit.pose)
+    above = np.stack([np.eye(3) if parent < 0 else rotation[parent] for parent in base.parents])
+    turned = Rotation.from_rotvec(view.fit.pose.copy()) * Rotation.from_rotvec(view.start.copy()).inv()
+    bent = np.einsum("jab,jb->ja", above, turned.as_rotvec())
+    rows = np.zeros((3 * joints + 1, 3 * joints + 4))
+    rows[: 3 * joints, : 3 * joints] = np.diag(1 / sigmas.ravel())
+    distance = -view.fit.translation[2]
+    rows[-1, -2] = -1 / (distance * _DISTANCE_SPREAD)
+    off = np.log(distance / evidence.distance) / _DISTANCE_SPREAD
+    return rows, np.append((bent / sigmas).ravel(), off)
+
+
+def _tape_rows(space: ShapeSpace, parameters: FloatArray, evidence: Evidence) -> tuple[FloatArray, FloatArray]:
+    """Rows that draw the measurements to the population's, and the stature to the one given."""
+    vertices = space.vertices(parameters)
+    readings = [evidence.tape.read(DEFINITIONS[name], vertices) for name in evidence.population.names]
+    slope = np.array([np.einsum("nk,pnk->p", r.gradient, space.fields[:, r.vertices]) for r in readings])
+    value = np.array([r.value for r in readings])
+    whiten = np.linalg.inv(np.linalg.cholesky(evidence.population.covariance))
+    tall = evidence.population.names.index("stature")
+    return (
+        np.vstack([whiten @ slope, slope[tall] / _STATURE_SIGMA_M]),
+        np.append(whiten @ (value - evidence.population.mean), (value[tall] - evidence.stature) / _STATURE_SIGMA_M),
+    )
+
+
+def _moved(space: ShapeSpace, view: View, parameters: FloatArray, move: FloatArray) -> View:
+    base = space.base
+    rotation, _ = joint_transforms(space.joints(view.fit.parameters), base.parents, view.fit.pose)
+    turn = move[:-4].reshape(-1, 3)
+    pose = np.empty_like(view.fit.pose)
+    for j, parent in enumerate(base.parents):
+        above = np.eye(3) if parent < 0 else rotation[parent]
+        local = above.T @ Rotation.from_rotvec(turn[j]).as_matrix() @ above
+        pose[j] = (Rotation.from_matrix(local) * Rotation.from_rotvec(view.fit.pose[j])).as_rotvec()
+    fit = replace(view.fit, parameters=parameters, pose=pose, translation=view.fit.translation + move[-4:-1])
+    return replace(view, fit=fit, camera=replace(view.camera, focal=view.camera.focal * float(np.exp(move[-1]))))

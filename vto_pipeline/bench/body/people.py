@@ -1,0 +1,76 @@
+"""People whose true body is known: drawn from the population, posed at random, scanned with noise, outliers, holes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vto_pipeline.avatar.from_measurements import fit_measurements
+from vto_pipeline.avatar.population import population
+from vto_pipeline.avatar.pose import pose_avatar
+from vto_pipeline.geometry.sampling import sample_surface
+from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.body import Avatar, Measurements
+from vto_pipeline.model.mesh import PointCloud
+
+ASKED = ("stature", "chest_girth", "waist_girth", "hip_girth")
+"""What a tape is put to; the population says the rest."""
+
+_SPREAD_RAD = {
+    "spine": 0.05,
+    "chest": 0.05,
+    "neck": 0.08,
+    "head": 0.08,
+    "clavicle": 0.05,
+    "shoulder": 0.20,
+    "elbow": 0.25,
+    "hip": 0.06,
+    "knee": 0.08,
+}
+"""How differently people stand who were asked to stand in an A-pose."""
+_HOLE_M = (0.03, 0.08)
+
+
+def drawn(sex: str, seed: int) -> Measurements:
+    """Return all measurements of a random person of the population (ANSUR II)."""
+    people = population(sex)
+    values = np.random.default_rng(seed).multivariate_normal(people.mean, people.covariance)
+    return Measurements(dict(zip(people.names, values.tolist(), strict=True)), sex=sex)
+
+
+def person(sex: str, seed: int) -> Avatar:
+    """Return a random body of our own shape space, in a random stance, facing anywhere."""
+    known = drawn(sex, seed)
+    body = fit_measurements(Measurements({name: known.values[name] for name in ASKED}, sex=sex))
+    rng = np.random.default_rng(seed)
+    pose = np.zeros((len(body.joints), 3))
+    for k, name in enumerate(body.joint_names):
+        pose[k] = rng.normal(0.0, _SPREAD_RAD.get(name.rpartition("_")[2], 0.0), 3)
+    pose[0] = [0.0, rng.uniform(-np.pi, np.pi), 0.0]
+    return pose_avatar(body, pose, np.array([rng.normal(0.0, 0.3), 0.0, rng.normal(0.0, 0.3)]))
+
+
+def cloud_of(
+    body: Avatar, seed: int, *, count: int = 20_000, noise: float = 0.002, outliers: float = 0.05, holes: float = 0.10
+) -> PointCloud:
+    """Return a poor scan.
+
+    Args:
+        body: The truth.
+        seed: Of noise, outliers and holes.
+        count: Points.
+        noise: Standard deviation in each direction [m].
+        outliers: Share of points that lie anywhere around the body.
+        holes: Share of the surface without points, in round patches.
+    """
+    rng = np.random.default_rng(seed)
+    kept = count - round(outliers * count)
+    points, _, _ = sample_surface(body.mesh, round(1.1 * kept / (1.0 - holes)), seed)
+    seen = np.ones(len(points), dtype=bool)
+    while (~seen).mean() < holes:
+        center = points[rng.integers(len(points))]
+        seen &= np.linalg.norm(points - center, axis=1) > rng.uniform(*_HOLE_M)
+    on_body = points[rng.permutation(np.flatnonzero(seen))[:kept]]
+    low, high = points.min(axis=0) - 0.1, points.max(axis=0) + 0.1
+    anywhere = rng.uniform(low, high, (count - len(on_body), 3))
+    scanned: FloatArray = np.concatenate([on_body + rng.normal(0.0, noise, on_body.shape), anywhere])
+    return PointCloud(scanned)
