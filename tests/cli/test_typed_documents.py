@@ -79,6 +79,10 @@ def test_drape_takes_avatars_meshes_and_measurements(typed):
     assert caught["data"]["given"]["body"] == {"mesh": "b.ply"}
     assert caught["data"]["given"]["mannequin"] == {"surface": "form.ply"}
     assert caught["data"]["given"]["fabric"] == "cotton_poplin"
+    assert caught["data"]["stages"] == {}
+    _, caught, _ = typed("drape", "--garment", "g.ply", "--body", "b.ply", "--source-body", "form.npz", "--regraded")
+    assert caught["data"]["given"]["mannequin"] == {"avatar": "form.npz"}
+    assert caught["data"]["stages"] == {"grade": {"mode": "regraded"}}
     _, caught, _ = typed("drape", "--garment", "g.ply", "--measurements", "tape.yaml")
     assert caught["data"]["given"]["body"] == {"measurements": "tape.yaml"}
     assert typed("drape", "--garment", "g.ply")[0] == 2

@@ -5,11 +5,11 @@ import pytest
 from cloth_scenes import ball, fabric, moved, tube
 from numpy.testing import assert_allclose, assert_array_equal
 
-import vto_pipeline.cloth.drape as drape_module
+import vto_pipeline.cloth.phases as phases_module
 from vto_pipeline.cloth.drape import drape
-from vto_pipeline.cloth.start import Start, vertices_of
+from vto_pipeline.cloth.start import Start
 from vto_pipeline.errors import ConfigError, IntersectingError
-from vto_pipeline.geometry.intersections import intersecting_faces, self_intersections
+from vto_pipeline.geometry.intersections import intersecting_faces, meeting_vertices, self_intersections
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.garment import Garment, RestShape
 from vto_pipeline.model.job import Job
@@ -49,6 +49,7 @@ def test_a_vest_comes_to_rest_on_the_pear():
     found = drape(vest(), pear(), fabric(bending=1e-5), {**QUICK, "settle_seconds": 4.0}, job)
     assert found.audit["finite"] is True
     assert found.audit["settled"] is True
+    assert found.audit["mode"] == job.metrics["mode"] == "same_garment"
     assert len(intersecting_faces(found.mesh, pear())) == 0
     assert 1.0 < found.audit["min_clearance_mm"] < 4.0
     assert found.audit["max_stretch"] < 0.3
@@ -75,6 +76,21 @@ def test_the_garment_rides_on_a_body_that_swells():
     assert len(intersecting_faces(found.mesh, fat)) == 0
     assert found.audit["rms_stretch"] > 0.005  # 0.132 m about the waist stretches the 0.115 m tube
     assert "riding along with the body" not in dict(job.left_out)
+    assert any(note.endswith("mm: the garment rides along") for note in job.notes)
+
+
+def test_where_the_body_changes_much_the_garment_starts_reshaped():
+    thin, fat = pear(0.8), pear(1.1)
+    body = MovingBody(np.stack([thin.vertices, fat.vertices]), thin.faces)
+    job = Job()
+    found = drape(vest(), body, fabric(bending=1e-5), {**QUICK, "ride_up_to_mm": 10}, job)
+    rides = drape(vest(), body, fabric(bending=1e-5), QUICK)
+    assert any(note.endswith("the garment starts reshaped on the body as it ends") for note in job.notes)
+    assert "riding along with the body" in dict(job.left_out)
+    assert len(intersecting_faces(found.mesh, fat)) == 0
+    # the same stretch whichever way it came there: friction holds it a little higher or lower
+    assert_allclose(found.audit["rms_stretch"], rides.audit["rms_stretch"], rtol=0.3)
+    assert_allclose(found.mesh.vertices.mean(axis=0), rides.mesh.vertices.mean(axis=0), rtol=0, atol=0.02)
 
 
 def test_two_runs_have_the_same_bits_and_a_budget_that_is_not_spent_changes_nothing():
@@ -113,15 +129,15 @@ def test_a_garment_that_starts_through_itself_is_untangled():
 def test_what_cannot_be_untangled_is_told_with_places(monkeypatch):
     def give_up(positions, faces, rest, thickness, job, body=None):
         pairs = self_intersections(TriangleMesh(positions, faces))
-        return Start(positions, len(pairs), len(pairs), vertices_of(pairs, faces, len(positions)))
+        return Start(positions, len(pairs), len(pairs), meeting_vertices(pairs, faces, len(positions)))
 
-    monkeypatch.setattr(drape_module, "free_start", give_up)
-    job = Job()
+    monkeypatch.setattr(phases_module, "free_start", give_up)
     quick = {"settle_seconds": 0.1, "place": "as_it_stands"}
-    found = drape(double_vest(through=0.03), pear(), fabric(bending=1e-5), quick, job)
-    assert found.audit["self_intersections"] == len(self_intersections(found.mesh)) > 0
-    assert any("cross each other, near (0.1" in text for text in job.warnings)
-    places = np.array(found.audit["self_intersection_places"])
+    with pytest.raises(IntersectingError, match=r"the garment with itself still cross, near \(0\.1") as caught:
+        drape(double_vest(through=0.03), pear(), fabric(bending=1e-5), quick)
+    audit, mesh = caught.value.partial["audit"], caught.value.partial["draped"]
+    assert audit["self_intersections"] == len(self_intersections(mesh)) > 0
+    places = np.array(audit["self_intersection_places"])
     assert_allclose(places, [[0.12, 0.1, 0.0]] * len(places), rtol=0, atol=0.05)  # the patch is some 40 mm wide
 
 

@@ -1,4 +1,4 @@
-"""The place of a garment, the growing body, the judge, and the last pass."""
+"""The growing body, the judge, and the last pass."""
 
 import json
 import time
@@ -20,7 +20,6 @@ from vto_pipeline.cloth.grow import growing
 from vto_pipeline.cloth.judge.balance import Weave, knows
 from vto_pipeline.cloth.judge.gap import gaps_within
 from vto_pipeline.cloth.materials import Materials
-from vto_pipeline.cloth.place import PlaceConfig, place
 from vto_pipeline.cloth.rest_shape import RestShapeConfig, rest_shape
 from vto_pipeline.cloth.stepper import StepConfig, Stepper
 from vto_pipeline.geometry.intersections import intersecting_faces
@@ -36,41 +35,6 @@ def skittle():
     x, y, z = mesh.vertices.T
     girth = 0.15 - 0.09 * np.exp(-(((y - 0.2) / 0.25) ** 2))
     return TriangleMesh(np.column_stack([girth * x, 0.5 + 0.5 * y, girth * z]), mesh.faces)
-
-
-def spool():
-    """A thick rod with a groove of radius 0.08 from y = 0.52 to 0.68."""
-    mesh = tube(1.0, 1.0, 64, 101)
-    y = mesh.vertices[:, 1]
-    radius = np.where(np.abs(y - 0.6) < 0.08, 0.08, 0.15) * np.where((y < 1e-9) | (y > 1 - 1e-9), 1e-3, 1.0)
-    return TriangleMesh(mesh.vertices * np.column_stack([radius, np.ones_like(y), radius]), mesh.faces)
-
-
-@pytest.mark.parametrize("flip", [False, True])
-def test_a_collar_goes_to_the_groove_it_was_made_for(flip):
-    body = spool()
-    collar = tube(0.09, 0.1, 36, 8, base=0.55)
-    strayed = moved(collar, 0.3, -0.2, 0.15)
-    if flip:
-        strayed = TriangleMesh(strayed.vertices, strayed.faces[:, ::-1])
-    job = Job()
-    found = place(strayed, body, PlaceConfig(cube_mm=10), job)
-    assert_allclose(found.vertices[:, [0, 2]].mean(axis=0), 0.0, rtol=0, atol=0.012)  # one cube
-    assert_allclose(found.vertices[:, 1].mean(), 0.6, rtol=0, atol=0.03)
-    assert "garment moved by (-3" in job.notes[0]
-
-
-def test_a_garment_wider_than_the_body_is_centred():
-    hoop = moved(tube(0.165, 0.4, 48, 12, base=0.05), 0.25, 0.0, -0.4)
-    found = place(hoop, spool(), PlaceConfig(cube_mm=10), Job())
-    assert_allclose(found.vertices[:, [0, 2]].mean(axis=0), 0.0, rtol=0, atol=0.015)  # what play there is, and one cube
-
-
-def test_a_garment_that_stands_well_is_left_alone():
-    collar = tube(0.09, 0.1, 36, 8, base=0.55)
-    job = Job()
-    assert place(collar, spool(), PlaceConfig(cube_mm=10), job) is collar
-    assert job.notes[0].startswith("garment left where it stands")
 
 
 def test_the_body_grows_from_where_it_no_longer_crosses():

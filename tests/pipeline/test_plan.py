@@ -40,6 +40,18 @@ def test_an_optional_input_is_absent_where_it_cannot_be_made(ask):
     assert plan.left_out["right.double"] == "right.number not given"
 
 
+def test_an_optional_input_that_the_settings_have_no_use_for_is_neither_made_nor_taken(ask):
+    sparing = replace(TOY.stages[2], idle=lambda settings: ("right_doubled",) if settings.offset == 0 else ())
+    tables = Catalogue((*TOY.stages[:2], sparing, *TOY.stages[3:]), TOY.kinds, TOY.given)
+    alone = make_plan(ask(BOTH + "want: [total]"), tables)
+    assert names(alone) == ["left.double", "add"]
+    assert alone.steps[-1].inputs == ("left_doubled",)
+    assert alone.left_out["right.double"] == "nothing wanted needs it"
+    both = make_plan(ask(BOTH + "want: [total]\nstages: {add: {offset: 1}}"), tables)
+    assert names(both) == ["left.double", "right.double", "add"]
+    assert both.steps[-1].inputs == ("left_doubled", "right_doubled")
+
+
 def test_given_is_preferred_over_making(ask):
     plan = make_plan(ask("schema: 1\ngiven: {left: {number: left.txt, doubled: right.txt}}\nwant: [total]"), TOY)
     assert names(plan) == ["add"]

@@ -29,7 +29,7 @@ def test_what_is_assumed_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     job = Job()
     (stage,) = [stage for stage in cloth_stages.STAGES if stage.name == "drape"]
     stage.run(
-        {"sim_mesh": None, "rest_shape": None, "collider": None, "fabric": read_fabric(tmp_path / name)}, None, job
+        {"sim_mesh": None, "worn_rest": None, "collider": None, "fabric": read_fabric(tmp_path / name)}, None, job
     )
     assert "assumed, not measured: thickness 0.267 mm" in job.notes[0]
     stretch = name in ("kes.yaml", "fast.csv")

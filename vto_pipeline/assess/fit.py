@@ -12,6 +12,7 @@ from pydantic import Field
 from vto_pipeline.assess.allowance import Allowance, read_allowances
 from vto_pipeline.assess.clearance import clearance, summarise_clearance
 from vto_pipeline.assess.ease import Ease
+from vto_pipeline.assess.ease_map import ease_map
 from vto_pipeline.assess.strain import principal_stretches, summarise_stretch
 from vto_pipeline.assess.surface import face_areas, to_vertices, vertex_areas
 from vto_pipeline.assess.zones import ease_at_levels, ease_at_openings
@@ -46,6 +47,7 @@ def assess_fit(
     *,
     trunk: NDArray[np.bool_] | None = None,
     observed_share: float | None = None,
+    mode: str = "same_garment",
 ) -> tuple[dict[str, Any], dict[str, FloatArray]]:
     """Judge a draped garment on a body.
 
@@ -60,10 +62,12 @@ def assess_fit(
         trunk: Which body vertices are neither arm nor leg, shape (B,). Without it an arm that touches the trunk is
             measured with it.
         observed_share: Share of the garment's area that a sensor saw, when it was scanned.
+        mode: "same_garment", or "regraded" when the rest shape was made in proportion to this body.
 
     Returns:
         The report (plain JSON values), and per vertex of `draped` the maps "stretch" (largest principal stretch, 1 at
-        rest) and "clearance_mm" (to the body, negative inside), each of shape (V,).
+        rest), "clearance_mm" (to the body, negative inside) and "ease_mm" (at that height; NaN off the trunk), each of
+        shape (V,).
 
     Raises:
         ConfigError: an unknown kind of garment.
@@ -93,7 +97,7 @@ def assess_fit(
 
     report = {
         "schema": 1,
-        "mode": "same_garment",
+        "mode": mode,
         "garment": config.garment,
         "fabric": fabric.name,
         "fabric_assumed": list(fabric.assumed),
@@ -107,6 +111,7 @@ def assess_fit(
     maps = {
         "stretch": to_vertices(largest, areas, draped.faces, len(draped.vertices)),
         "clearance_mm": 1000 * nearest.distance,
+        "ease_mm": 1000 * ease_map(draped, rest, body, garment_faces, body_faces),
     }
     _tell(report, job)
     return report, maps

@@ -8,6 +8,7 @@ from typing import Any
 from vto_pipeline.bench.bench import Bench
 from vto_pipeline.report.body_plot import draw_body
 from vto_pipeline.report.collision_plot import draw_collision
+from vto_pipeline.report.drape_plot import draw_drape
 from vto_pipeline.report.plots import Curves, draw_curves
 from vto_pipeline.report.scaling_plot import draw_scaling
 from vto_pipeline.report.verdict_table import draw_verdicts
@@ -59,6 +60,11 @@ BENCHES = {
         "bodies from scans, tape and outlines: error against run time, and the noise floor beside ISO 20685",
         "vto_pipeline.bench.body",
         draw_body,
+    ),
+    "drape": Bench(
+        "garments on bodies: error against run time, honesty, refinement, extreme fabrics, rest shapes",
+        "vto_pipeline.bench.drape",
+        draw_drape,
     ),
     "scaling": Bench(
         "run time at equal error from 1k vertices up, kernels, threads", "vto_pipeline.bench.scaling", draw_scaling

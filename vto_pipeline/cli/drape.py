@@ -17,11 +17,15 @@ _WANT = ("draped", "audit", "trace", "render_mesh", "fit_report", "page")
 @click.option("--body", type=PATH, metavar="FILE", help="Avatar (.npz of vto fit), or a mesh taken as it stands.")
 @click.option("--measurements", type=PATH, metavar="FILE", help="Make the body from these, in place of --body.")
 @click.option(
-    "--source-body", type=PATH, metavar="FILE", help="Mesh of what the garment was on; absent: it is left where it is."
+    "--source-body",
+    type=PATH,
+    metavar="FILE",
+    help="What the garment was on: avatar or mesh. Absent: the garment is put where it belongs on the body.",
 )
 @click.option(
     "--fabric", default="cotton_poplin", show_default=True, metavar="NAME|FILE", help="Preset or fabric file."
 )
+@click.option("--regraded", is_flag=True, help="Show how it would look in the customer's size, not whether it fits.")
 @running
 @pass_session
 def drape_command(
@@ -31,6 +35,7 @@ def drape_command(
     measurements: Path | None,
     source_body: Path | None,
     fabric: str,
+    regraded: bool,
     output: Path | None,
     overrides: tuple[str, ...],
     force_all: bool,
@@ -39,7 +44,7 @@ def drape_command(
 
     \b
     vto drape --garment shirt.ply --source-body form.ply --measurements customer.yaml --fabric denim
-    vto drape --garment shirt.ply --body customer.ply -o runs/shirt
+    vto drape --garment shirt.ply --source-body form.ply --body customer.ply --regraded -o runs/shirt
     """
     from vto_pipeline.cli.work import carry_out, catalogue, typed_document
 
@@ -47,11 +52,15 @@ def drape_command(
         raise click.UsageError("give the body: either --body or --measurements")
     given = {
         "garment.mesh": garment,
-        "mannequin.surface": source_body,
-        f"body.{'avatar' if body and body.suffix == '.npz' else 'mesh'}": body,
+        f"mannequin.{'avatar' if _is_avatar(source_body) else 'surface'}": source_body,
+        f"body.{'avatar' if _is_avatar(body) else 'mesh'}": body,
         "body.measurements": measurements,
         "fabric": fabric,
     }
-    document = typed_document("the command line", given, _WANT, {})
+    document = typed_document("the command line", given, _WANT, {"grade": {"mode": "regraded"}} if regraded else {})
     name = Path("runs") / f"drape_{garment.resolve().stem}"
     carry_out(document, Path.cwd(), output or name, overrides, force_all, session, catalogue())
+
+
+def _is_avatar(path: Path | None) -> bool:
+    return path is not None and path.suffix.lower() == ".npz"

@@ -1,22 +1,30 @@
-"""Where a garment belongs on a body it was never on: the shift at which the body fills it best.
-
-Body and garment, its openings closed, are solids of small cubes. For every shift at once (by FFT): cubes of body
-inside the garment count for it, cubes of cloth inside the body against it. No landmark is needed, so a skirt is as
-good as a shirt.
-"""
+"""Where a garment belongs on a body it was never on: its unit, its axes, and where the body fills it best."""
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-from pydantic import Field
-from scipy.fft import irfftn, next_fast_len, rfftn
+from typing import NamedTuple
 
-from vto_pipeline.geometry.topology import boundary_loops
+import numpy as np
+from pydantic import Field
+
+from vto_pipeline.cloth.fill import Cubes, Fill, quarter_turns
+from vto_pipeline.errors import InputError
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
+from vto_pipeline.units import LENGTH_M
+
+_PLAUSIBLE = (0.12, 1.3)  # longest side of a garment as a share of the body's: from briefs to a gown with a train
+_SMALLEST = 0.02  # the same of a patch of cloth that is in metres: no other unit would make it larger
+_COARSE = 2.0  # times the cube: enough to tell which ways up are worth a second look
+_CLOSE = 0.9  # of the best coarse worth: these are looked at again with fine cubes
+_ALIKE = 0.98  # as good, but for where the cubes happen to lie
+_LARGER, _STEPS = 1.2, 4  # a garment may start up to twice as large as it is
+_FALLING = 0.85  # of the best worth yet: larger garments need not be tried
+_DEEP = 0.01  # m
+_AROUND = 32  # cubes along the longest side: enough to tell units, which differ by 2.5 at least
 
 
 class PlaceConfig(Config):
@@ -32,70 +40,164 @@ class PlaceConfig(Config):
     stands_well: float = Field(
         0.95, ge=0, le=1, description="auto leaves a garment whose place is this share as good as the best"
     )
+    turned_well: float = Field(
+        0.95, ge=0, le=1, description="A garment is not turned whose own way up is this share as good as the best"
+    )
+    buried: float = Field(
+        0.1,
+        ge=0,
+        le=1,
+        description="Share of a garment over 10 mm deep in the body at which it starts larger than it is",
+    )
 
 
-def place(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig, job: Job) -> TriangleMesh:
-    """Return the garment shifted to where the body fills it best; units and axes are taken to be right.
+class Placement(NamedTuple):
+    """What is done to a garment: scaled and turned about the origin, stretched, then shifted.
 
     Args:
-        garment: As it stands [m].
+        scale: Metres in its unit.
+        turn: Rotation, shape (3, 3).
+        stretch: How much larger than it is the garment starts, for the body to be inside.
+        shift: [m], shape (3,).
+    """
+
+    scale: float
+    turn: FloatArray
+    stretch: float
+    shift: FloatArray
+
+    def turned(self, rest: FloatArray) -> FloatArray:
+        """Return the rest positions of the garment, shape (V, 3), in metres and as the body stands."""
+        return self.scale * rest @ self.turn.T
+
+    def put(self, positions: FloatArray) -> FloatArray:
+        """Return where the garment starts that stood at these positions, shape (V, 3) [m]."""
+        return self.stretch * self.turned(positions) + self.shift
+
+
+_AS_IT_STANDS = Placement(1.0, np.eye(3), 1.0, np.zeros(3))
+
+
+def place(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig, job: Job) -> Placement:
+    """Return what puts the garment where the body fills it best.
+
+    Args:
+        garment: As it stands, in metres or another unit, with any axis up.
         body: Where it shall go [m].
-        config: Search and threshold.
-        job: Told what was done.
+        config: Search and thresholds.
+        job: Told what is done, and why.
+
+    Raises:
+        InputError: in no unit is this a garment for a body of this size.
     """
     if config.place == "as_it_stands":
         job.note("garment left where it stands, as asked")
-        return garment
-    cube = 1e-3 * config.cube_mm
-    shift, share = _best_shift(garment, body, cube, config.cloth_in_body)
-    if config.place == "auto" and share >= config.stands_well:
+        return _AS_IT_STANDS
+    scale = _scale(garment, body, config, job)
+    metres = TriangleMesh(scale * garment.vertices, garment.faces)
+    stands, best = _best_way(metres, body, config)
+    if stands.worth < config.turned_well * best.worth:
+        best = _as_if_large_enough(metres, body, best, config)
+    as_turned = 1.0 if (best.turn == stands.turn).all() else _share(stands.worth, best.worth)
+    if as_turned >= _ALIKE:
+        best = stands
+    elif as_turned >= config.turned_well:
+        job.note(f"garment not turned, though ({_way(best)}) as (x, y, z) were {1 / as_turned - 1:.1%} better")
+        best = stands
+    else:
+        job.note(
+            f"garment turned: its ({_way(best)}) is the body's (x, y, z); as it stood, the body could fill it "
+            f"{as_turned:.0%} as well"
+        )
+    stretch, best = _stretched(metres, body, best, config)
+    if stretch > 1.0:
+        job.warn(f"too small: this body would fill it best were it {stretch - 1:.0%} larger; it starts stretched so")
+    share = _share(best.here, best.worth)
+    if config.place == "auto" and best is stands and scale == 1.0 and share >= config.stands_well:
         job.note(f"garment left where it stands: {share:.0%} as good as the best place")
-        return garment
+        return _AS_IT_STANDS
     job.note(
-        f"garment moved by ({', '.join(f'{1e3 * part:.0f}' for part in shift)}) mm (x, y, z) to where the body "
-        f"fills it best; as it stood, {max(share, 0.0):.0%} as good"
+        f"garment moved by ({', '.join(f'{1e3 * part:.0f}' for part in best.shift)}) mm (x, y, z) to where the body "
+        f"fills it best; as it stood, {share:.0%} as good"
     )
-    return TriangleMesh(garment.vertices + shift, garment.faces, garment.colors)
+    return Placement(scale, best.turn, stretch, best.shift)
 
 
-def _best_shift(garment: TriangleMesh, body: TriangleMesh, cube: float, penalty: float) -> tuple[FloatArray, float]:
-    """Return the best shift [m], shape (3,), and how good no shift is, as a share of the best."""
-    body_low, garment_low = body.vertices.min(axis=0), garment.vertices.min(axis=0)
-    # garment cubes lie on the body's lattice, so that the shifts found include "none"
-    garment_low = body_low + np.floor((garment_low - body_low) / cube) * cube
-    body_solid = _solid(body, body_low, cube)
-    inside = _solid(_closed(garment), garment_low, cube)
-    cloth = np.zeros_like(inside)
-    points = np.vstack([garment.vertices, garment.vertices[garment.faces].mean(axis=1)])
-    cloth[tuple(((points - garment_low) / cube).astype(np.int64).T)] = True
-    worth = (inside & ~cloth).astype(np.float64) - penalty * cloth
-    size = [next_fast_len(int(a + b)) for a, b in zip(body_solid.shape, worth.shape, strict=True)]
-    score = irfftn(rfftn(body_solid.astype(np.float64), size) * np.conj(rfftn(worth, size)), size)
-    best = np.unravel_index(int(np.argmax(np.round(score, 6))), score.shape)
-    steps = np.array([k if k < b else k - n for k, n, b in zip(best, size, body_solid.shape, strict=True)])
-    stay = np.round((garment_low - body_low) / cube).astype(np.int64)
-    reach = np.array(worth.shape)
-    overlaps = ((stay < np.array(body_solid.shape)) & (stay > -reach)).all()
-    here = score[tuple(stay % np.array(size))] if overlaps else 0.0
-    return (steps - stay) * cube, float(here / max(score[best], 1e-12))
+def _best_way(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig) -> tuple[Fill, Fill]:
+    """Return the best place of the garment as it is turned, and of all quarter turns."""
+    cube = 1e-3 * config.cube_mm
+    turns = quarter_turns()
+    cubes = Cubes(garment, body, _COARSE * cube, config.cloth_in_body)
+    coarse = np.array([cubes.fill(turn).worth for turn in turns])
+    promising = coarse >= np.maximum(_CLOSE * coarse.max(), config.turned_well * coarse[0])
+    promising[0] = True
+    cubes = Cubes(garment, body, cube, config.cloth_in_body)
+    ways = [cubes.fill(turn) for turn, look in zip(turns, promising, strict=True) if look]
+    return ways[0], max(ways, key=lambda way: way.worth)
 
 
-def _solid(mesh: TriangleMesh, low: FloatArray, cube: float) -> NDArray[np.bool_]:
-    """Return which cubes, counted from `low`, have their centre inside the mesh, whichever way it is oriented."""
-    import igl
+def _as_if_large_enough(garment: TriangleMesh, body: TriangleMesh, best: Fill, config: PlaceConfig) -> Fill:
+    """Return the best place, turned as the garment would be if larger: one too small for the trunk may suit a thigh."""
+    ways = [best]
+    for step in range(1, _STEPS + 1):
+        larger = TriangleMesh(_LARGER**step * garment.vertices, garment.faces)
+        ways.append(_best_way(larger, body, config)[1])
+        if ways[-1].worth < _FALLING * max(way.worth for way in ways):
+            break
+    turn = max(ways, key=lambda way: way.worth).turn
+    return Cubes(garment, body, 1e-3 * config.cube_mm, config.cloth_in_body).fill(turn)
 
-    counts = np.ceil((mesh.vertices.max(axis=0) - low) / cube).astype(np.int64) + 1
-    centres = low + cube * (np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), axis=-1) + 0.5)
-    winding = igl.fast_winding_number(mesh.vertices, mesh.faces.astype(np.int64), centres.reshape(-1, 3))
-    return (np.abs(winding) > 0.5).reshape(counts)
+
+def _stretched(garment: TriangleMesh, body: TriangleMesh, own: Fill, config: PlaceConfig) -> tuple[float, Fill]:
+    """Return by how much the garment must start larger for the body to be inside it, and its place then.
+
+    Args:
+        garment: As large as it is [m].
+        body: [m].
+        own: Its best place at its own size, with the turn to keep.
+        config: Search and thresholds.
+    """
+    depth = -SurfaceDistance(body).signed(garment.vertices @ own.turn.T + own.shift).distance
+    if (depth > _DEEP).mean() <= config.buried:
+        return 1.0, own
+    ways = [own]
+    for step in range(1, _STEPS + 1):
+        larger = TriangleMesh(_LARGER**step * garment.vertices, garment.faces)
+        ways.append(Cubes(larger, body, 1e-3 * config.cube_mm, config.cloth_in_body).fill(own.turn))
+        if ways[-1].worth < _FALLING * max(way.worth for way in ways):
+            break
+    best = max(range(len(ways)), key=lambda step: ways[step].worth)
+    return _LARGER**best, ways[best]
 
 
-def _closed(garment: TriangleMesh) -> TriangleMesh:
-    """Return the garment with a fan over each opening."""
-    vertices, faces = [garment.vertices], [garment.faces]
-    count = len(garment.vertices)
-    for loop in boundary_loops(garment):
-        vertices.append(garment.vertices[loop].mean(axis=0, keepdims=True))
-        faces.append(np.column_stack([np.roll(loop, -1), loop, np.full(len(loop), count)]).astype(np.int32))
-        count += 1
-    return TriangleMesh(np.vstack(vertices), np.vstack(faces))
+def _scale(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig, job: Job) -> float:
+    """Return how many metres the garment's unit is: one where that is plausible, else what it is best filled in."""
+    longest = np.ptp(garment.vertices, axis=0).max() / np.ptp(body.vertices, axis=0).max()
+    low, high = _PLAUSIBLE
+    plausible = {unit: metres for unit, metres in LENGTH_M.items() if low <= metres * longest <= high}
+    if _SMALLEST <= longest <= high:
+        return 1.0
+    if not plausible:
+        raise InputError(
+            f"the garment's longest side is {longest:.3g} times the body's; in none of {', '.join(LENGTH_M)} is that "
+            f"{low} to {high}",
+            hint="scale the garment, or give the unit of its file",
+        )
+    worth = dict.fromkeys(plausible, 0.0)
+    for unit, metres in plausible.items() if len(plausible) > 1 else ():
+        scaled = TriangleMesh(metres * garment.vertices, garment.faces)
+        cube = max(1e-3 * config.cube_mm, np.ptp(scaled.vertices, axis=0).max() / _AROUND)
+        cubes = Cubes(scaled, body, cube, config.cloth_in_body)
+        worth[unit] = max(cubes.fill(turn).worth for turn in quarter_turns())
+    unit = max(worth, key=lambda name: worth[name])
+    job.note(f"garment taken to be in {unit}: in metres its longest side would be {longest:.3g} times the body's")
+    return plausible[unit]
+
+
+def _way(fill: Fill) -> str:
+    """Name which of the garment's axes are the body's x, y and z."""
+    return ", ".join(("-" if row.sum() < 0.0 else "") + "xyz"[np.abs(row).argmax()] for row in fill.turn)
+
+
+def _share(worth: float, best: float) -> float:
+    return max(worth, 0.0) / best if best > 0.0 else 0.0

@@ -1,16 +1,24 @@
-"""From the scanned garment to the mesh that is simulated."""
+"""From any garment mesh to the mesh that is simulated: sound, in even triangles, each piece for itself."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
-from vto_pipeline.geometry.remesh import RemeshConfig, edge_lengths, remesh
+from vto_pipeline.errors import GarmentError
+from vto_pipeline.geometry.remesh import RemeshConfig, edge_lengths, perimeter, remesh
 from vto_pipeline.geometry.repair import RepairConfig, is_manifold, repair
-from vto_pipeline.geometry.topology import face_components
+from vto_pipeline.geometry.topology import boundary_loops, face_area_vectors, face_components, submesh
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
+
+_ACROSS = 3.0  # edges that a strap is wide at least: it needs finer triangles than the cloth it holds
+_TRIES = 3  # each with half the edge of the one before
+_LEAST_EDGE_MM = 1.0  # the remesher's
 
 
 class SimulationMeshConfig(Config):
@@ -18,28 +26,47 @@ class SimulationMeshConfig(Config):
 
     edge_mm: float = Field(10.0, ge=2, le=100, description="wanted edge length [mm]")
     tolerance: float = Field(
-        0.2, ge=0, le=1, description="a mesh whose median edge is off by less may be used as it is"
+        0.2, ge=0, le=1, description="a piece whose median edge is off by less may be used as it is"
     )
-    least_angle_deg: float = Field(20.0, ge=0, le=60, description="a mesh with sharper triangles is remeshed [degree]")
+    least_angle_deg: float = Field(20.0, ge=0, le=60, description="a piece with sharper triangles is remeshed [degree]")
+    least_piece: float = Field(
+        4.0, ge=0, le=1000, description="smaller pieces, such as buttons, are dropped [squares of the wanted edge]"
+    )
 
 
 def remesh_for_simulation(garment: TriangleMesh, config: SimulationMeshConfig, job: Job) -> TriangleMesh:
-    """Return the garment in near-equilateral triangles of the wanted size, openings kept.
+    """Return the garment in near-equilateral triangles of the wanted size, its pieces and their openings kept.
+
+    A piece that is good enough is used as it is, one too narrow for such triangles is given finer ones, and one that
+    no size suits stays as it was. Pieces too small to be cloth are dropped. All of it is told.
 
     Raises:
-        GarmentError: remeshing lost an opening or a piece.
+        InputError: no face has an area.
     """
-    reason = good_enough(garment, config)
-    if reason and not job.force_all:
-        job.leave_out("remeshing", reason)
-        return garment
-    mended = garment if is_manifold(garment) else repair(garment, RepairConfig(), job)
-    return remesh(mended, RemeshConfig(edge_mm=config.edge_mm), job)
+    sound = garment if is_manifold(garment) else repair(garment, RepairConfig(), job)
+    pieces = list(_pieces(sound, config, job))
+    made = []
+    for k, piece in enumerate(pieces):
+        job.progress(k / len(pieces), "remeshing")
+        made.append(_even(piece, config, job))
+    if all(one is piece for one, piece in zip(made, pieces, strict=True)) and len(pieces) == face_components(sound)[0]:
+        return sound
+    whole = _joined(made)
+    length = 1e3 * edge_lengths(whole)
+    job.measure(
+        pieces=len(made),
+        vertices=len(whole.vertices),
+        faces=len(whole.faces),
+        edge_median_mm=float(np.median(length)),
+        edge_p5_mm=float(np.percentile(length, 5)),
+        edge_p95_mm=float(np.percentile(length, 95)),
+    )
+    return whole
 
 
 def good_enough(mesh: TriangleMesh, config: SimulationMeshConfig) -> str | None:
     """Return why a mesh can be simulated as it is, or None."""
-    if not is_manifold(mesh) or face_components(mesh)[0] != 1:
+    if not is_manifold(mesh):
         return None
     median = float(np.median(edge_lengths(mesh))) * 1e3
     if abs(median / config.edge_mm - 1.0) > config.tolerance:
@@ -50,10 +77,68 @@ def good_enough(mesh: TriangleMesh, config: SimulationMeshConfig) -> str | None:
     return f"edges are {median:.1f} mm at the median and no angle is below {sharpest:.0f}°: used as it is"
 
 
-def least_angles(mesh: TriangleMesh) -> np.ndarray:
+def least_angles(mesh: TriangleMesh) -> NDArray[np.float64]:
     """Return the least angle of each face [rad], shape (F,); zero for a face without area."""
     corners = mesh.vertices[mesh.faces]
     side = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     a, b, c = np.sort(side, axis=1).T  # the least angle lies opposite the shortest side
     cosine = (b**2 + c**2 - a**2) / np.maximum(2.0 * b * c, 1e-30)
     return np.where(b > 0.0, np.arccos(np.clip(cosine, -1.0, 1.0)), 0.0)
+
+
+def _pieces(mesh: TriangleMesh, config: SimulationMeshConfig, job: Job) -> Iterator[TriangleMesh]:
+    """Yield the pieces that are cloth, in the order of their first faces; the largest always is."""
+    count, piece = face_components(mesh)
+    if count == 1:
+        yield mesh
+        return
+    area = np.bincount(piece, np.linalg.norm(face_area_vectors(mesh), axis=1), count)
+    small = area < min(config.least_piece * (1e-3 * config.edge_mm) ** 2, float(area.max()))
+    if small.any():
+        lost = f"{1e4 * float(area[small].sum()):.1f} cm² in all"
+        least = f"{config.least_piece:g} squares of the wanted edge"
+        job.note(f"dropped {int(small.sum())} of {count} pieces, which are smaller than {least}: {lost}")
+    for k in np.flatnonzero(~small):
+        yield submesh(mesh, piece == k)[0]
+
+
+def _even(piece: TriangleMesh, config: SimulationMeshConfig, job: Job) -> TriangleMesh:
+    """Return a piece in even triangles."""
+    reason = good_enough(piece, config)
+    if reason and not job.force_all:
+        job.leave_out("remeshing", reason)
+        return piece
+    edge = min(config.edge_mm, 1e3 * _width(piece) / _ACROSS)
+    if edge < config.edge_mm:
+        job.note(f"a piece of {len(piece.faces)} faces is narrow: its edges become {max(edge, _LEAST_EDGE_MM):.1f} mm")
+    for k in range(_TRIES):
+        tried = Job()
+        try:
+            made = remesh(piece, RemeshConfig(edge_mm=max(0.5**k * edge, _LEAST_EDGE_MM)), tried)
+        except GarmentError:
+            continue
+        for name in ("hausdorff_mm", "deviation_rms_mm"):
+            job.measure(**{name: max(_figure(job, name), _figure(tried, name))})
+        return made
+    job.warn(f"a piece of {len(piece.faces)} faces could not be remeshed and is used as it is")
+    return piece
+
+
+def _width(piece: TriangleMesh) -> float:
+    """Return how wide a strap of the same area and perimeter would be [m]; infinite without a border."""
+    around = sum(perimeter(piece, loop) for loop in boundary_loops(piece))
+    area = float(np.linalg.norm(face_area_vectors(piece), axis=1).sum())
+    return 2.0 * area / around if around > 0.0 else np.inf
+
+
+def _figure(job: Job, name: str) -> float:
+    value = job.metrics.get(name, 0.0)
+    assert isinstance(value, float)
+    return value
+
+
+def _joined(pieces: list[TriangleMesh]) -> TriangleMesh:
+    """Return the pieces as one mesh."""
+    first = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
+    faces = [piece.faces + np.int32(start) for piece, start in zip(pieces, first, strict=False)]
+    return TriangleMesh(np.vstack([piece.vertices for piece in pieces]), np.vstack(faces))

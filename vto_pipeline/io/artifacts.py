@@ -156,12 +156,26 @@ ARTIFACTS: tuple[ArtifactKind, ...] = (
         "rest_shape", "rest_shape.npz", "the cloth without forces", garments.read_rest_shape, garments.write_rest_shape
     ),
     ArtifactKind(
+        "worn_rest",
+        "worn_rest.npz",
+        "the rest shape that is draped: the garment's own, or regraded",
+        garments.read_rest_shape,
+        garments.write_rest_shape,
+    ),
+    ArtifactKind(
         "source_avatar",
         "source_avatar.npz",
         "the template fitted to what the garment was on",
         avatars.read_avatar,
         avatars.write_avatar,
         receive=lambda path, job: avatars.receive_avatar(path),
+    ),
+    ArtifactKind(
+        "body_avatar",
+        "body_avatar.npz",
+        "the template fitted to the body mesh",
+        avatars.read_avatar,
+        avatars.write_avatar,
     ),
     ArtifactKind(
         "fitted_avatar",
@@ -204,7 +218,7 @@ ARTIFACTS: tuple[ArtifactKind, ...] = (
     ArtifactKind(
         "fit_maps",
         "fit_maps.npz",
-        "stretch and clearance on the draped mesh",
+        "stretch, strain, pressure, clearance and ease on the draped mesh",
         garments.read_fit_maps,
         garments.write_fit_maps,
     ),

@@ -87,7 +87,8 @@ def read_fit_maps(path: Path) -> dict[str, FloatArray]:
 
 def write_rest_shape(path: Path, rest: RestShape) -> None:
     """Write rest_shape.npz."""
-    write_arrays(path, {"positions": rest.positions, "rest_angles": np.bool_(rest.rest_angles), "mode": rest.mode})
+    flags = {"rest_angles": np.bool_(rest.rest_angles), "regraded": np.bool_(rest.regraded)}
+    write_arrays(path, {"positions": rest.positions, "mode": rest.mode, **flags})
 
 
 def read_rest_shape(path: Path) -> RestShape:
@@ -96,8 +97,8 @@ def read_rest_shape(path: Path) -> RestShape:
     Raises:
         FormatError: an array is missing.
     """
-    arrays = read_arrays(path, required=("positions", "rest_angles", "mode"))
-    return RestShape(arrays["positions"], bool(arrays["rest_angles"]), str(arrays["mode"]))
+    arrays = read_arrays(path, required=("positions", "rest_angles", "mode", "regraded"))
+    return RestShape(arrays["positions"], bool(arrays["rest_angles"]), str(arrays["mode"]), bool(arrays["regraded"]))
 
 
 def write_collider(path: Path, body: MovingBody) -> None:

@@ -57,11 +57,19 @@ class RestShape:
         positions: Rest positions of the simulation mesh [m], shape (V, 3). Edge lengths and areas are taken from them.
         rest_angles: Dihedral rest angles are those of `positions` where True, else flat.
         mode: How it was found: "as_scanned", "gravity_removed", "inverse".
+        regraded: Whether it was made anew in proportion to another body, so that a drape tells how the garment would
+            look in that size, not whether it fits.
     """
 
     positions: FloatArray
     rest_angles: bool = False
     mode: str = "as_scanned"
+    regraded: bool = False
+
+    @property
+    def worn_as(self) -> str:
+        """What a drape of it answers: "same_garment" (does it fit) or "regraded" (how would it look)."""
+        return "regraded" if self.regraded else "same_garment"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "positions", freeze("rest positions", self.positions, (None, 3), "f8"))

@@ -58,11 +58,15 @@ def make_plan(request: Request, catalogue: Catalogue) -> Plan:
             if artifact not in request.given:
                 makers.setdefault(artifact, stage)
     steps = tuple(
-        Step(stage, (*stage.needs, *(a for a in stage.optional if a in held)), request.settings[stage.section])
+        _step(stage, held, request.settings[stage.section])
         for stage in _in_order([stage for stage in catalogue.stages if stage.name in taken], makers)
     )
     left_out = {s.name: _reason(s, makers, request, catalogue) for s in catalogue.stages if s.name not in taken}
     return Plan(steps, left_out, {artifact: stage.name for artifact, stage in makers.items()})
+
+
+def _step(stage: Stage, held: set[str], settings: Config) -> Step:
+    return Step(stage, (*stage.needs, *(a for a in stage.extras(settings) if a in held)), settings)
 
 
 class _Walk:
@@ -86,7 +90,7 @@ class _Walk:
         self.makers[artifact] = stage
         for need in stage.needs:
             self._need(need)
-        for need in () if stage.final else stage.optional:
+        for need in () if stage.final else stage.extras(self.request.settings[stage.section]):
             if need in self.able:
                 self._need(need)
 

@@ -27,6 +27,7 @@ class Stage:
         skip: Inputs -> the reason why this data does not need the stage, or None. Must be conservative.
         passes: Made artifact -> needed artifact whose file it takes when the stage is skipped.
         final: Runs last, every time, uncached; its inputs also hold "run_record", the dict that run.json holds.
+        idle: Settings -> those of the optional artifacts that it has no use for under these.
     """
 
     name: str
@@ -40,12 +41,18 @@ class Stage:
     skip: Callable[[Mapping[str, Any]], str | None] | None = None
     passes: Mapping[str, str] = field(default_factory=dict)
     final: bool = False
+    idle: Callable[[Any], tuple[str, ...]] = lambda settings: ()
 
     def __post_init__(self) -> None:
         if self.skip is not None and set(self.passes) != set(self.makes):
             raise ValueError(f"stage {self.name} can be skipped: passes must name a source for each of {self.makes}")
         if not set(self.passes.values()) <= set(self.needs):
             raise ValueError(f"stage {self.name}: passes may only name what it needs, {self.needs}")
+
+    def extras(self, settings: Config) -> tuple[str, ...]:
+        """Return the optional artifacts that it takes under these settings, if they can be had."""
+        idle = self.idle(settings)
+        return tuple(artifact for artifact in self.optional if artifact not in idle)
 
     @property
     def section(self) -> str:

@@ -38,6 +38,10 @@ def _shape_mannequin(inputs: Inputs, settings: MeasurementsConfig, job: Job) -> 
     return {"source_avatar": avatar, "mannequin_surface": avatar.mesh}
 
 
+def _register_body(inputs: Inputs, settings: ScanConfig, job: Job) -> Outputs:
+    return {"body_avatar": fit_scan(inputs["body_mesh"], settings, job)}
+
+
 def _fit_measurements(inputs: Inputs, settings: MeasurementsConfig, job: Job) -> Outputs:
     return {"fitted_avatar": fit_measurements(inputs["body_measurements"], settings, job)}
 
@@ -83,6 +87,15 @@ STAGES: tuple[Stage, ...] = (
         run=_shape_mannequin,
         settings=MeasurementsConfig,
         uses=("scipy",),
+    ),
+    Stage(
+        name="register_body",
+        about="the template fitted to the body mesh, so that what the garment was on can turn into it",
+        needs=("body_mesh", "source_avatar"),
+        makes=("body_avatar",),
+        run=_register_body,
+        settings=ScanConfig,
+        uses=("scipy", "libigl"),
     ),
     Stage(
         name="fit_measurements",

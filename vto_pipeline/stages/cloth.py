@@ -8,8 +8,11 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from vto_pipeline.avatar.carry import carry
 from vto_pipeline.avatar.pose import morph
-from vto_pipeline.cloth.drape import DrapeConfig, drape
+from vto_pipeline.cloth.drape import drape
+from vto_pipeline.cloth.drape_config import DrapeConfig
+from vto_pipeline.cloth.regrade import GradeConfig, worn_rest
 from vto_pipeline.io.fabric_assumed import told
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.garment import Garment
@@ -35,16 +38,24 @@ def _morph(inputs: Inputs, settings: MorphConfig, job: Job) -> Outputs:
     return {"collider": morph(inputs["source_avatar"], avatar, settings.keyframes)}
 
 
-def _still_body(inputs: Inputs, settings: Config, job: Job) -> Outputs:
+def _mesh_morph(inputs: Inputs, settings: MorphConfig, job: Job) -> Outputs:
     body = inputs["body_mesh"]
-    job.leave_out("fitting an avatar", "a body mesh was given: the cloth lies on that very mesh")
-    return {"collider": MovingBody(body.vertices[np.newaxis], body.faces)}
+    if "body_avatar" not in inputs:
+        job.leave_out("fitting an avatar", "a body mesh was given: the cloth lies on that very mesh")
+        return {"collider": MovingBody(body.vertices[np.newaxis], body.faces)}
+    motion = morph(inputs["source_avatar"], inputs["body_avatar"], settings.keyframes)
+    return {"collider": carry(body, motion)}
+
+
+def _grade(inputs: Inputs, settings: GradeConfig, job: Job) -> Outputs:
+    garment = Garment(inputs["sim_mesh"], inputs["rest_shape"])
+    return {"worn_rest": worn_rest(garment, inputs["collider"], settings, job)}
 
 
 def _drape(inputs: Inputs, settings: DrapeConfig, job: Job) -> Outputs:
     for text in told(inputs["fabric"]):
         job.note(text)
-    garment = Garment(inputs["sim_mesh"], inputs["rest_shape"])
+    garment = Garment(inputs["sim_mesh"], inputs["worn_rest"])
     draped = drape(garment, inputs["collider"], inputs["fabric"], settings, job)
     return {"draped": draped.mesh, "audit": dict(draped.audit), "trace": tuple(draped.trace)}
 
@@ -60,16 +71,26 @@ STAGES: tuple[Stage, ...] = (
         settings=MorphConfig,
     ),
     Stage(
-        name="still_body",
-        about="a body mesh as it is",
+        name="mesh.morph",
+        about="a body mesh as it is, into which what the garment was on turns if that is known",
         needs=("body_mesh",),
+        optional=("source_avatar", "body_avatar"),
         makes=("collider",),
-        run=_still_body,
+        run=_mesh_morph,
+        settings=MorphConfig,
+    ),
+    Stage(
+        name="grade",
+        about="the same garment, or the garment made in the customer's size",
+        needs=("sim_mesh", "rest_shape", "collider"),
+        makes=("worn_rest",),
+        run=_grade,
+        settings=GradeConfig,
     ),
     Stage(
         name="drape",
         about="the garment at rest on the body (small-step XPBD)",
-        needs=("sim_mesh", "rest_shape", "collider", "fabric"),
+        needs=("sim_mesh", "worn_rest", "collider", "fabric"),
         makes=("draped", "audit", "trace"),
         run=_drape,
         settings=DrapeConfig,

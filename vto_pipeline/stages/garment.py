@@ -58,7 +58,13 @@ def _simulation_mesh(inputs: Inputs, settings: SimulationMeshConfig, job: Job) -
 
 
 def _rest_shape(inputs: Inputs, settings: RestShapeConfig, job: Job) -> Outputs:
-    return {"rest_shape": rest_shape(inputs["sim_mesh"], settings, job)}
+    body, fabric = inputs.get("mannequin_surface"), inputs.get("fabric")
+    return {"rest_shape": rest_shape(inputs["sim_mesh"], settings, job, body, fabric)}
+
+
+def _without_body(settings: RestShapeConfig) -> tuple[str, ...]:
+    """What the rest shape is not found from when it is taken as scanned: another fabric then re-uses it."""
+    return ("mannequin_surface", "fabric") if settings.mode == "as_scanned" else ()
 
 
 STAGES: tuple[Stage, ...] = (
@@ -113,8 +119,11 @@ STAGES: tuple[Stage, ...] = (
         name="rest_shape",
         about="what the cloth would be without forces",
         needs=("sim_mesh",),
+        optional=("mannequin_surface", "fabric"),
+        idle=_without_body,
         makes=("rest_shape",),
         run=_rest_shape,
         settings=RestShapeConfig,
+        uses=("numba", "libigl"),
     ),
 )

@@ -10,6 +10,7 @@ import numpy as np
 from vto_pipeline.assess.fit import FitConfig, assess_fit
 from vto_pipeline.avatar.measure import fit_levels
 from vto_pipeline.avatar.regions import trunk
+from vto_pipeline.cloth.judge.worn import vertex_maps
 from vto_pipeline.geometry.topology import face_area_vectors
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -34,7 +35,7 @@ def _assess(inputs: Inputs, settings: FitConfig, job: Job) -> Outputs:
         job.leave_out("ease at chest, waist and hip", "a bare mesh does not say where these are; fit an avatar to it")
     report, maps = assess_fit(
         inputs["draped"],
-        inputs["rest_shape"].positions,
+        inputs["worn_rest"].positions,
         body,
         {} if avatar is None else fit_levels(avatar),
         inputs["fabric"],
@@ -42,8 +43,10 @@ def _assess(inputs: Inputs, settings: FitConfig, job: Job) -> Outputs:
         job,
         trunk=None if avatar is None else trunk(avatar),
         observed_share=_observed_share(inputs),
+        mode=inputs["worn_rest"].worn_as,
     )
-    return {"fit_report": report, "fit_maps": maps}
+    worn = vertex_maps(inputs["draped"], inputs["worn_rest"], body, inputs["fabric"])
+    return {"fit_report": report, "fit_maps": {**maps, **worn}}
 
 
 def _observed_share(inputs: Inputs) -> float | None:
@@ -82,7 +85,7 @@ STAGES: tuple[Stage, ...] = (
     Stage(
         name="assess",
         about="ease, stretch and clearance: does it fit",
-        needs=("draped", "rest_shape", "collider", "fabric"),
+        needs=("draped", "worn_rest", "collider", "fabric"),
         optional=("avatar", "garment", "observed"),
         makes=("fit_report", "fit_maps"),
         run=_assess,

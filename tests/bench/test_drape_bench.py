@@ -1,0 +1,171 @@
+"""The drape bench: its judgements on made-up drapes, its cases, and the picture of all kinds of rows."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from vto_pipeline.bench.bench import Row, Watch
+from vto_pipeline.bench.drape import budget, fabrics, refinement, scanned
+from vto_pipeline.bench.drape.case import Case
+from vto_pipeline.bench.samples.wearer import wearer
+from vto_pipeline.bench.timing import Timing
+from vto_pipeline.errors import InputError, IntersectingError
+from vto_pipeline.io.fabrics import read_fabric
+from vto_pipeline.model.cloth import Draped, TraceRow
+from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.report.drape_plot import draw_drape
+
+CLEAN = {
+    "finite": True,
+    "settled": True,
+    "body_intersections": 0,
+    "self_intersections": 0,
+    "max_stretch": 0.01,
+    "residual": 0.5,
+}
+
+
+def draped(mesh, predicted_mm, **audit):
+    row = TraceRow(1.0, 10, predicted_mm, 0.5)
+    return Draped(mesh, np.zeros_like(mesh.vertices), None, (row,), {**CLEAN, **audit})
+
+
+@pytest.fixture
+def shirt(monkeypatch):
+    """A drape that moves the garment by its target error along x, but predicts half of that."""
+    case = Case("shirt", "average", "denim", 40.0)
+
+    def drape(self, settings, fabric=None):
+        mesh = self.made().mesh
+        shift = 1e-3 * settings["target_error_mm"] * np.array([1.0, 0.0, 0.0])
+        return draped(TriangleMesh(mesh.vertices + shift, mesh.faces), 0.5 * settings["target_error_mm"])
+
+    monkeypatch.setattr(Case, "drape", drape)
+    budget._reference.cache_clear()
+    yield case
+    budget._reference.cache_clear()
+
+
+def test_a_prediction_that_promises_too_much_is_found_out(shirt):
+    _, found = budget._measure(shirt, {"target_error_mm": 4.0}, {"target_error_mm": 0.5})
+    assert_allclose(found["distance_mm"], 3.5, rtol=1e-9)
+    assert_allclose(found["true_over_predicted"], 3.5 / 2.0, rtol=1e-9)
+    assert found["honest"] is False
+    assert_allclose(found["reference_mm"], 0.25)
+    _, near = budget._measure(shirt, {"target_error_mm": 1.0}, {"target_error_mm": 0.5})
+    assert near["honest"] is True  # 0.5 mm true, 0.5 mm predicted
+
+
+def test_a_reference_that_has_not_come_to_rest_judges_nobody(shirt, monkeypatch):
+    monkeypatch.setattr(Case, "drape", lambda self, settings: draped(self.made().mesh, 1.0, settled=False))
+    found = budget._measure(shirt, {"target_error_mm": 1.0}, {"target_error_mm": 0.5})[1]
+    assert found["distance_mm"] == 0.0
+    assert found["honest"] is None
+
+
+def test_a_failed_drape_is_a_row_too(shirt, monkeypatch):
+    def fail(self, settings, fabric=None):
+        raise IntersectingError("7 pairs still cross")
+
+    monkeypatch.setattr(Case, "drape", fail)
+    assert budget._measure(shirt, {}, {})[1] == {"status": "7 pairs still cross"}
+    assert fabrics._measure(shirt, read_fabric("denim"), {})[1]["verdict"] == "IntersectingError"
+
+
+def test_there_are_ten_cases_of_every_garment_and_body():
+    cases = [Case(*names, edge_mm=30.0) for names in budget._CASES]
+    assert len({case.name for case in cases}) == 10
+    assert {case.garment for case in cases} == {"shirt", "dress", "skirt", "trousers"}
+    assert {case.size for case in cases} == {"slim", "average", "large"}
+    assert {case.fabric for case in cases} == {"silk_charmeuse", "jersey", "denim", "leather"}
+
+
+@pytest.mark.parametrize(
+    ("audit", "word"),
+    [
+        ({}, "passes"),
+        ({"settled": False}, "moves"),
+        ({"self_intersections": 1}, "crossings"),
+        ({"body_intersections": 2, "settled": False}, "crossings"),
+        ({"finite": False, "self_intersections": 3}, "not finite"),
+    ],
+)
+def test_the_worst_is_the_verdict(shirt, monkeypatch, audit, word):
+    monkeypatch.setattr(Case, "drape", lambda self, settings, fabric=None: draped(self.made().mesh, 1.0, **audit))
+    assert fabrics._measure(shirt, read_fabric("denim"), {})[1]["verdict"] == word
+
+
+def test_a_fabric_is_changed_in_one_way_only():
+    base = read_fabric("cotton_poplin")
+    soft = fabrics.extreme(base, "stretch", 1e-3)
+    assert_allclose([soft.stretch_warp, soft.stretch_weft, soft.shear], 1e-3 * np.array(
+        [base.stretch_warp, base.stretch_weft, base.shear]), rtol=1e-12)  # fmt: skip
+    assert replace(soft, stretch_warp=base.stretch_warp, stretch_weft=base.stretch_weft, shear=base.shear) == base
+    assert fabrics.extreme(base, "density", 2000.0).areal_density == 2.0
+    assert fabrics.extreme(base, "friction", 2.0).friction == 2.0
+    assert_allclose(fabrics.extreme(base, "bending", 1e3).bending_weft, 1e3 * base.bending_weft, rtol=1e-12)
+
+
+def test_figures_of_a_tube_about_the_body():
+    who = wearer("average")
+    turn, up = np.meshgrid(2.0 * np.pi * np.arange(64) / 64, np.linspace(0.7, 1.3, 31), indexing="ij")
+    radius, axis = 0.35, np.array([0.0, 0.0, who.axis_z])
+    points = np.stack([radius * np.sin(turn), up, radius * np.cos(turn)], axis=-1).reshape(-1, 3) + axis
+    at = np.arange(64 * 31).reshape(64, 31)
+    on = np.roll(at, -1, axis=0)
+    a, b, c, d = at[:, :-1].ravel(), on[:, :-1].ravel(), on[:, 1:].ravel(), at[:, 1:].ravel()
+    mesh = TriangleMesh(points, np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])]))
+    found = refinement.figures(mesh, mesh, who)
+    assert_allclose(found["hem_mm"], 700.0, rtol=1e-9)
+    for zone in ("chest", "waist", "hip"):
+        assert_allclose(found[f"{zone}_girth_mm"], 2e3 * np.pi * radius, rtol=2e-3)  # a 64-gon
+    assert 50.0 < found["clearance_mm"] < 350.0
+
+
+def test_length_errors_are_relative():
+    mesh = TriangleMesh([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    assert_allclose(scanned.length_errors(1.01 * mesh.vertices, mesh.vertices, mesh), 0.01, rtol=1e-9)
+
+
+def rows():
+    settings = {"target_error_mm": 1.0}
+    clean = {"predicted_mm": 1.0, "settled": True}
+    yield Row("shirt, slim, silk", "reference", settings, 500, 9.0, clean)
+    for scene, ratio in (("shirt, slim, silk", 1.2), ("skirt, large, denim", 2.0)):
+        for k in (1, 2):
+            judged = {"distance_mm": ratio / k, "predicted_mm": 1.0 / k, "honest": ratio < 1.5 if k == 1 else None}
+            yield Row(scene, "drape", settings, 500, 1.0 * k, judged)
+    for count in (500, 1000, 2000):
+        yield Row("refinement", "drape", settings, count, 1.0, {"from_finest_mm": 1e3 / count, "off_hem_mm": 2.0})
+    for name, verdict in (("fabric: stretch 10", "passes"), ("fabric: stretch 0.001", "crossings")):
+        yield Row(name, "drape", settings, 500, 1.0, {"verdict": verdict})
+    for mode, far in (("as_scanned", 13.0), ("inverse", 0.3)):
+        shape = {"from_scan_mm": far, "length_error_median_share": 1e-3 * far}
+        yield Row("rest shape: shirt", mode, settings, 500, 1.0, shape)
+
+
+@pytest.mark.parametrize("kinds", ["every", "one"])
+def test_the_picture_has_a_panel_for_each_kind(kinds):
+    chosen = list(rows()) if kinds == "every" else [row for row in rows() if "verdict" in row.errors]
+    png = draw_drape({"bench": "drape", "rows": [row.as_json() for row in chosen]})
+    assert png.startswith(b"\x89PNG")
+    assert len(png) > 20_000
+
+
+def test_rows_of_nothing_known_are_refused():
+    with pytest.raises(InputError, match="none with a figure of a drape"):
+        draw_drape({"bench": "drape", "rows": [Row("x", "y", {}, 1, 1.0, {"other": 1.0}).as_json()]})
+
+
+@pytest.mark.slow
+def test_quick_rows_name_what_they_measure(monkeypatch):
+    """No drape here: each measurement is replaced, and what would be measured is looked at."""
+    for module in (budget, refinement, fabrics, scanned):
+        monkeypatch.setattr(module, "_measure", lambda *given: (Timing(1.0), {}))
+    monkeypatch.setattr(budget, "_exact", lambda *given: (Timing(1.0), {}))
+    parts = (budget.budget_rows, refinement.refinement_rows, fabrics.fabric_rows, scanned.scanned_rows)
+    found = [row for part in parts for row in part(True, Watch())]
+    assert len({row.key for row in found}) == len(found) > 8
+    assert all(200 < row.vertices < 3000 for row in found)

@@ -1,0 +1,118 @@
+"""The place of a garment on a body it was never on: unit, axes, shift."""
+
+import numpy as np
+import pytest
+from cloth_scenes import moved, tube
+from numpy.testing import assert_allclose
+
+from vto_pipeline.cloth.fill import Cubes, quarter_turns
+from vto_pipeline.cloth.place import PlaceConfig, place
+from vto_pipeline.errors import InputError
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+
+FINE = PlaceConfig(cube_mm=10)
+Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+DOWN = np.diag([-1.0, -1.0, 1.0])
+
+
+def spool():
+    """A thick rod with a groove of radius 0.08 from y = 0.52 to 0.68."""
+    mesh = tube(1.0, 1.0, 64, 101)
+    y = mesh.vertices[:, 1]
+    radius = np.where(np.abs(y - 0.6) < 0.08, 0.08, 0.15) * np.where((y < 1e-9) | (y > 1 - 1e-9), 1e-3, 1.0)
+    return TriangleMesh(mesh.vertices * np.column_stack([radius, np.ones_like(y), radius]), mesh.faces)
+
+
+def pear():
+    """A rod that is wide below and narrow above."""
+    mesh = tube(1.0, 1.0, 64, 101)
+    y = mesh.vertices[:, 1]
+    radius = (0.2 - 0.14 * y) * np.where((y < 1e-9) | (y > 1 - 1e-9), 1e-3, 1.0)
+    return TriangleMesh(mesh.vertices * np.column_stack([radius, np.ones_like(y), radius]), mesh.faces)
+
+
+def skirt():
+    """A cone that the pear fills from 0.1 to 0.7, 12 mm about it."""
+    mesh = tube(1.0, 0.6, 48, 31, base=0.1)
+    radius = 0.212 - 0.14 * mesh.vertices[:, 1:2]
+    return TriangleMesh(mesh.vertices * np.hstack([radius, np.ones_like(radius), radius]), mesh.faces)
+
+
+@pytest.mark.parametrize("flip", [False, True])
+def test_a_collar_goes_to_the_groove_it_was_made_for(flip):
+    collar = tube(0.09, 0.1, 36, 8, base=0.55)
+    strayed = moved(collar, 0.3, -0.2, 0.15)
+    if flip:
+        strayed = TriangleMesh(strayed.vertices, strayed.faces[:, ::-1])
+    job = Job()
+    found = place(strayed, spool(), FINE, job).put(strayed.vertices)
+    assert_allclose(found[:, [0, 2]].mean(axis=0), 0.0, rtol=0, atol=0.012)  # one cube
+    assert_allclose(found[:, 1].mean(), 0.6, rtol=0, atol=0.03)
+    assert "garment moved by (-3" in job.notes[0]
+
+
+def test_a_garment_wider_than_the_body_is_centred():
+    hoop = moved(tube(0.165, 0.4, 48, 12, base=0.05), 0.25, 0.0, -0.4)
+    found = place(hoop, spool(), FINE, Job()).put(hoop.vertices)
+    assert_allclose(found[:, [0, 2]].mean(axis=0), 0.0, rtol=0, atol=0.015)  # what play there is, and one cube
+
+
+def test_a_garment_that_stands_well_is_left_alone():
+    collar = tube(0.09, 0.1, 36, 8, base=0.55)
+    job = Job()
+    assert_allclose(place(collar, spool(), FINE, job).put(collar.vertices), collar.vertices, rtol=0, atol=0)
+    assert job.notes == ["garment left where it stands: 100% as good as the best place"]
+
+
+@pytest.mark.parametrize(
+    ("unit", "metres", "turn"), [("m", 1.0, Z_UP), ("cm", 0.01, np.eye(3)), ("mm", 0.001, DOWN), ("in", 0.0254, DOWN)]
+)
+def test_unit_and_axes_are_found_and_told(unit, metres, turn):
+    worn, job = skirt(), Job()
+    strayed = TriangleMesh(worn.vertices @ turn / metres, worn.faces)
+    placement = place(strayed, pear(), PlaceConfig(cube_mm=20), job)
+    found = placement.put(strayed.vertices)
+    assert_allclose(found[:, 1], worn.vertices[:, 1], rtol=0, atol=0.01)  # half a cube
+    assert_allclose(found[:, [0, 2]].mean(axis=0), 0.0, rtol=0, atol=0.01)
+    rest = placement.turned(strayed.vertices)
+    assert_allclose(np.ptp(rest, axis=0), np.ptp(worn.vertices, axis=0), rtol=1e-9)
+    assert any(f"taken to be in {unit}:" in note for note in job.notes) == (unit != "m")
+    assert any(note.startswith("garment turned") for note in job.notes) == (turn[1, 1] != 1.0)
+
+
+def test_a_garment_too_small_starts_around_the_body_and_that_is_told():
+    rod, job = tube(0.15, 1.0, 64, 51), Job()
+    rod = TriangleMesh(
+        rod.vertices * np.where(np.abs(rod.vertices[:, 1:2] - 0.5) > 0.499, [1e-3, 1, 1e-3], 1.0), rod.faces
+    )
+    small = tube(0.12, 0.4, 48, 21, base=0.3)  # the rod is a quarter too thick
+    placement = place(small, rod, PlaceConfig(cube_mm=15), job)
+    assert 1.2 <= placement.stretch <= 1.5
+    start = TriangleMesh(placement.put(small.vertices), small.faces)
+    assert (SurfaceDistance(rod).signed(start.vertices).distance > -0.015).all()  # a cube
+    assert_allclose(placement.turned(small.vertices), small.vertices, rtol=0, atol=0)  # it is as small as before
+    assert job.warnings[0].startswith("too small")
+
+
+def test_a_garment_of_no_size_is_refused():
+    speck = TriangleMesh(1e-9 * skirt().vertices, skirt().faces)
+    with pytest.raises(InputError, match="longest side is .*times the body"):
+        place(speck, pear(), FINE, Job())
+
+
+def test_quarter_turns_are_the_rotations_of_a_cube_and_cubes_turn_like_meshes():
+    turns = quarter_turns()
+    assert len({tuple(turn.ravel()) for turn in turns}) == 24
+    for turn in turns:
+        assert_allclose(turn @ turn.T, np.eye(3), rtol=0, atol=0)
+        assert np.linalg.det(turn) == pytest.approx(1.0)
+    worn = moved(skirt(), 0.037, 0.0, 0.021)
+    cubes = Cubes(worn, pear(), 0.02, 2.0)
+    for turn in turns[5::6]:
+        found = cubes.fill(turn)
+        turned = TriangleMesh(worn.vertices @ turn.T + found.shift, worn.faces)
+        anew = Cubes(turned, pear(), 0.02, 2.0).fill(np.eye(3))
+        assert_allclose(anew.shift, 0.0, rtol=0, atol=0.021)  # a cube: the lattices differ by part of one
+        assert_allclose(anew.worth, found.worth, rtol=0, atol=0.05)

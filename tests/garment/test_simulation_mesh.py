@@ -1,0 +1,129 @@
+"""Any mesh becomes one that can be simulated: what is kept, what is mended, what is dropped, and that it is said."""
+
+import numpy as np
+import pytest
+import trimesh
+from numpy.testing import assert_allclose
+
+from vto_pipeline.garment.simulation_mesh import SimulationMeshConfig, least_angles, remesh_for_simulation
+from vto_pipeline.geometry.remesh import edge_lengths, perimeter
+from vto_pipeline.geometry.repair import is_manifold
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.geometry.topology import boundary_loops, edge_face_counts, edge_faces, edges, face_components
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+
+RADIUS, LENGTH, EDGE = 0.10, 0.3, 15.0
+CONFIG = SimulationMeshConfig(edge_mm=EDGE)
+
+
+def tube(around=60, along=30, shift=0.0):
+    """An open tube, edges of 10 mm, that lies in (x, 0, z) = (shift, ..., 0)."""
+    turn, up = np.meshgrid(2.0 * np.pi * np.arange(around) / around, np.linspace(0.0, LENGTH, along), indexing="ij")
+    vertices = np.stack([RADIUS * np.sin(turn) + shift, up, RADIUS * np.cos(turn)], axis=-1).reshape(-1, 3)
+    at = np.arange(around * along).reshape(around, along)
+    on = np.roll(at, -1, axis=0)
+    a, b, c, d = at[:, :-1].ravel(), on[:, :-1].ravel(), on[:, 1:].ravel(), at[:, 1:].ravel()
+    return TriangleMesh(vertices, np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])]))
+
+
+def together(*meshes):
+    first = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    faces = [mesh.faces + start for mesh, start in zip(meshes, first, strict=False)]
+    return TriangleMesh(np.vstack([mesh.vertices for mesh in meshes]), np.vstack(faces))
+
+
+def with_flaps(mesh, count):
+    """Triangles that stand off from inner edges, which so have three faces."""
+    ends = edges(mesh)[edge_faces(mesh)[:, 1] >= 0][:: len(mesh.faces) // count][:count]
+    tips = mesh.vertices[ends].mean(axis=1) * [1.05, 1.0, 1.05]
+    flaps = np.column_stack([ends, len(mesh.vertices) + np.arange(count)])
+    return TriangleMesh(np.vstack([mesh.vertices, tips]), np.vstack([mesh.faces, flaps]))
+
+
+def broken(how):
+    mesh = tube()
+    if how == "soup":
+        return TriangleMesh(mesh.vertices[mesh.faces].reshape(-1, 3), np.arange(3 * len(mesh.faces)).reshape(-1, 3))
+    if how == "100 edges of three faces":
+        return with_flaps(mesh, 100)
+    if how == "doubled faces":
+        return TriangleMesh(mesh.vertices, np.vstack([mesh.faces, mesh.faces[:, ::-1]]))
+    if how == "turned faces":
+        turn = np.random.default_rng(3).random(len(mesh.faces)) < 0.5
+        return TriangleMesh(mesh.vertices, np.where(turn[:, None], mesh.faces[:, ::-1], mesh.faces))
+    if how == "vertices on each other":
+        moved, inner = mesh.vertices.copy(), np.arange(35, 1700, 90)
+        moved[inner] = moved[inner + 1]
+        return TriangleMesh(moved, mesh.faces)
+    if how == "a button":
+        ball = trimesh.creation.icosphere(subdivisions=1, radius=0.004)
+        return together(mesh, TriangleMesh(ball.vertices + np.array([0.12, 0.1, 0.0]), ball.faces))
+    return mesh
+
+
+CASES = {
+    "nothing": [],
+    "soup": ["welded"],
+    "100 edges of three faces": ["cut non-manifold", "dropped 100 of 101 pieces"],
+    "doubled faces": ["duplicate faces"],
+    "turned faces": ["to agree with their neighbours"],
+    "vertices on each other": ["welded", "degenerate faces"],
+    "a button": ["dropped 1 of 2 pieces"],
+}
+
+
+@pytest.mark.parametrize("how", CASES)
+def test_a_tube_comes_out_as_a_tube_whatever_was_wrong_with_it(how):
+    from vto_pipeline.geometry.repair import RepairConfig, repair
+
+    mesh, job = broken(how), Job()
+    if how == "100 edges of three faces":
+        assert (edge_face_counts(mesh)[1] == 3).sum() == 100
+    made = remesh_for_simulation(repair(mesh, RepairConfig(), job), CONFIG, job)
+    assert is_manifold(made)
+    assert face_components(made)[0] == 1
+    rims = [perimeter(made, loop) for loop in boundary_loops(made)]
+    assert_allclose(rims, [2.0 * np.pi * RADIUS] * 2, rtol=0.03)  # a 60-gon, its chords cut by 15 mm edges
+    area = trimesh.Trimesh(made.vertices, made.faces, process=False).area
+    assert_allclose(area, 2.0 * np.pi * RADIUS * LENGTH, rtol=0.02)  # the same
+    assert_allclose(1e3 * np.median(edge_lengths(made)), EDGE, rtol=0.1)
+    assert np.rad2deg(least_angles(made).min()) > 15.0
+    off = SurfaceDistance(tube()).nearest(made.vertices).distance
+    assert off.max() < 2e-3  # a pinched row of the broken tube is 0.5 mm off; chords sag 0.3 mm
+    told = " ".join(job.notes)
+    assert all(words in told for words in CASES[how])
+
+
+def test_each_of_several_pieces_is_kept_and_treated_for_itself():
+    even = remesh_for_simulation(tube(), CONFIG, Job())
+    job, loose = Job(), SimulationMeshConfig(edge_mm=EDGE, least_angle_deg=10)
+    both = remesh_for_simulation(together(tube(shift=0.5), even), loose, job)
+    assert face_components(both)[0] == 2
+    assert len(boundary_loops(both)) == 4
+    assert_allclose(both.vertices[-len(even.vertices) :], even.vertices, rtol=0, atol=0)  # good enough: as it was
+    assert [what for what, _ in job.left_out] == ["remeshing"]
+    assert both.vertices[: -len(even.vertices), 0].min() > 0.3
+
+
+def test_a_strap_keeps_its_width_with_finer_triangles():
+    rows = np.linspace(0.0, 0.4, 41)
+    left, right = (np.column_stack([np.full(41, x), rows, np.zeros(41)]) for x in (0.0, 0.02))
+    at = np.arange(40)
+    faces = np.vstack([np.column_stack([at, at + 41, at + 42]), np.column_stack([at, at + 42, at + 1])])
+    job = Job()
+    made = remesh_for_simulation(TriangleMesh(np.vstack([left, right]), faces), CONFIG, job)
+    assert any("narrow" in note for note in job.notes)
+    assert 4.0 < 1e3 * np.median(edge_lengths(made)) < 9.0  # a third of 20 mm
+    assert_allclose(trimesh.Trimesh(made.vertices, made.faces, process=False).area, 0.4 * 0.02, rtol=0.05)
+    assert np.ptp(made.vertices[:, 0]) > 0.018
+
+
+def test_all_good_pieces_are_left_as_they_are():
+    even = remesh_for_simulation(tube(), CONFIG, Job())
+    loose = SimulationMeshConfig(edge_mm=EDGE, least_angle_deg=10)
+    pair = together(even, TriangleMesh(even.vertices + np.array([0.5, 0.0, 0.0]), even.faces))
+    job = Job()
+    assert remesh_for_simulation(pair, loose, job) is pair
+    assert all("used as it is" in why for _, why in job.left_out)
+    assert remesh_for_simulation(pair, loose, Job(force_all=True)) is not pair

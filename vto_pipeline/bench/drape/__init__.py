@@ -1,0 +1,17 @@
+"""Draping: error against run time and the honesty of its prediction, refinement, extreme fabrics, rest shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from vto_pipeline.bench.bench import Row, Watch
+from vto_pipeline.bench.drape.budget import budget_rows
+from vto_pipeline.bench.drape.fabrics import fabric_rows
+from vto_pipeline.bench.drape.refinement import refinement_rows
+from vto_pipeline.bench.drape.scanned import scanned_rows
+
+
+def rows(quick: bool, watch: Watch) -> Iterator[Row]:
+    """Measure all of them."""
+    for part in (budget_rows, refinement_rows, fabric_rows, scanned_rows):
+        yield from part(quick, watch)

@@ -1,0 +1,143 @@
+"""The phases of one drape: freed, grown into, ridden along, settled."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from vto_pipeline.cloth.build import ClothModel, ClothState, at_rest, without_gravity
+from vto_pipeline.cloth.collision.self_contact import Tally
+from vto_pipeline.cloth.drape_config import DrapeConfig
+from vto_pipeline.cloth.grow import growing
+from vto_pipeline.cloth.pace import PacedBody, covered_way, ride
+from vto_pipeline.cloth.settle import SettleLimits, Settling, settle
+from vto_pipeline.cloth.simulation import default_skin
+from vto_pipeline.cloth.start import free_start
+from vto_pipeline.cloth.stepper import Stepper
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.model.body import MovingBody
+from vto_pipeline.model.fabric import Fabric
+from vto_pipeline.model.garment import RestShape
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+
+_CALM = 20.0  # 1/s: velocities fade this fast while the body grows, where the way does not matter
+
+
+class Phases:
+    """What the phases of one drape share.
+
+    Args:
+        model: The cloth.
+        rest: Its shape without forces.
+        fabric: What it is made of.
+        config: All settings.
+        job: For progress, findings and what was left out.
+    """
+
+    def __init__(self, model: ClothModel, rest: RestShape, fabric: Fabric, config: DrapeConfig, job: Job) -> None:
+        self._model = model
+        self._rest = rest
+        self._fabric = fabric
+        self._friction = fabric.friction if config.friction is None else config.friction
+        self._skin = default_skin(model.edge_length) if config.skin_mm is None else 1e-3 * config.skin_mm
+        self._config = config
+        self._job = job
+        self._crossed = np.zeros(len(model.mass), np.bool_)
+        self._tallies: list[Tally] = []
+
+    def free(self, state: ClothState, body: TriangleMesh | None = None) -> ClothState:
+        """Return the cloth where it crosses neither itself nor the body; where it could not be freed, it may go on."""
+        if not self._config.self_collision:
+            return state
+        start = free_start(
+            state.positions, self._model.faces, self._rest.positions, self._fabric.thickness, self._job, body
+        )
+        self._crossed = start.crossed
+        if start.pairs == 0:
+            return state
+        return replace(state, positions=start.positions, velocities=np.zeros_like(state.velocities))
+
+    def collider(self, body: MovingBody, cloth: TriangleMesh) -> PacedBody:
+        """Return the body, which moves as fast as it may about the cloth."""
+        seconds = covered_way(body, cloth) / self._config.body_speed
+        return PacedBody(body, seconds, self._friction, self._job)
+
+    def stepper(self, model: ClothModel, collider: PacedBody, damping: float) -> Stepper:
+        """Return the cloth among its colliders."""
+        made = Stepper(
+            model,
+            [collider],
+            np.full(len(model.mass), self._skin),
+            self._config,
+            damping=damping,
+            max_speed=self._config.max_speed,
+            crossed=self._crossed,
+            force_all=self._job.force_all,
+        )
+        if made.self_contact is not None:
+            self._tallies.append(made.self_contact.tally)
+        return made
+
+    def grow(self, state: ClothState, body: TriangleMesh) -> ClothState:
+        """Return the cloth outside the body."""
+        mesh = TriangleMesh(state.positions, self._model.faces)
+        depth = -float(SurfaceDistance(body).signed(mesh.vertices).distance.min())
+        what = "growing the body inside the garment"
+        if depth <= 1e-3 * self._config.grow_above_mm:
+            self._job.leave_out(what, f"no cloth deeper in it than {1e3 * max(depth, 0):.1f} mm")
+            return state
+        self._job.progress(0.05, what)
+        collider = self.collider(growing(body, mesh, self._job), mesh)
+        stepper = self.stepper(without_gravity(self._model), collider, _CALM)
+        grown = ride(stepper, state, collider, self._skin, lambda done: self._job.progress(0.05 + 0.25 * done, what))
+        return at_rest(grown.positions)
+
+    def ride(self, state: ClothState, stepper: Stepper, collider: PacedBody, body: TriangleMesh) -> ClothState:
+        """Return the cloth after the body's motion."""
+        what = "riding along with the body"
+        if collider.ends == 0.0:
+            self._job.leave_out(what, "the body is at rest")
+            return state
+        at_full_pace = collider.ends
+        state = ride(stepper, state, collider, self._skin, lambda done: self._job.progress(0.3 + 0.2 * done, what))
+        self._job.note(
+            f"the body took {collider.ends:.2f} s of cloth time to change, {at_full_pace:.2f} s had it not been slowed"
+        )
+        return self.free(state, body)
+
+    def settle(self, state: ClothState, stepper: Stepper, deadline: float) -> Settling:
+        """Return the cloth at rest, or as near to it as allowed."""
+
+        def watch(done: float, error: float) -> None:
+            known = f"{1e3 * error:.2f} mm to come" if np.isfinite(error) else "falling into place"
+            self._job.progress(0.5 + 0.4 * done, f"settling: {known}")
+
+        limits = SettleLimits(
+            error=1e-3 * self._config.target_error_mm,
+            residual=self._config.target_residual,
+            seconds=self._config.settle_seconds,
+            finest=self._config.finest,
+            deadline=deadline,
+        )
+        return settle(stepper, state, limits, watch)
+
+    def account(self) -> None:
+        """Tell what the search for contacts of the cloth with itself took and saved."""
+        asked, out, reused = (
+            sum(getattr(one, name) for one in self._tallies) for name in ("asked", "out_of_reach", "reused")
+        )
+        if out + reused > 0:
+            self._job.leave_out(
+                "self-collision search",
+                f"{(out + reused) / asked:.0%} of {asked} questions needed none: the cloth was out of its own reach "
+                f"({out}), or an earlier search still held ({reused})",
+            )
+        if asked > 0:
+            self._job.measure(
+                self_searches=sum(one.searched for one in self._tallies),
+                self_searches_left_out=out + reused,
+                self_searches_took_s=sum(one.proof_s + one.search_s for one in self._tallies),
+                self_searches_saved_s=sum(one.saved_s for one in self._tallies),
+            )
