@@ -46,7 +46,7 @@ def towel(columns=13, rows=37):
 def scan():
     """A towel that has come to rest on the bar, and how it was cut."""
     cut = towel()
-    settings = {"place": "as_it_stands", "target_error_mm": 0.1, "target_residual": 0.0, "settle_seconds": 6.0}
+    settings = {"place": "as_it_stands", "target_error_mm": 0.1, "settle_seconds": 6.0}
     hung = drape(Garment(cut, RestShape(cut.vertices)), bar(), SOFT, settings)
     return cut, hung.mesh
 

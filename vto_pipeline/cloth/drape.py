@@ -11,7 +11,6 @@ import numpy as np
 from vto_pipeline.cloth.audit import audit
 from vto_pipeline.cloth.balance import elastic_energy
 from vto_pipeline.cloth.build import at_rest, build
-from vto_pipeline.cloth.clear import clear_of_body
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.judge.balance import knows
 from vto_pipeline.cloth.pace import covered_way
@@ -86,12 +85,11 @@ def drape(
         stepper.prepare(state.positions)
         job.note(f"{stepper.choice.method}, {stepper.substeps} steps per 1/60 s: {stepper.choice.reason}")
         state = phases.ride(state, stepper, collider, body.final)
-        settling = phases.settle(state, stepper, deadline)
-        job.progress(0.9, "clearing the body")
-        state, _ = clear_of_body(stepper, settling.state, model.faces, body.final, config.clear_rounds)
+        settling = phases.settle(state, stepper, body.final, deadline)
     except DivergedError as error:
         error.partial["draped"] = mesh
         raise
+    state = settling.state
     draped = TriangleMesh(state.positions, model.faces, mesh.colors)
     findings = {
         "mode": garment.rest.worn_as,

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from vto_pipeline.cloth.build import ClothModel, ClothState, at_rest, without_gravity
+from vto_pipeline.cloth.clear import clear_of_body
 from vto_pipeline.cloth.collision.self_contact import Tally
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.grow import growing
@@ -22,6 +23,7 @@ from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
+_NEARLY = 10.0  # times the bounds of rest: near enough to see where the cloth lies across the body
 _CALM = 20.0  # 1/s: velocities fade this fast while the body grows, where the way does not matter
 
 
@@ -107,8 +109,8 @@ class Phases:
         )
         return self.free(state, body)
 
-    def settle(self, state: ClothState, stepper: Stepper, deadline: float) -> Settling:
-        """Return the cloth at rest, or as near to it as allowed."""
+    def settle(self, state: ClothState, stepper: Stepper, body: TriangleMesh, deadline: float) -> Settling:
+        """Return the cloth at rest and clear of the body, or as near to it as allowed."""
 
         def watch(done: float, error: float) -> None:
             known = f"{1e3 * error:.2f} mm to come" if np.isfinite(error) else "falling into place"
@@ -121,7 +123,19 @@ class Phases:
             finest=self._config.finest,
             deadline=deadline,
         )
-        return settle(stepper, state, limits, watch)
+        near = replace(limits, error=_NEARLY * limits.error, residual=_NEARLY * limits.residual)
+        first = settle(stepper, state, near, watch)
+        cleared = self._cleared(first.state, stepper, body)
+        last = settle(stepper, cleared, limits, watch)  # what was pushed off the body comes to rest, too
+        last.state = self._cleared(last.state, stepper, body)
+        spent = first.trace[-1].seconds if first.trace else 0.0
+        last.trace = first.trace + [replace(row, seconds=spent + row.seconds) for row in last.trace]
+        return last
+
+    def _cleared(self, state: ClothState, stepper: Stepper, body: TriangleMesh) -> ClothState:
+        """Return the cloth where no triangle of it crosses the body, if rounds enough are allowed."""
+        self._job.progress(0.9, "clearing the body")
+        return clear_of_body(stepper, state, self._model.faces, body, self._config.clear_rounds)[0]
 
     def account(self) -> None:
         """Tell what the search for contacts of the cloth with itself took and saved."""

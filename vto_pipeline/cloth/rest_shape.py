@@ -139,7 +139,6 @@ class _Inverse:
         settings = {
             "place": "as_it_stands",
             "target_error_mm": config.target_error_mm,
-            "target_residual": 0.0,
             "settle_seconds": config.settle_seconds,
         }
         garment = Garment(self._mesh, RestShape(rest, config.rest_angles))

@@ -148,8 +148,9 @@ class Stepper:
     def residual(self, state: ClothState) -> float:
         """Return the out-of-balance force; see `balance.out_of_balance`."""
         x, still = state.positions, np.zeros_like(state.positions)
-        pairs = no_pairs() if self.self_contact is None else self.self_contact.near(x, x, FRAME / self.substeps)
-        touched = active_set(self._contacts, pairs, 0.0, 1.0, self._model.inverse_mass, x, still, no_contacts(0))
+        pairs = no_pairs() if self.self_contact is None else self.self_contact.near(x, x, FRAME)
+        mass = self._model.inverse_mass
+        touched = active_set(self._contacts, pairs, 0.0, 1.0, mass, x, still, still, no_contacts(0))
         return out_of_balance(self._model, x, touched)
 
     @property

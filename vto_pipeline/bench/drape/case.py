@@ -19,7 +19,7 @@ from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import Garment
 from vto_pipeline.model.job import Job
 
-STAND: Mapping[str, Value] = {"place": "as_it_stands", "target_residual": 0.0, "settle_seconds": 20.0}
+STAND: Mapping[str, Value] = {"place": "as_it_stands", "settle_seconds": 20.0}
 """Settings of every drape here: garments are made where they belong, and only the predicted error ends a run."""
 
 

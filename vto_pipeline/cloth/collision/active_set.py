@@ -89,7 +89,7 @@ def no_contacts(count):
 
 
 @njit(cache=True, error_model="numpy")
-def active_set(contacts, pairs, t0, t1, inverse_mass, x, guess, before):
+def active_set(contacts, pairs, t0, t1, inverse_mass, x, guess, drift, before):
     """Return the contacts where they are at the end of a step, with a guess which of them push.
 
     Args:
@@ -99,6 +99,7 @@ def active_set(contacts, pairs, t0, t1, inverse_mass, x, guess, before):
         inverse_mass: [1/kg], shape (V,).
         x: Positions at the begin [m], shape (V, 3).
         guess: How far vertices would go by themselves [m], shape (V, 3).
+        drift: How far by their speed alone [m], shape (V, 3): cloth may hold what would else fall.
         before: The active set of the last step.
     """
     found = no_contacts(np.sum(contacts.active) + len(pairs.key))
@@ -119,7 +120,7 @@ def active_set(contacts, pairs, t0, t1, inverse_mass, x, guess, before):
         _take_pair(found, count, pairs, p)
         count += 1
     for c in range(count):
-        _recall(found, c, before, x, guess)
+        _recall(found, c, before, x, guess, drift)
     return _chosen(found, np.arange(count))
 
 
@@ -146,7 +147,7 @@ def _arriving(pairs, places, contacts, x, guess):
     found = no_contacts(len(places))
     for c in range(len(places)):
         _take_pair(found, c, pairs, places[c])
-        _recall(found, c, contacts, x, guess)
+        _recall(found, c, contacts, x, guess, guess)
     return found
 
 
@@ -183,17 +184,19 @@ def _chosen(contacts, places):
 
 
 @njit(cache=True, error_model="numpy")
-def _recall(found, c, before, x, guess):
+def _recall(found, c, before, x, guess, drift):
     """Guess whether contact c pushes and slides: as in the last step, or where its vertices are going."""
     n = load(found.normal, c)
     place = np.searchsorted(before.key, found.key[c])
+    pushed, way = False, guess
     if place < len(before.key) and before.key[place] == found.key[c]:
+        pushed, way = before.pushing[place], drift
         found.force[c], found.sliding[c] = before.force[place], before.sliding[place]
         store(found.slide, c, load(before.slide, place))
         store(found.rub, c, tangential(n, load(before.rub, place)))
     touched = found.force[c] > 0.0
-    reached = dot(n, sum_at(found, c, x)) + dot(n, sum_at(found, c, guess))
-    found.pushing[c] = reached < found.level[c] or touched
+    reached = dot(n, sum_at(found, c, x)) + dot(n, sum_at(found, c, way))
+    found.pushing[c] = reached < found.level[c] or pushed
     if touched:
         slip = tangential(n, load(found.slide, c))  # the normal has turned since
     else:  # it arrives: friction is against the way it comes

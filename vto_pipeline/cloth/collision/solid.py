@@ -68,8 +68,10 @@ def _planes(kind, size, positions, move, skin, travel):  # type: ignore[no-untyp
         length = norm(way)
         near[i] = d < skin[i] + travel + length
         if glides(d, dot(n, way), skin[i]):
-            _, q, n = signed_distance(kind, size, axpy(0.5, way, p))
-            d = dot(n, sub(p, q))
+            _, there, ahead = signed_distance(kind, size, axpy(0.5, way, p))
+            room = dot(ahead, sub(p, there))
+            if room > 0.0:  # else the way leads over an edge, and the vertex may stay on this side of it
+                d, q, n = room, there, ahead
         elif near[i] and d > 0.0 and length > SLOW * skin[i] and d + dot(n, way) < skin[i]:
             d, q, n = first_touch(kind, size, p, way)
         distance[i] = d

@@ -131,7 +131,8 @@ class Newton:
         target = x + move + (~held)[:, None] * (h * h * model.gravity)
         itself = self.self_contact
         pairs = no_pairs() if itself is None else itself.near(start, target, h)
-        self._active = active_set(contacts, pairs, t0, t1, model.inverse_mass, start, move, self._active)
+        guess, mass = target - start, model.inverse_mass
+        self._active = active_set(contacts, pairs, t0, t1, mass, start, guess, move, self._active)
         if led.any():  # what they pull at their neighbours by being led is no measure
             forces = model.mass[:, None] * model.gravity
             add_forces(start, model.constraints, forces)
