@@ -6,56 +6,17 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from block_sheets import links, sheet, whole
 from numba import get_num_threads, set_num_threads
 from scipy import sparse
 from scipy.linalg import cho_factor, cho_solve
 
-from vto_pipeline.numerics.block_matrix import BlockMatrix, pattern, to_scipy
+from vto_pipeline.numerics.block_matrix import BlockMatrix
 from vto_pipeline.numerics.cholesky import factor_room, factorise, solve
 from vto_pipeline.numerics.elimination import Elimination, eliminate
 from vto_pipeline.numerics.elimination_tree import dissection
 
 NO_LINKS = np.empty((0, 4), np.int32), np.empty((0, 4)), np.empty((0, 3, 3))
-
-
-def sheet(count: int, rng: np.random.Generator, reach: int = 1) -> BlockMatrix:
-    """Return a positive definite matrix on a grid of count x count whose rows couple neighbours up to `reach` away."""
-    place = np.arange(count * count).reshape(count, count)
-    near = [(i, j) for i in range(-reach, reach + 1) for j in range(-reach, reach + 1)]
-    ends = [
-        (place[max(0, i) : count + min(0, i), max(0, j) : count + min(0, j)],
-         place[max(0, -i) : count + min(0, -i), max(0, -j) : count + min(0, -j)])
-        for i, j in near
-    ]  # fmt: skip
-    rows = np.concatenate([one.ravel() for one, _ in ends]).astype(np.int32)
-    columns = np.concatenate([other.ravel() for _, other in ends]).astype(np.int32)
-    matrix, _ = pattern(rows, columns, count * count)
-    matrix.blocks[:] = rng.standard_normal(matrix.blocks.shape)
-    whole = to_scipy(matrix).tocsr()
-    whole = whole + whole.T
-    whole = whole + sparse.diags_array(np.abs(whole).sum(axis=1) + 0.01)
-    blocks = sparse.bsr_array(whole, blocksize=(3, 3))
-    blocks.sort_indices()
-    matrix.blocks[:] = blocks.data
-    return matrix
-
-
-def links(count: int, rows: int, rng: np.random.Generator):  # type: ignore[no-untyped-def]
-    """Return vertices, weights (some of no part) and blocks of random links."""
-    vertices = np.stack([rng.choice(rows, 4, replace=False) for _ in range(count)]).astype(np.int32)
-    weights = rng.standard_normal((count, 4))
-    weights[::3, 3] = 0.0
-    weights[::7, 1:] = 0.0
-    half = rng.standard_normal((count, 3, 3))
-    return vertices, weights, half @ half.transpose(0, 2, 1)
-
-
-def whole(matrix: BlockMatrix, vertices, weights, between):  # type: ignore[no-untyped-def]
-    """Return the matrix and its links as one, by SciPy."""
-    rows, count = len(matrix.diagonal), len(vertices)
-    gather = sparse.csr_array((weights.ravel(), (np.repeat(np.arange(count), 4), vertices.ravel())), (count, rows))
-    gather = sparse.kron(gather, sparse.eye_array(3)).tocsr()
-    return to_scipy(matrix).tocsr() + gather.T @ sparse.block_diag(list(between)).tocsr() @ gather
 
 
 def planned(matrix: BlockMatrix, vertices, weights) -> Elimination:  # type: ignore[no-untyped-def]
@@ -67,13 +28,13 @@ def planned(matrix: BlockMatrix, vertices, weights) -> Elimination:  # type: ign
 def test_solution(count: int, reach: int, linked: int) -> None:
     rng = np.random.default_rng(count)
     matrix = sheet(count, rng, reach)
-    vertices, weights, between = links(linked, count * count, rng) if linked else NO_LINKS
+    vertices, weights, between = links(linked, count * count, rng)
     plan = planned(matrix, vertices, weights)
     room = factor_room(plan)
     assert factorise(plan, matrix.starts, matrix.blocks, weights, between, room)
     right, x = rng.standard_normal((count * count, 3)), np.empty((count * count, 3))
     solve(plan, room, right, x)
-    dense = (whole(matrix, vertices, weights, between) if linked else to_scipy(matrix)).toarray()
+    dense = whole(matrix, vertices, weights, between).toarray()
     wanted = cho_solve(cho_factor(dense), right.ravel()).reshape(-1, 3)
     np.testing.assert_allclose(x, wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())  # condition times rounding
 

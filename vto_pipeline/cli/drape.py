@@ -14,7 +14,7 @@ _WANT = ("draped", "audit", "trace", "render_mesh", "fit_report", "page")
 
 @click.command("drape")
 @click.option("--garment", type=PATH, required=True, metavar="FILE", help="Garment mesh.")
-@click.option("--body", type=PATH, metavar="FILE", help="Avatar (.npz of vto fit), or a mesh taken as it stands.")
+@click.option("--body", type=PATH, metavar="FILE", help="Avatar (.npz of vto fit), another model's body, or a mesh: taken as it stands.")
 @click.option("--measurements", type=PATH, metavar="FILE", help="Make the body from these, in place of --body.")
 @click.option(
     "--source-body",
@@ -63,4 +63,7 @@ def drape_command(
 
 
 def _is_avatar(path: Path | None) -> bool:
-    return path is not None and path.suffix.lower() == ".npz"
+    """Return whether it is one of ours; other models' bodies are meshes."""
+    from vto_pipeline.io.sniff import find_kind
+
+    return path is not None and path.suffix.lower() == ".npz" and find_kind(path)[0] == "avatar"

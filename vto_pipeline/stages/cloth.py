@@ -89,11 +89,11 @@ STAGES: tuple[Stage, ...] = (
     ),
     Stage(
         name="drape",
-        about="the garment at rest on the body (small-step XPBD)",
+        about="the garment at rest on the body",
         needs=("sim_mesh", "worn_rest", "collider", "fabric"),
         makes=("draped", "audit", "trace"),
         run=_drape,
         settings=DrapeConfig,
-        uses=("numba", "libigl"),
+        uses=("numba", "libigl", "pymetis"),
     ),
 )
