@@ -73,3 +73,17 @@ def test_a_cut_sphere_is_a_cap_with_one_round_border(height):
     length = np.linalg.norm(border[:, 0] - border[:, 1], axis=1)
     assert_allclose(length.sum(), 2 * np.pi * np.sqrt(0.01 - height**2), rtol=5e-3, atol=0)  # chords, snapped vertices
     assert length.min() > 0.0003  # no slivers left at the border
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_noise_has_a_surface_too(seed):
+    """Half of all faces of such a grid are checkerboards or next to one: filling them has to come to an end."""
+    rng = np.random.default_rng(seed)
+    phases, waves = rng.uniform(0.0, 6.3, (12, 3)), rng.uniform(-400.0, 400.0, (12, 3))
+
+    def noise(points):
+        waving = sum(np.sin(points @ wave + phase.sum()) for wave, phase in zip(waves, phases, strict=True))
+        return np.maximum(0.003 * waving, np.abs(points).max(axis=1) - 0.1)
+
+    mesh = zero_surface(noise, np.full(3, -0.12), np.full(3, 0.12), 0.01, relaxations=0)
+    assert edge_uses(mesh.faces).tolist() == [0, 0, len(mesh.faces) * 3 // 2]

@@ -14,7 +14,7 @@ _WANT = ("draped", "audit", "trace", "render_mesh", "fit_report", "page")
 
 @click.command("drape")
 @click.option("--garment", type=PATH, required=True, metavar="FILE", help="Garment mesh.")
-@click.option("--body", type=PATH, metavar="FILE", help="Avatar (.npz of vto fit), another model's body, or a mesh: taken as it stands.")
+@click.option("--body", type=PATH, metavar="FILE", help="Avatar, another model's body, or a mesh as it stands.")
 @click.option("--measurements", type=PATH, metavar="FILE", help="Make the body from these, in place of --body.")
 @click.option(
     "--source-body",

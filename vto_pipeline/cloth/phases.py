@@ -18,12 +18,14 @@ from vto_pipeline.cloth.start import free_start
 from vto_pipeline.cloth.stepper import Stepper
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.body import MovingBody
+from vto_pipeline.model.cloth import TraceRow
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
 _NEARLY = 10.0  # times the bounds of rest: near enough to see where the cloth lies across the body
+_TURNS = 5  # of coming to rest and being cleared
 _CALM = 20.0  # 1/s: velocities fade this fast while the body grows, where the way does not matter
 
 
@@ -123,14 +125,19 @@ class Phases:
             finest=self._config.finest,
             deadline=deadline,
         )
-        near = replace(limits, error=_NEARLY * limits.error, residual=_NEARLY * limits.residual)
-        first = settle(stepper, state, near, watch)
-        cleared = self._cleared(first.state, stepper, body)
-        last = settle(stepper, cleared, limits, watch)  # what was pushed off the body comes to rest, too
-        last.state = self._cleared(last.state, stepper, body)
-        spent = first.trace[-1].seconds if first.trace else 0.0
-        last.trace = first.trace + [replace(row, seconds=spent + row.seconds) for row in last.trace]
-        return last
+        bounds = replace(limits, error=_NEARLY * limits.error, residual=_NEARLY * limits.residual)
+        trace: list[TraceRow] = []
+        for _ in range(_TURNS):
+            settling = settle(stepper, state, bounds, watch)
+            spent = trace[-1].seconds if trace else 0.0
+            trace += [replace(row, seconds=spent + row.seconds) for row in settling.trace]
+            state = self._cleared(settling.state, stepper, body)
+            lies_clear = state is settling.state
+            settling.state, settling.trace = state, trace
+            if lies_clear and bounds is limits:
+                break
+            bounds = limits  # what was pushed off the body comes to rest, too
+        return settling
 
     def _cleared(self, state: ClothState, stepper: Stepper, body: TriangleMesh) -> ClothState:
         """Return the cloth where no triangle of it crosses the body, if rounds enough are allowed."""

@@ -14,6 +14,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 Field = Callable[[FloatArray], FloatArray]
 
+_FLIPS = 10  # rounds; a handful is usual
 BLOCK = 4  # fine cells per coarse cell
 EDGES = [(corner, corner | 1 << axis) for axis in range(3) for corner in range(8) if not corner >> axis & 1]
 
@@ -65,11 +66,14 @@ def _sample(field: Field, low: FloatArray, high: FloatArray, cell: float) -> Flo
 
 
 def _settle(values: FloatArray) -> FloatArray:
-    """Flip the faintest corner of every checkerboard face, at which four triangles would share an edge."""
+    """Flip the faintest corner of every checkerboard face, at which four triangles would share an edge.
+
+    Where that goes to and fro between faces, what is outside is filled instead, which comes to an end.
+    """
     values = values.copy()
-    flips = 1
+    flips, turns = 1, 0
     while flips:
-        flips = 0
+        flips, turns = 0, turns + 1
         for axis in range(3):
             grid = np.moveaxis(values, axis, 0)
             a, b, c, d = grid[:, :-1, :-1], grid[:, 1:, :-1], grid[:, 1:, 1:], grid[:, :-1, 1:]
@@ -77,7 +81,8 @@ def _settle(values: FloatArray) -> FloatArray:
             mixed = np.argwhere((inside == (c < 0.0)) & (inside != (b < 0.0)) & (inside != (d < 0.0)))
             for i, j, k in mixed:  # a handful
                 face = grid[i, j : j + 2, k : k + 2]
-                faint = np.unravel_index(np.abs(face).argmin(), face.shape)
+                size = np.abs(face) if turns <= _FLIPS else np.where(face < 0.0, np.inf, face)
+                faint = np.unravel_index(size.argmin(), face.shape)
                 face[faint] = -face[faint] if face[faint] != 0.0 else -1e-12
             flips += len(mixed)
     return values
