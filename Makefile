@@ -44,7 +44,7 @@ format: $(READY)  ## Bring the source into form
 	$(BIN)/ruff format .
 
 bench: $(READY)  ## Measure error against run time (hours; `vto bench NAME --quick` takes a minute)
-	$(BIN)/vto bench solvers integrators stability physics scaling
+	$(BIN)/vto bench solvers integrators stability physics collision drape body scaling
 
 sample-data: $(READY)  ## Generate sample_data/ again
 	$(BIN)/python -m vto_pipeline.bench.samples --out sample_data

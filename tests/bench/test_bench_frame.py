@@ -14,7 +14,7 @@ from vto_pipeline.bench.machine import same_machine, this_machine
 from vto_pipeline.bench.record import Files, carry_out
 from vto_pipeline.bench.timing import Timing, timed
 
-NAMES = ("solvers", "integrators", "stability", "physics", "collision", "scaling")
+NAMES = ("solvers", "integrators", "stability", "physics", "collision", "drape", "body", "scaling")
 
 
 class Counted:

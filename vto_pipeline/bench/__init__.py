@@ -56,15 +56,15 @@ BENCHES = {
         "vto_pipeline.bench.collision",
         draw_collision,
     ),
-    "body": Bench(
-        "bodies from scans, tape and outlines: error against run time, and the noise floor beside ISO 20685",
-        "vto_pipeline.bench.body",
-        draw_body,
-    ),
     "drape": Bench(
         "garments on bodies: error against run time, honesty, refinement, extreme fabrics, rest shapes",
         "vto_pipeline.bench.drape",
         draw_drape,
+    ),
+    "body": Bench(
+        "bodies from scans, tape and outlines: error against run time, and the noise floor beside ISO 20685",
+        "vto_pipeline.bench.body",
+        draw_body,
     ),
     "scaling": Bench(
         "run time at equal error from 1k vertices up, kernels, threads", "vto_pipeline.bench.scaling", draw_scaling

@@ -63,7 +63,9 @@ def drape_command(
 
 
 def _is_avatar(path: Path | None) -> bool:
-    """Return whether it is one of ours; other models' bodies are meshes."""
+    """Return whether it is one of ours; an archive of another model's body is a mesh."""
     from vto_pipeline.io.sniff import find_kind
 
-    return path is not None and path.suffix.lower() == ".npz" and find_kind(path)[0] == "avatar"
+    if path is None or path.suffix.lower() != ".npz":
+        return False
+    return not path.is_file() or find_kind(path)[0] == "avatar"  # what is missing is told later
