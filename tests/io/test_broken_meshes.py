@@ -127,7 +127,7 @@ def test_a_truncated_file_is_an_error_and_never_a_shorter_mesh(tmp_path: Path, n
         (
             "body.fbx",
             b"Kaydara",
-            "files of type .fbx are not read here; wanted .glb, .gltf, .obj, .off, .ply, .stl",
+            "files of type .fbx are not read here; wanted .glb, .gltf, .npz, .obj, .off, .ply, .stl",
             "",
         ),
     ],
