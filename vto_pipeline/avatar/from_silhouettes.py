@@ -183,11 +183,15 @@ def _advance(
 
 def _report(space: ShapeSpace, solution: Solution, job: Job) -> Avatar:
     body = space.avatar(solution.parameters)
-    tape = Tape(body)
-    for name, share in _OPEN_SHARE.items():
-        reading = tape.read(DEFINITIONS[name], body.bind_vertices)
+    tape, sigmas = Tape(body), {}
+    for name, definition in DEFINITIONS.items():
+        reading = tape.read(definition, body.bind_vertices)
         slope = np.einsum("nk,pnk->p", reading.gradient, space.fields[:, reading.vertices])
-        sigma = float(np.sqrt(slope @ solution.covariance @ slope + (share * reading.value) ** 2))
-        job.measure(**{f"{name}_m": round(reading.value, 4), f"{name}_interval_mm": round(1.96 * sigma * 1e3, 1)})
+        open_part = _OPEN_SHARE.get(name, 0.0) * reading.value
+        sigmas[name] = float(np.sqrt(slope @ solution.covariance @ slope + open_part**2))
+        if name in _OPEN_SHARE:
+            job.measure(
+                **{f"{name}_m": round(reading.value, 4), f"{name}_interval_mm": round(1.96e3 * sigmas[name], 1)}
+            )
     job.note("girths behind two outlines are intervals, not points; measure by tape where it matters")
-    return body
+    return replace(body, sigmas=sigmas)
