@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from vto_pipeline.errors import InputError
-from vto_pipeline.report.figure import COLORS, ELSEWHERE, canvas, label_decades, look_of
+from vto_pipeline.report.figure import COLORS, ELSEWHERE, label_decades, look_of
+from vto_pipeline.report.panels import Rows, draw_panels
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Rows = Sequence[Mapping[str, Any]]
-
-_LINE = 0.24  # inch per line of a list
 _LEAST = 1e-3  # mm, s: less is drawn here
 _GOOD, _BAD = COLORS[2], COLORS[1]
 
@@ -43,17 +41,7 @@ def draw_drape(bench: Mapping[str, Any]) -> bytes:
     filled = [(rows, paint) for rows, paint in chosen if rows]
     if not filled:
         raise InputError(f"bench {bench['bench']}: {len(bench['rows'])} rows, none with a figure of a drape")
-    lines = [filled[k : k + 2] for k in range(0, len(filled), 2)]
-    heights = [max(3.2, 1.0 + _LINE * max(len(_scenes(rows)) for rows, _ in line)) for line in lines]
-    with canvas(12.0, sum(heights)) as drawn:
-        grid = drawn.figure.subplots(len(lines), 2, squeeze=False, height_ratios=heights)
-        for line, axes_line in zip(lines, grid, strict=True):
-            for k, axes in enumerate(axes_line):
-                if k < len(line):
-                    line[k][1](axes, line[k][0])
-                else:
-                    axes.set_axis_off()
-    return drawn.png
+    return draw_panels(filled, _scenes, 12.0, 3.2)
 
 
 def _scenes(rows: Rows) -> list[str]:
