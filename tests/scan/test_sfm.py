@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import sqlite3
+from contextlib import closing
 from dataclasses import replace
 
 import cv2
@@ -11,6 +13,7 @@ from scan_scene import distances
 from vto_pipeline.errors import ScanError
 from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
+from vto_pipeline.scan.mapping import _copy
 from vto_pipeline.scan.scale import ScaleConfig, apply_board
 from vto_pipeline.scan.sfm import SfmConfig, estimate_cameras
 from vto_pipeline.scan.similarity import fit_similarity
@@ -113,3 +116,13 @@ def test_photos_from_one_place_are_refused(shot, tmp_path, copies):
         paths[-1].write_bytes(picture)
     with pytest.raises(ScanError, match="could be placed|sparse point"):
         estimate_cameras(PhotoSet(tuple(paths), shot[0].intrinsics[:copies]), SfmConfig(), Job())
+
+
+def test_copy_of_a_database_has_what_is_still_in_the_log(tmp_path):
+    with closing(sqlite3.connect(tmp_path / "sure.db")) as writer:
+        writer.execute("pragma journal_mode=wal")
+        writer.execute("create table matches (pair integer)")
+        writer.execute("insert into matches values (7)")
+        writer.commit()
+        with closing(sqlite3.connect(_copy(tmp_path / "sure.db", "global"))) as reader:
+            assert reader.execute("select pair from matches").fetchall() == [(7,)]

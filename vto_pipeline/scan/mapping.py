@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import shutil
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -36,9 +37,15 @@ def _merit(model: Any) -> tuple[int, float]:
 
 
 def _copy(database: Path, name: str) -> Path:
-    """Each mapper writes to its own database: calibration changes the cameras in it."""
+    """Each mapper writes to its own database: calibration changes the cameras in it.
+
+    Copied by SQLite: what was committed may still lie in the write-ahead log, which a copy of the file would miss.
+    """
     (database.parent / name).mkdir()
-    return Path(shutil.copy(database, database.parent / name / database.name))
+    copied = database.parent / name / database.name
+    with closing(sqlite3.connect(database)) as source, closing(sqlite3.connect(copied)) as target:
+        source.backup(target)
+    return copied
 
 
 def _global(database: Path, folder: Path, seed: int) -> list[Any]:
