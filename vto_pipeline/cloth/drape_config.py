@@ -35,7 +35,7 @@ class DrapeConfig(StepConfig, PlaceConfig, Materials):
     max_speed: float = Field(1.0, gt=0, le=1000, description="No vertex moves faster [m/s]")
     target_error_mm: float = Field(0.5, gt=0, le=100, description="Predicted motion at which it is at rest, rms [mm]")
     target_residual: float = Field(
-        0.05, ge=0, le=10, description="And left-over force at which it is, rms, as a share of a vertex's weight"
+        0.01, ge=0, le=10, description="And left-over force at which it is, rms, as a share of a vertex's weight"
     )
     settle_seconds: float = Field(6.0, gt=0, le=600, description="Cloth time at most until rest [s]")
     finest: int = Field(160, ge=1, le=10000, description="Steps per 1/60 s that are not refined further")

@@ -26,6 +26,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 _NEARLY = 10.0  # times the bounds of rest: near enough to see where the cloth lies across the body
 _TURNS = 5  # of coming to rest and being cleared
+_LONG = 0.5  # steps per 1/60 s on the way to rest: backward Euler takes the more motion out, the longer they are
 _CALM = 20.0  # 1/s: velocities fade this fast while the body grows, where the way does not matter
 
 
@@ -125,6 +126,8 @@ class Phases:
             finest=self._config.finest,
             deadline=deadline,
         )
+        if self._config.substeps is None and stepper.rests_exactly:
+            stepper.substeps = min(stepper.substeps, _LONG)
         bounds = replace(limits, error=_NEARLY * limits.error, residual=_NEARLY * limits.residual)
         trace: list[TraceRow] = []
         for _ in range(_TURNS):

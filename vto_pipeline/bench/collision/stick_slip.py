@@ -21,14 +21,14 @@ from vto_pipeline.model.mesh import TriangleMesh
 _LENGTH, _WIDTH = 0.1, 0.02  # [m]
 _RIGIDITY = 1e-4  # [N·m]
 _STIFFNESS = 3e3  # membrane; the strip is shortened by 0.01 % under its Euler load [N/m]
-_DENSITY = 0.1  # it swings in 0.13 s, and is lowered in two [kg/m²]
+_DENSITY = 0.1  # it swings in 0.13 s, and is lowered in eight [kg/m²]
 _DAMPING = 2.0  # [1/s]
 _SKIN = 1e-3  # [m]
 _SLIPPED = 0.005  # of the length: how far the tip may creep
-_SECONDS = 2.0
+_SECONDS = 8.0
 
 
-def slipping_shortening(settings: Mapping[str, object], friction: float, edges: int = 20) -> float:
+def slipping_shortening(settings: Mapping[str, object], friction: float, edges: int = 40) -> float:
     """Return by what share of its length the strip has been pushed down when its tip slips.
 
     It starts as theory has it at half of that share, and is lowered to half as much again.

@@ -1,14 +1,14 @@
 """Contacts as part of an implicit step: stiff springs along the normal, and Coulomb friction.
 
 Which contacts push, and which of those hold and which slide, is taken from the last step and put right after each
-solution (an active set, as Alart & Curnier 1991 do it), so the system stays linear while it is solved. What holds is
-held by the same spring; what slides is pulled back by μ times the force last seen, against the slip last seen, with
-the stiffness that Coulomb's force has across its direction.
+solution (an active set, as Alart & Curnier 1991 do it), so the system stays linear while it is solved. Friction is
+that of a spring in series with a slider, which gives way at μ times the force last seen: return mapping with its
+consistent tangent (Simo & Hughes 1998, ch. 1; Wriggers 2006, ch. 9). The spring is about as stiff as the cloth, so what
+holds gives way by micrometres; it takes up the friction of the last step, so what rests does not creep.
 
 A plane holds one vertex, and may be as stiff as it likes. Springs across the cloth couple it all, and the stiffer they
 are the harder it is to solve; so between pairs they are only as stiff as what they bear asks for, and what they pushed
 last is pushed from the start (augmented Lagrangian; Hestenes 1969), which in the end leaves as little of a gap open.
-Friction that held is taken up where it was for the same reason: what rests does not creep.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from vto_pipeline.cloth.collision.plane import plane_at
-from vto_pipeline.numerics.vector import axpy, dot, load, norm, store, sub, unit
+from vto_pipeline.numerics.vector import axpy, dot, load, store
 
 _PAIRS = np.int64(1) << 40  # keys from here on are of pairs, those under it of planes
 
@@ -38,10 +38,12 @@ class ActiveSet(NamedTuple):
         carried: How far the surface moves in the step, shape (K, 3) [m].
         friction: Coulomb coefficient, shape (K,).
         pushing: Whether it takes part in the solution, shape (K,).
-        spring: Stiffness along the normal, and against slip of what holds [N/m], shape (K,).
-        sliding: Whether it slides, shape (K,).
-        slide: Direction of the slip, unit, shape (K, 3).
-        across: Stiffness across that direction [N/m], shape (K,).
+        spring: Stiffness along the normal [N/m], shape (K,).
+        cling: Stiffness along the surface, of what holds [N/m], shape (K,).
+        grip: Friction at the begin of the step [N], shape (K, 3).
+        sliding: Whether the slider gives way, shape (K,).
+        trial: What friction would have been when last seen, had the slider held [N], shape (K, 3).
+        across: Stiffness of what slides, across the trial's direction [N/m], shape (K,).
         hold: Friction at most [N], shape (K,).
         force: With which each pushed when last seen [N], shape (K,).
         rub: Friction when last seen [N], shape (K, 3).
@@ -57,8 +59,10 @@ class ActiveSet(NamedTuple):
     friction: NDArray[np.float64]
     pushing: NDArray[np.bool_]
     spring: NDArray[np.float64]
+    cling: NDArray[np.float64]
+    grip: NDArray[np.float64]
     sliding: NDArray[np.bool_]
-    slide: NDArray[np.float64]
+    trial: NDArray[np.float64]
     across: NDArray[np.float64]
     hold: NDArray[np.float64]
     force: NDArray[np.float64]
@@ -79,6 +83,8 @@ def no_contacts(count):
         np.zeros(count),
         np.zeros(count, np.bool_),
         np.zeros(count),
+        np.zeros(count),
+        np.zeros((count, 3)),
         np.zeros(count, np.bool_),
         np.zeros((count, 3)),
         np.zeros(count),
@@ -174,8 +180,10 @@ def _chosen(contacts, places):
         contacts.friction[places],
         contacts.pushing[places],
         contacts.spring[places],
+        contacts.cling[places],
+        contacts.grip[places],
         contacts.sliding[places],
-        contacts.slide[places],
+        contacts.trial[places],
         contacts.across[places],
         contacts.hold[places],
         contacts.force[places],
@@ -192,18 +200,12 @@ def _recall(found, c, before, x, guess, drift):
     if place < len(before.key) and before.key[place] == found.key[c]:
         pushed, way = before.pushing[place], drift
         found.force[c], found.sliding[c] = before.force[place], before.sliding[place]
-        store(found.slide, c, load(before.slide, place))
-        store(found.rub, c, tangential(n, load(before.rub, place)))
-    touched = found.force[c] > 0.0
+        store(found.trial, c, tangential(n, load(before.trial, place)))  # the normal has turned since
+        store(found.grip, c, tangential(n, load(before.rub, place)))
+        store(found.rub, c, load(found.grip, c))
+    found.sliding[c] |= found.force[c] == 0.0  # how hard it will push, and so rub, is not known
     reached = dot(n, sum_at(found, c, x)) + dot(n, sum_at(found, c, way))
     found.pushing[c] = reached < found.level[c] or pushed
-    if touched:
-        slip = tangential(n, load(found.slide, c))  # the normal has turned since
-    else:  # it arrives: friction is against the way it comes
-        slip = tangential(n, sub(sum_at(found, c, guess), load(found.carried, c)))
-        found.sliding[c] = True
-    found.sliding[c] &= norm(slip) > 0.0
-    store(found.slide, c, unit(slip))
 
 
 @njit(cache=True, error_model="numpy")

@@ -36,27 +36,12 @@ def add_contacts(contacts, mass, held, h, x, y, matrix, right, blocks):
     for c in range(len(contacts.key)):
         if not contacts.pushing[c]:
             continue
-        n, t = load(contacts.normal, c), load(contacts.slide, c)
-        spring = contacts.spring[c]
-        hold = contacts.friction[c] * contacts.force[c]
-        slip = _slip(contacts, c, x, y)
-        across = spring
-        if contacts.friction[c] == 0.0:
-            across = 0.0
-        elif contacts.sliding[c]:
-            length = norm(slip)
-            across = hold / length if hold < spring * length else spring
-            if hold == 0.0:
-                across = 0.0
-        contacts.across[c], contacts.hold[c] = across, hold
-        gap = _gap(contacts, c, y)
-        pull = axpy(-spring * gap, n, scale(-across, slip))
-        along = 0.0
+        n, spring = load(contacts.normal, c), contacts.spring[c]
+        _set_friction(contacts, c)
+        pull = axpy(-spring * _gap(contacts, c, y), n, _friction(contacts, c, _slip(contacts, c, x, y)))
+        across, along, t = contacts.across[c], 0.0, unit(load(contacts.trial, c))
         if contacts.sliding[c]:
             along = across
-            pull = axpy(across * dot(slip, t) - hold, t, pull)
-        else:
-            pull = axpy(1.0, load(contacts.rub, c), pull)
         for s in range(4):
             i, w = contacts.vertices[c, s], contacts.weights[c, s]
             if not held[i]:
@@ -116,14 +101,16 @@ def _set_springs(contacts, mass, held, h, matrix):
                 stiff_give += w * w / stiff
                 give += w * w / (_SOFT * inertia)
         if give == 0.0:  # nothing of it can move
-            contacts.spring[c] = contacts.lift[c] = 0.0
-        elif lone:
+            contacts.spring[c] = contacts.cling[c] = contacts.lift[c] = 0.0
+            continue
+        if lone:
             contacts.spring[c] = _HARD / stiff_give
             contacts.lift[c] = contacts.force[c] / contacts.spring[c]
         else:
             borne = _FIRM * contacts.force[c] / max(contacts.level[c], _NO_LENGTH)
             contacts.spring[c] = min(1.0 / stiff_give, max(1.0 / give, borne))
             contacts.lift[c] = contacts.force[c] / contacts.spring[c]
+        contacts.cling[c] = min(1.0 / stiff_give, contacts.spring[c])
 
 
 @njit(cache=True, error_model="numpy")
@@ -159,14 +146,10 @@ def contact_energy(contacts, x, y):
     for c in range(len(contacts.key)):
         if contacts.pushing[c]:
             gap = _gap(contacts, c, y)
-            slip = _slip(contacts, c, x, y)
-            energy += 0.5 * contacts.spring[c] * gap * gap
+            off = _off(contacts, c, _slip(contacts, c, x, y))
+            energy += 0.5 * contacts.spring[c] * gap * gap + 0.5 * contacts.across[c] * dot(off, off)
             if contacts.sliding[c]:
-                along = dot(slip, load(contacts.slide, c))
-                energy += contacts.hold[c] * along - 0.5 * contacts.across[c] * along * along
-            else:
-                energy -= dot(slip, load(contacts.rub, c))
-            energy += 0.5 * contacts.across[c] * dot(slip, slip)
+                energy -= contacts.hold[c] * dot(unit(load(contacts.trial, c)), _slip(contacts, c, x, y))
     return energy
 
 
@@ -211,47 +194,68 @@ def revise(contacts, x, y, allowed):
     amiss = total = 0.0
     for c in range(len(contacts.key)):
         gap, slip = _gap(contacts, c, y), _slip(contacts, c, x, y)
-        length = norm(slip)
         if not contacts.pushing[c]:
             if gap < 0.0:  # from now on; how hard, and so how it rubs, is not known yet
-                contacts.pushing[c] = True
-                contacts.sliding[c] = length > 0.0
-                store(contacts.slide, c, unit(slip))
+                contacts.pushing[c] = contacts.sliding[c] = True
                 amiss += -contacts.spring[c] * gap if gap < -allowed else 0.0
             continue
         if gap > 0.0:
             amiss += contacts.spring[c] * gap  # what pushes does not pull
             contacts.pushing[c] = contacts.sliding[c] = False
             contacts.force[c] = contacts.lift[c] = 0.0
+            store(contacts.grip, c, (0.0, 0.0, 0.0))
             store(contacts.rub, c, (0.0, 0.0, 0.0))
             continue
-        arrived = contacts.force[c] == 0.0
         push = -contacts.spring[c] * gap
         total += push
-        contacts.force[c] = push
         if not _is_against_other(contacts, c) and gap + contacts.lift[c] < -_LOST * contacts.level[c]:
             amiss += push
+        contacts.force[c] = push
         if contacts.friction[c] == 0.0:
             continue
-        most = contacts.friction[c] * push
-        amiss += most if arrived else 0.0
-        if contacts.sliding[c]:
-            contacts.sliding[c] = dot(slip, load(contacts.slide, c)) > 0.0
-            amiss += 0.0 if contacts.sliding[c] else most
-            store(contacts.slide, c, unit(slip))
-            store(contacts.rub, c, scale(-most if contacts.sliding[c] else 0.0, unit(slip)))
-            continue
-        held = axpy(-contacts.spring[c], slip, load(contacts.rub, c))
-        asked = norm(held)
-        if asked > most:
-            contacts.sliding[c] = True
-            amiss += asked - most
-            store(contacts.slide, c, scale(-1.0 / asked, held))
-            held = scale(most / asked, held)
-        store(contacts.rub, c, held)
+        solved = _friction(contacts, c, slip)
+        trial = axpy(-contacts.cling[c], slip, load(contacts.grip, c))
+        most, asked = contacts.friction[c] * push, norm(trial)
+        rub = scale(most / asked, trial) if asked > most else trial
+        amiss += norm(sub(rub, solved))
+        turned = contacts.sliding[c] and dot(trial, load(contacts.trial, c)) < 0.0  # between the two it holds
+        contacts.sliding[c] = asked > most and not turned
+        store(contacts.trial, c, trial)
+        store(contacts.rub, c, rub)
     if total > 0.0:
         return amiss / total
     return 1.0 if amiss > 0.0 else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _set_friction(contacts, c):
+    """Set the stiffness of what slides, and the friction at most, from what was last seen."""
+    contacts.hold[c] = contacts.friction[c] * contacts.force[c]
+    contacts.across[c] = contacts.cling[c] if contacts.friction[c] > 0.0 else 0.0
+    if contacts.sliding[c]:
+        asked = norm(load(contacts.trial, c))
+        contacts.across[c] *= min(1.0, contacts.hold[c] / asked) if asked > 0.0 else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _friction(contacts, c, slip):
+    """Return the friction after a slip, as the linear system has it [N]."""
+    rub = scale(-contacts.across[c], _off(contacts, c, slip))
+    if contacts.sliding[c]:
+        rub = axpy(contacts.hold[c], unit(load(contacts.trial, c)), rub)
+    return rub
+
+
+@njit(cache=True, error_model="numpy")
+def _off(contacts, c, slip):
+    """Return by how much the spring is drawn after a slip, were the slider to hold [m]; what slides, sideways only."""
+    if contacts.across[c] == 0.0:
+        return (0.0, 0.0, 0.0)
+    off = axpy(-1.0 / contacts.cling[c], load(contacts.grip, c), slip)
+    if contacts.sliding[c]:
+        t = unit(load(contacts.trial, c))
+        off = axpy(-dot(t, off), t, off)
+    return off
 
 
 @njit(cache=True, error_model="numpy")

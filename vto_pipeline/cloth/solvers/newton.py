@@ -49,8 +49,8 @@ _BENT = 0.06  # 1/s: share of the motion's energy that curvature left out by an 
 _SLIGHT = 10.0  # times what is allowed: a fall that is not worth a second way down
 _SHORTEST = 1e-10  # share of a Newton step: from a point, cloth begins to grow by a millionth of its edges
 _ROUNDING = 1e-9  # relative change of the objective that is no change
-_CONTACT_ROUNDS = 4  # solutions with a revised set of contacts, an iteration
-_CHANGED = 0.01  # of the contact forces: amiss by less, their set is good enough
+_CONTACT_ROUNDS = 20  # solutions with a revised set of contacts, an iteration, at most
+_CHANGED = 0.05  # of the contact forces: amiss by less, their set is good enough
 _EXTENSIONS = 2  # times an iteration is solved again with what it would have passed through
 _CROSSED = 0.01  # of an edge: how far a plane may be crossed without solving again
 
