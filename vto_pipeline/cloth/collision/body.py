@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from vto_pipeline.cloth.collision.clean import clean_faces
 from vto_pipeline.cloth.collision.contacts import Contacts, Round, ride
+from vto_pipeline.cloth.collision.crease import other_flank
 from vto_pipeline.cloth.collision.march import march
 from vto_pipeline.cloth.collision.nearest import Nearest, Searched
 from vto_pipeline.cloth.collision.solid import SLOW
@@ -74,6 +75,8 @@ class BodyCollider:
             self._job.note(f"body: {self._clean}")
         self._guess: np.ndarray = np.empty(0, np.int32)
         self._distance: FloatArray = np.empty(0)
+        self._flank: np.ndarray = np.empty(0, np.int32)
+        self._first: FloatArray = np.empty((0, 3))
         self._moves = len(self._frames) > 1 and bool(np.ptp(self._frames, axis=0).any())
         self._fitted_to = self.at(0.0)
         self._at_rest = not self._moves
@@ -135,11 +138,15 @@ class BodyCollider:
         if len(self._guess) != len(positions):
             self._guess = np.full(len(positions), -1, np.int32)
             self._distance = np.full(len(positions), -_FAR)
+            self._flank, self._first = self._guess.copy(), np.zeros_like(positions)
         reach = np.maximum(span.skin, -self._distance + look) + look  # cloth inside must not be lost
         near = surface.searched.nearest(positions, reach, self._guess)
         found = surface.on_body(near)
         side, distance = self._sides(positions, before, found)
+        outside = np.where(side == OUTSIDE, span.skin + look, 0.0)
+        flank = other_flank(surface.searched, positions, near, (self._flank, self._guess), outside)
         self._guess, self._distance = near.triangle, np.where(side == INSIDE, -distance, distance)
+        self._flank = flank.triangle
         seen_from = positions
         if span.move is not None or after is not before:
             way = self._way(before, after, span, found)
@@ -150,10 +157,24 @@ class BodyCollider:
             found = found.replaced(chosen[clear], ahead.of(clear))
             seen_from = positions.copy()
             seen_from[chosen[clear]] = place[clear]
-        distance, point, normal, there = triangle_planes(
-            before, after, surface.faces, surface.normals, positions, seen_from, side, *found
-        )
-        return ride(distance, point, normal, self._friction, there, span)
+        body = before, after, surface.faces, surface.normals, positions
+        nearest = ride(*triangle_planes(*body, seen_from, side, *found), self._friction, span)
+        if not (flank.triangle >= 0).any():
+            self._first = nearest.normal[0, :, 0]
+            return nearest
+        beside = ride(*triangle_planes(*body, positions, side, *surface.on_body(flank)), self._friction, span)
+        return self._in_order(nearest, beside)
+
+    def _in_order(self, nearest: Contacts, beside: Contacts) -> Contacts:
+        """Return both flanks, the one that was first before as the first: contacts are remembered by their place."""
+        normals = nearest.normal[0, :, 0], beside.normal[0, :, 0]
+        like, unlike = (np.einsum("ij,ij->i", normal, self._first) for normal in normals)
+        turned = beside.active[0] & (unlike > like)
+        both = Contacts(*(np.concatenate(parts) for parts in zip(nearest, beside, strict=True)))
+        for part in both[:4]:
+            part[:, turned] = part[::-1, turned]
+        self._first = both.normal[0, :, 0]
+        return both
 
     def _sides(self, positions: FloatArray, before: FloatArray, found: Nearest) -> tuple[NDArray[np.int8], FloatArray]:
         """Return on which side of the body vertices are, and how far from it [m]."""

@@ -56,7 +56,7 @@ class Collider(Protocol):
     """Anything cloth can lie on."""
 
     def contacts(self, positions: FloatArray, span: Round) -> Contacts:
-        """Return the contacts of this surface alone (S = 1) with vertices at these positions [m], shape (V, 3)."""
+        """Return the contacts of this surface alone with vertices at these positions [m], shape (V, 3)."""
 
 
 def gather(colliders: Sequence[Collider], positions: FloatArray, span: Round) -> Contacts:
@@ -81,15 +81,15 @@ def nothing(count: int) -> Contacts:
 
 
 def ride(
-    distance: FloatArray, point: FloatArray, normal: FloatArray, friction: float, near: NDArray[np.bool_], span: Round
+    distance: FloatArray, point: FloatArray, normal: FloatArray, near: NDArray[np.bool_], friction: float, span: Round
 ) -> Contacts:
     """Return contacts of one surface.
 
     Args:
         distance: Signed, negative inside [m], shape (V,).
         point, normal: At begin and end, shape (V, 2, 3).
-        friction: Coefficient.
         near: Which vertices have a plane, shape (V,).
+        friction: Coefficient.
         span: The round.
     """
     offset = np.empty((len(distance), 2))

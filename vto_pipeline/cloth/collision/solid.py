@@ -37,7 +37,7 @@ def solid_contacts(
     move = np.zeros_like(positions) if span.move is None else where.own_direction(span.move)
     distance, point, normal, near = _planes(kind, size, where.own(positions), move, span.skin, span.travel)
     point, normal = where.world(point), where.world_direction(normal)
-    return ride(distance, np.stack([point, point], 1), np.stack([normal, normal], 1), friction, near, span)
+    return ride(distance, np.stack([point, point], 1), np.stack([normal, normal], 1), near, friction, span)
 
 
 @njit(cache=True, error_model="numpy")

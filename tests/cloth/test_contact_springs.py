@@ -1,0 +1,129 @@
+"""Springs and friction of contacts in an implicit step, against differences of their energy and the law of friction."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from vto_pipeline.cloth.collision.active_set import no_contacts
+from vto_pipeline.cloth.collision.contact_springs import add_contacts, contact_energy, linked_contacts, revise
+from vto_pipeline.numerics.block_matrix import BlockMatrix
+
+COUNT, STEP = 6, 1e-7
+
+
+def contacts(sliding, seed=1):
+    """On a plane each, vertices 0 to 3; and a pair between 2 and the middle of 3, 4, 5. All push."""
+    rng = np.random.default_rng(seed)
+    made = no_contacts(5)
+    made.key[:] = [0, 1, 2, 3, 1 << 41]
+    for c in range(4):
+        made.vertices[c, 0], made.weights[c, 0] = c, 1.0
+    made.vertices[4], made.weights[4] = [2, 3, 4, 5], [1.0, -0.3, -0.3, -0.4]
+    made.normal[:] = unit(rng.normal(size=(5, 3)))
+    made.friction[:], made.pushing[:], made.sliding[:] = 0.4, True, sliding
+    made.force[:] = rng.uniform(0.5, 1.0, 5)
+    made.level[:] = 1e-3
+    for part in (made.grip, made.rub, made.trial):
+        part[:] = along(made, rng.normal(size=(5, 3)))
+    made.carried[:] = 1e-4 * rng.normal(size=(5, 3))
+    return made
+
+
+def unit(a):
+    return a / np.linalg.norm(a, axis=1, keepdims=True)
+
+
+def along(made, a):
+    return a - np.einsum("ij,ij->i", a, made.normal)[:, None] * made.normal
+
+
+def slips(made, x, y):
+    moved = np.einsum("kw,kwd->kd", made.weights, (y - x)[made.vertices])
+    return along(made, moved - made.carried)
+
+
+def solved(made, x, y, h=0.01):
+    """What the contacts add: the matrix, dense, and the forces."""
+    diagonal = np.arange(COUNT)
+    stiff = np.tile(1e3 * np.eye(3), (COUNT, 1, 1))
+    matrix = BlockMatrix(np.arange(COUNT + 1, dtype=np.int32), diagonal.astype(np.int32), stiff.copy(), diagonal)
+    right, held, mass = np.zeros((COUNT, 3)), np.zeros(COUNT, np.bool_), np.full(COUNT, 1e-3)
+    vertices, weights = linked_contacts(made, held)
+    between = np.zeros((len(vertices), 3, 3))
+    add_contacts(made, mass, held, h, x, y, matrix, right, between)
+    dense = np.zeros((COUNT, 3, COUNT, 3))
+    for i in range(COUNT):
+        dense[i, :, i] += matrix.blocks[i] - stiff[i]
+    for corners, shares, block in zip(vertices, weights, between, strict=True):
+        for i, a in zip(corners, shares, strict=True):
+            for j, b in zip(corners, shares, strict=True):
+                dense[i, :, j] += a * b * block
+    return dense.reshape(3 * COUNT, -1), right.ravel()
+
+
+@pytest.mark.parametrize("sliding", [False, True])
+def test_forces_and_stiffness_are_those_of_the_energy(sliding):
+    rng = np.random.default_rng(3)
+    made = contacts(sliding)
+    x = 1e-2 * rng.normal(size=(COUNT, 3))
+    y = x + 1e-4 * rng.normal(size=(COUNT, 3))
+    matrix, right = solved(made, x, y)
+
+    def energy(d):
+        return contact_energy(made, x, y + d.reshape(-1, 3))
+
+    size = 1e-4
+    steps = size * np.eye(3 * COUNT)
+    slope = [(energy(s) - energy(-s)) / (2 * size) for s in steps]
+    assert_allclose(-np.array(slope), right, rtol=1e-7, atol=1e-9 * np.abs(right).max())
+    bend = [
+        [(energy(s + t) - energy(s - t) - energy(t - s) + energy(-s - t)) / (4 * size**2) for t in steps] for s in steps
+    ]
+    assert_allclose(bend, matrix, rtol=1e-5, atol=1e-7 * np.abs(matrix).max())
+
+
+def test_what_slides_has_the_tangent_of_coulombs_force():
+    """Derivative of μ N p / |p| with p the friction were the slider to hold: what a return mapping is consistent with."""
+    rng = np.random.default_rng(5)
+    made = contacts(True)
+    x = 1e-2 * rng.normal(size=(COUNT, 3))
+    y = x + 1e-3 * rng.normal(size=(COUNT, 3))
+    solved(made, x, y)  # sets the springs
+    cling, hold = made.cling[:, None], (made.friction * made.force)[:, None]
+    made.trial[:] = made.grip - cling * slips(made, x, y)
+    assert (np.linalg.norm(made.trial, axis=1) > 2.0 * hold[:, 0]).all()
+
+    def coulomb(there):
+        trial = made.grip - cling * slips(made, x, there)
+        return hold * unit(trial)
+
+    matrix, _ = solved(made, x, y)
+    for i in range(2):  # those of a single contact
+        for d in range(3):
+            step = np.zeros_like(x)
+            step[i, d] = 1e-9
+            change = (coulomb(y + step) - coulomb(y - step))[i] / 2e-9
+            normal = made.spring[i] * made.normal[i] * made.normal[i, d]
+            assert_allclose(normal - change, matrix[3 * i : 3 * i + 3, 3 * i + d], rtol=1e-5, atol=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_friction_is_the_trial_or_the_limit_in_its_direction(seed):
+    rng = np.random.default_rng(seed)
+    made = contacts(rng.random(5) < 0.5, seed)
+    x = 1e-2 * rng.normal(size=(COUNT, 3))
+    y = x + 1e-3 * rng.normal(size=(COUNT, 3))
+    solved(made, x, y)
+    gap = np.einsum("kw,kwd,kd->k", made.weights, y[made.vertices], made.normal) - made.level - made.lift
+    trial = made.grip - made.cling[:, None] * slips(made, x, y)
+    revise(made, x, y, 0.0)
+    touches = gap <= 0.0
+    assert 0 < touches.sum() < 5 or seed > 0
+    assert (made.pushing == touches).all()
+    assert_allclose(made.force[touches], (-made.spring * gap)[touches], rtol=1e-12)
+    limit = made.friction * made.force
+    size = np.linalg.norm(trial, axis=1)
+    wanted = trial * np.minimum(1.0, limit / size)[:, None]
+    assert_allclose(made.rub[touches], wanted[touches], rtol=1e-12, atol=1e-15)
+    assert (made.rub[~touches] == 0.0).all()
+    assert not (made.sliding & (size <= limit) & touches).any()
