@@ -83,7 +83,7 @@ def test_forces_and_stiffness_are_those_of_the_energy(sliding):
 
 
 def test_what_slides_has_the_tangent_of_coulombs_force():
-    """Derivative of μ N p / |p| with p the friction were the slider to hold: what a return mapping is consistent with."""
+    """The derivative of μ N p / |p|, with p what friction were if the slider held: consistent with a return mapping."""
     rng = np.random.default_rng(5)
     made = contacts(True)
     x = 1e-2 * rng.normal(size=(COUNT, 3))

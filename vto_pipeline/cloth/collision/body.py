@@ -157,13 +157,18 @@ class BodyCollider:
             found = found.replaced(chosen[clear], ahead.of(clear))
             seen_from = positions.copy()
             seen_from[chosen[clear]] = place[clear]
-        body = before, after, surface.faces, surface.normals, positions
-        nearest = ride(*triangle_planes(*body, seen_from, side, *found), self._friction, span)
+
+        def planes(seen_from: FloatArray, found: Nearest) -> Contacts:
+            distance, point, normal, there = triangle_planes(
+                before, after, surface.faces, surface.normals, positions, seen_from, side, *found
+            )
+            return ride(distance, point, normal, there, self._friction, span)
+
+        nearest = planes(seen_from, found)
         if not (flank.triangle >= 0).any():
             self._first = nearest.normal[0, :, 0]
             return nearest
-        beside = ride(*triangle_planes(*body, positions, side, *surface.on_body(flank)), self._friction, span)
-        return self._in_order(nearest, beside)
+        return self._in_order(nearest, planes(positions, surface.on_body(flank)))
 
     def _in_order(self, nearest: Contacts, beside: Contacts) -> Contacts:
         """Return both flanks, the one that was first before as the first: contacts are remembered by their place."""
