@@ -15,6 +15,9 @@ from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.from_silhouettes import SilhouettesConfig, fit_silhouettes
 from vto_pipeline.avatar.measure import measure
 from vto_pipeline.avatar.outline import Camera, ImageOutline, model_outline
+from vto_pipeline.avatar.registration import Fit
+from vto_pipeline.avatar.shape import shape_space
+from vto_pipeline.avatar.silhouette_fit import View, _camera_rows, _moved, _posture_rows
 from vto_pipeline.avatar.template import template
 from vto_pipeline.bench.body.silhouettes import photograph as shot
 from vto_pipeline.errors import AvatarError
@@ -72,6 +75,37 @@ def test_pull_back_is_the_derivative_of_the_projection() -> None:
         for e in np.eye(3)
     ]
     assert_allclose(camera.pull_back(points, normals), np.stack(slope, axis=1), rtol=1e-6, atol=1e-5)
+
+
+def test_turns_of_pose_and_camera_follow_their_derivatives() -> None:
+    """The rows that hold both pictures together, by central differences of what they hold."""
+    space, rng = shape_space(0.0), np.random.default_rng(3)
+    count, block = len(space.names), 3 * len(space.base.joints) + 5
+
+    def view(yaw: float) -> View:
+        nominal = np.zeros((len(space.base.joints), 3))
+        nominal[0] = [0.0, yaw, 0.0]
+        pose = nominal + rng.normal(0.0, 0.01, nominal.shape)
+        zero = np.zeros(count)
+        fit = Fit(zero, pose, np.array([0.0, -0.8, -2.5]), zero)
+        return View(ImageOutline(np.pad(np.ones((8, 8), dtype=bool), 4)), nominal, fit, Camera(900.0, 16, 16))
+
+    front, side = view(0.0), view(np.pi / 2)
+    rows = np.vstack([_posture_rows(space, front, side)[0], _camera_rows(front, side)[0]])
+    step = 1e-5
+    for column in rng.choice(2 * block, 60, replace=False):
+        values = []
+        for sign in (step, -step):
+            move = np.zeros(2 * block)
+            move[column] = sign
+            moved = [
+                _moved(space, one, np.zeros(count), part)
+                for one, part in zip((front, side), np.split(move, 2), strict=True)
+            ]
+            values.append(np.concatenate([_posture_rows(space, *moved)[1], _camera_rows(*moved)[1]]))
+        slope = (values[0] - values[1]) / (2 * step)
+        # where turns are small, one by one axis moves another's reading by half the angle: some hundredths of a row
+        assert (np.abs(rows[:, column] - slope) < 0.04 * np.abs(rows).max(axis=1)).all()
 
 
 def views(body: Avatar) -> tuple[np.ndarray, np.ndarray]:
