@@ -171,7 +171,7 @@ def test_bodies_of_another_model() -> None:
     assert np.mean(held) >= 0.9
     # two outlines leave 13 to 21 mm; arms held off broaden the chest, and the seats of these bodies are rounder in
     # section than those of people surveyed
-    assert chest < 0.030
+    assert chest < 0.035
     assert waist < 0.025
     assert hip < 0.030
 
