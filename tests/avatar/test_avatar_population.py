@@ -81,6 +81,18 @@ def misses(sex: str, tape: dict[str, float]) -> dict[str, float]:
     return out
 
 
+def test_a_bridge_scales_what_it_names() -> None:
+    people = population("female")
+    other = people.bridged({"hip_breadth": 1.05}, 0.02)
+    k, n = (people.names.index(name) for name in ("hip_breadth", "hip_girth"))
+    mean, spread = people.mean[k], people.covariance[k, k]
+    assert_allclose(other.mean[k], 1.05 * mean, rtol=1e-12)
+    assert_allclose(other.covariance[k, k], 1.05**2 * spread + (0.02 * mean) ** 2, rtol=1e-12)
+    assert_allclose(other.covariance[k, n], 1.05 * people.covariance[k, n], rtol=1e-12)
+    rest = np.arange(len(people.names)) != k
+    assert_allclose(other.covariance[np.ix_(rest, rest)], people.covariance[np.ix_(rest, rest)], rtol=0, atol=0)
+
+
 @pytest.mark.parametrize(("sex", "letter"), [("female", "XS"), ("female", "4XL"), ("male", "M"), ("male", "4XL")])
 def test_sizes_fast(sex: str, letter: str) -> None:
     assert not misses(sex, of_size(sex, letter))

@@ -15,21 +15,23 @@ _AWAY_PX = 0.75
 
 @dataclass(frozen=True)
 class Camera:
-    """A level pinhole at the origin that looks along -Z; its principal point is the picture's middle.
+    """A level pinhole at the origin that looks along -Z.
 
     Args:
         focal: [px].
         width, height: Of the picture [px].
+        drop: How far the principal point lies below the picture's middle, as that of a cropped photo may [px].
     """
 
     focal: float
     width: int
     height: int
+    drop: float = 0.0
 
     @property
     def middle(self) -> FloatArray:
         """Principal point [px], shape (2,); (0, 0) is the centre of the first pixel."""
-        return np.array([self.width - 1, self.height - 1]) / 2
+        return np.array([(self.width - 1) / 2, (self.height - 1) / 2 + self.drop])
 
     def project(self, points: FloatArray) -> FloatArray:
         """Return column and row of points in front of the camera [px], shape (N, 2)."""

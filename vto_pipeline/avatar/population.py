@@ -87,6 +87,17 @@ class Population:
         covariance *= max(1.0, (_FREEDOM + self.distance(values, sigmas) ** 2) / (_FREEDOM + len(at)))
         return Population(self.names, self.mean + gain @ wrong, (covariance + covariance.T) / 2)
 
+    def bridged(self, factors: dict[str, float], spread: float) -> Population:
+        """Return the population of the same people where some measurements read larger by a factor.
+
+        Args:
+            factors: By name.
+            spread: How far each factor varies, on its own.
+        """
+        by = np.array([factors.get(name, 1.0) for name in self.names])
+        own = np.array([spread * mean * (name in factors) for name, mean in zip(self.names, self.mean, strict=True)])
+        return Population(self.names, self.mean * by, self.covariance * np.outer(by, by) + np.diag(own**2))
+
     def distance(self, values: dict[str, float], sigmas: dict[str, float]) -> float:
         """Return the Mahalanobis distance of measured values from the mean."""
         _, wrong, spread = self._known(values, sigmas)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
@@ -23,24 +24,40 @@ from vto_pipeline.avatar.tape import Tape
 from vto_pipeline.model.arrays import FloatArray
 
 _POSE_SIGMA_RAD = {
-    "spine": 0.05,
-    "chest": 0.05,
-    "neck": 0.10,
-    "head": 0.10,
-    "clavicle": 0.10,
-    "shoulder": 0.40,
-    "elbow": 0.40,
-    "wrist": 0.20,
-    "hip": 0.12,
-    "knee": 0.08,
-    "ankle": 0.15,
+    "pelvis": (0.05, 0.10, 0.03),
+    "spine": (0.05, 0.05, 0.03),
+    "chest": (0.05, 0.05, 0.03),
+    "neck": (0.10, 0.10, 0.05),
+    "head": (0.10, 0.10, 0.05),
+    "clavicle": (0.10, 0.10, 0.10),
+    "shoulder": (0.40, 0.40, 0.40),
+    "elbow": (0.40, 0.40, 0.40),
+    "wrist": (0.20, 0.20, 0.20),
+    "hip": (0.05, 0.12, 0.12),
+    "knee": (0.05, 0.05, 0.03),
+    "ankle": (0.08, 0.15, 0.08),
 }
-"""Of a person who stands straight. A stoop that no view shows would make the picture's scale too large."""
-_ROOT_SIGMA_RAD = np.array([0.05, 0.10, 0.03])
-"""Of the whole body: how far the camera may be tilted, the person turned, the picture askew."""
+"""Of a person who stands straight: bent forwards, turned about the vertical, bent sideways, in the parent's frame.
+
+The pelvis stands for the whole body: how far the camera may be tilted, the person turned, the picture askew. Legs that
+swing back or forth unseen would make the body shorter and the picture's scale too large.
+"""
 _STATURE_SIGMA_M = 0.003
+_POSTURE = ("spine", "chest", "neck", "head", "hip", "knee")
+_ALIKE_RAD = 0.02
+"""How differently one person stands in both pictures, arms and feet apart: one view shows what the other hides."""
+_DROP_SHARE = 0.10
+"""Of the picture's height: how far its middle may be from where the lens looks. Few photos are cropped evenly."""
+_SAME_TILT_RAD, _SAME_DISTANCE, _SAME_FOCAL, _SAME_DROP = 0.006, 0.01, 0.003, 0.006
+"""How differently one camera took both pictures of one size: the person turned, it did not. Shares but for the tilt.
+
+A tilt that the outlines of one view would suffer makes the body lean, and its picture's scale wrong by some percent.
+"""
 _DISTANCE_SPREAD = 0.08
 """Relative. How strongly a picture converges depends on the distance so little that any misfit would settle it."""
+_REACH_M, _LAST_REACH_M, _FALL = 0.10, 0.02, 0.85
+_INDEPENDENT = 150.0
+"""Points of an outline that err on their own: the model is wrong alike over some centimetres."""
 _MAX_MOVE = 2.0
 _CAP_M = 0.05
 _NORMAL_PX = 30.0
@@ -90,12 +107,14 @@ class Solution:
         parameters: Of the shape, shape (P,).
         covariance: Of the parameters, shape (P, P).
         wrong: Mean distance between the outlines before the step, per view, far points cut off [m].
+        misfit: Before the step: twice the negative logarithm of the likelihood with its prior, but for a constant.
     """
 
     views: tuple[View, ...]
     parameters: FloatArray
     covariance: FloatArray
     wrong: tuple[float, ...]
+    misfit: float
 
 
 def step(
@@ -105,7 +124,6 @@ def step(
     trust: FloatArray,
     reach: float,
     noise: float,
-    independent: float,
     stiff: float = 1.0,
 ) -> Solution:
     """Take one Gauss-Newton step over the shape and every view's pose, place and focal length.
@@ -117,18 +135,17 @@ def step(
         trust: How much each vertex counts, shape (V,).
         reach: Distance at which a point begins to count little [m].
         noise: Spread of an outline's distance [m].
-        independent: As how many independent points an outline counts.
         stiff: How much more than it should the shape is drawn to the usual one.
     """
     count, joints = len(space.names), len(space.base.joints)
-    block = 3 * joints + 4
+    block = 3 * joints + 5
     size = count + block * len(views)
     normal, right = np.zeros((size, size)), np.zeros(size)
-    wrong = []
+    wrong, misfit = [], 2 * float(np.log(np.diag(np.linalg.cholesky(evidence.population.covariance))).sum())
     for k, view in enumerate(views):
         slope, off, weight, apart = _rows(space, view, trust, reach)
         wrong.append(apart)
-        scale = np.sqrt(weight * independent / weight.sum()) / noise
+        scale = np.sqrt(weight * _INDEPENDENT / weight.sum()) / noise
         own, offs = _pose_prior(space, view, evidence)
         place = np.r_[0:count, count + k * block : count + (k + 1) * block]
         slope, off = slope * scale[:, None], off * scale
@@ -137,11 +154,21 @@ def step(
         place = place[count:]
         normal[np.ix_(place, place)] += own.T @ own
         right[place] -= own.T @ offs
+        misfit += float(off @ off + offs @ offs)
     parameters = views[0].fit.parameters
     usual = space.whitener @ (parameters - views[0].fit.expected)
+    if len(views) == 2:
+        together = [_posture_rows(space, *views)]
+        if (views[0].camera.width, views[0].camera.height) == (views[1].camera.width, views[1].camera.height):
+            together.append(_camera_rows(*views))
+        for own, offs in together:
+            normal[count:, count:] += own.T @ own
+            right[count:] -= own.T @ offs
+            misfit += float(offs @ offs)
     for slope, off in (_tape_rows(space, parameters, evidence), (space.whitener, usual)):
         normal[:count, :count] += stiff**2 * slope.T @ slope
         right[:count] -= stiff**2 * slope.T @ off
+        misfit += stiff**2 * float(off @ off)
     normal += 1e-9 * np.eye(size)
     move: FloatArray = np.linalg.solve(normal, right).astype(np.float64)
     move *= min(
@@ -152,11 +179,29 @@ def step(
         _moved(space, view, parameters, move[count + k * block : count + (k + 1) * block])
         for k, view in enumerate(views)
     )
-    return Solution(moved, parameters, np.linalg.inv(normal)[:count, :count].astype(np.float64), tuple(wrong))
+    return Solution(moved, parameters, np.linalg.inv(normal)[:count, :count].astype(np.float64), tuple(wrong), misfit)
+
+
+def advance(
+    space: ShapeSpace,
+    views: tuple[View, ...],
+    evidence: Evidence,
+    trust: FloatArray,
+    noise: float,
+    steps: int,
+    stiff: float = 1.0,
+    begun: int = 0,
+) -> Solution:
+    """Take some steps, each with a smaller reach; `begun` of them were taken before. The rest as `step` has it."""
+    for k in range(begun, begun + steps):
+        reach = max(_REACH_M * _FALL**k, _LAST_REACH_M)
+        solution = step(space, views, evidence, trust, reach, noise, stiff)
+        views = solution.views
+    return solution
 
 
 def _turns(move: FloatArray, count: int, block: int) -> FloatArray:
-    return move[count:].reshape(-1, block)[:, :-4]
+    return move[count:].reshape(-1, block)[:, :-5]
 
 
 def _rows(
@@ -195,26 +240,66 @@ def _rows(
     directions = view.camera.pull_back(middle, normals) * metres
     slope = derivatives(space, view.fit, Pairs(corners, shares, middle, directions, weight))
     by_focal = ((view.camera.project(middle) - view.camera.middle) * normals).sum(axis=1) * metres
-    return np.hstack([slope, by_focal[:, None]]), off, weight, float(apart)
+    return np.hstack([slope, by_focal[:, None], (normals[:, 1] * metres)[:, None]]), off, weight, float(apart)
 
 
 def _pose_prior(space: ShapeSpace, view: View, evidence: Evidence) -> tuple[FloatArray, FloatArray]:
     """Rows that draw the pose to the nominal one and the camera to its expected distance."""
     base = space.base
     joints = len(base.joints)
-    sigma = np.array([_POSE_SIGMA_RAD.get(name.rpartition("_")[2], 1.0) for name in base.joint_names])
-    sigmas = np.repeat(sigma[:, None], 3, axis=1)
-    sigmas[0] = _ROOT_SIGMA_RAD
+    sigmas = np.array([_POSE_SIGMA_RAD[name.rpartition("_")[2]] for name in base.joint_names])
     rotation, _ = joint_transforms(space.joints(view.fit.parameters), base.parents, view.fit.pose)
     above = np.stack([np.eye(3) if parent < 0 else rotation[parent] for parent in base.parents])
     turned = Rotation.from_rotvec(view.fit.pose.copy()) * Rotation.from_rotvec(view.start.copy()).inv()
-    bent = np.einsum("jab,jb->ja", above, turned.as_rotvec())
-    rows = np.zeros((3 * joints + 1, 3 * joints + 4))
-    rows[: 3 * joints, : 3 * joints] = np.diag(1 / sigmas.ravel())
+    rows = np.zeros((3 * joints + 2, 3 * joints + 5))
+    # the joints turn in world axes, they are bent in their parents'
+    rows[: 3 * joints, : 3 * joints] = block_diag(*(above.swapaxes(1, 2) / sigmas[:, :, None]))
     distance = -view.fit.translation[2]
-    rows[-1, -2] = -1 / (distance * _DISTANCE_SPREAD)
+    rows[-2, -3] = -1 / (distance * _DISTANCE_SPREAD)
     off = np.log(distance / evidence.distance) / _DISTANCE_SPREAD
-    return rows, np.append((bent / sigmas).ravel(), off)
+    rows[-1, -1] = 1 / (_DROP_SHARE * view.camera.height)
+    return rows, np.concatenate([(turned.as_rotvec() / sigmas).ravel(), [off, rows[-1, -1] * view.camera.drop]])
+
+
+def _posture_rows(space: ShapeSpace, front: View, side: View) -> tuple[FloatArray, FloatArray]:
+    """Rows that draw the posture of trunk and legs in one view to that in the other."""
+    base = space.base
+    joints = space.joints(front.fit.parameters)
+    own = np.array([name.rpartition("_")[2] in _POSTURE for name in base.joint_names])
+    rows, size = [], 3 * len(joints)
+    for view, sign in ((front, 1.0), (side, -1.0)):
+        rotation, _ = joint_transforms(joints, base.parents, view.fit.pose)
+        above = np.stack([rotation[max(parent, 0)] for parent in base.parents])
+        turns = sign / _ALIKE_RAD * block_diag(*above.swapaxes(1, 2))
+        rows.append(np.hstack([turns, np.zeros((size, 5))])[np.repeat(own, 3)])
+    apart = Rotation.from_rotvec(front.fit.pose.copy()) * Rotation.from_rotvec(side.fit.pose.copy()).inv()
+    return np.hstack(rows), (apart.as_rotvec()[own] / _ALIKE_RAD).ravel()
+
+
+def _camera_rows(front: View, side: View) -> tuple[FloatArray, FloatArray]:
+    """Rows that draw tilt, distance, focal length and middle of one camera to the other's: only the person turned."""
+    turned = [
+        Rotation.from_rotvec(view.fit.pose[0].copy()) * Rotation.from_rotvec(view.start[0].copy()).inv()
+        for view in (front, side)
+    ]
+    size = front.fit.pose.size + 5
+    away = [-view.fit.translation[2] for view in (front, side)]
+    sigmas = np.array([_SAME_TILT_RAD, _SAME_DISTANCE, _SAME_FOCAL, _SAME_DROP * front.camera.height])
+    rows = np.zeros((4, 2 * size))
+    for k, (start, sign) in enumerate(((0, 1.0), (size, -1.0))):
+        rows[0, start] = sign
+        rows[1, start + size - 3] = -sign / away[k]
+        rows[2, start + size - 2] = sign
+        rows[3, start + size - 1] = sign
+    off = np.array(
+        [
+            turned[0].as_rotvec()[0] - turned[1].as_rotvec()[0],
+            np.log(away[0] / away[1]),
+            np.log(front.camera.focal / side.camera.focal),
+            front.camera.drop - side.camera.drop,
+        ]
+    )
+    return rows / sigmas[:, None], off / sigmas
 
 
 def _tape_rows(space: ShapeSpace, parameters: FloatArray, evidence: Evidence) -> tuple[FloatArray, FloatArray]:
@@ -234,11 +319,14 @@ def _tape_rows(space: ShapeSpace, parameters: FloatArray, evidence: Evidence) ->
 def _moved(space: ShapeSpace, view: View, parameters: FloatArray, move: FloatArray) -> View:
     base = space.base
     rotation, _ = joint_transforms(space.joints(view.fit.parameters), base.parents, view.fit.pose)
-    turn = move[:-4].reshape(-1, 3)
+    turn = move[:-5].reshape(-1, 3)
     pose = np.empty_like(view.fit.pose)
     for j, parent in enumerate(base.parents):
         above = np.eye(3) if parent < 0 else rotation[parent]
         local = above.T @ Rotation.from_rotvec(turn[j]).as_matrix() @ above
         pose[j] = (Rotation.from_matrix(local) * Rotation.from_rotvec(view.fit.pose[j])).as_rotvec()
-    fit = replace(view.fit, parameters=parameters, pose=pose, translation=view.fit.translation + move[-4:-1])
-    return replace(view, fit=fit, camera=replace(view.camera, focal=view.camera.focal * float(np.exp(move[-1]))))
+    fit = replace(view.fit, parameters=parameters, pose=pose, translation=view.fit.translation + move[-5:-2])
+    camera = replace(
+        view.camera, focal=view.camera.focal * float(np.exp(move[-2])), drop=view.camera.drop + float(move[-1])
+    )
+    return replace(view, fit=fit, camera=camera)

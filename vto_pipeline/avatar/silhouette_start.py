@@ -1,0 +1,101 @@
+"""How a person stands in two pictures: where the arms are, which side is seen; begun from the mean body."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from vto_pipeline.avatar.implicit import arm_axis
+from vto_pipeline.avatar.outline import Camera, ImageOutline
+from vto_pipeline.avatar.pose import named_pose
+from vto_pipeline.avatar.registration import Fit, first_fit
+from vto_pipeline.avatar.scan_start import Start
+from vto_pipeline.avatar.shape import ShapeSpace
+from vto_pipeline.avatar.silhouette_fit import Evidence, Solution, View, advance
+from vto_pipeline.model.arrays import FloatArray
+
+_RACE_STEPS, _MORE_STEPS, _RACED = 3, 4, 2
+"""Steps of every guess, and how many more of how many of the best."""
+_STIFF = 4.0
+_POSES = ("a_pose", "arms_down", "t_pose")
+_ARMS_AHEAD_RAD = ((-0.2, 0.0), (0.15, 0.0), (0.5, 0.0), (0.0, 0.6))
+"""Swing of the shoulders, bend of the elbows: how the arms may be held in the side view."""
+
+
+def stand(
+    space: ShapeSpace, front: NDArray[np.bool_], side: NDArray[np.bool_], evidence: Evidence, noise: float
+) -> Solution:
+    """Find out how the person stands in both views.
+
+    Args:
+        space: The shape space.
+        front: Where the person is in the front picture, shape (H, W).
+        side: The same in the side picture.
+        evidence: Beside the outlines.
+        noise: Spread of an outline's distance [m].
+    """
+    ahead, across = ImageOutline(front), ImageOutline(side)
+    facing = _race(
+        space,
+        [(_place(space, ahead, front, 0.0, named_pose(space.base, name).pose, evidence),) for name in _POSES],
+        evidence,
+        noise,
+    ).views[0]
+    return _race(
+        space,
+        [
+            (facing, _place(space, across, side, yaw, _arms_ahead(space, facing.start, *angles), evidence))
+            for yaw in (np.pi / 2, -np.pi / 2)
+            for angles in _ARMS_AHEAD_RAD
+        ],
+        evidence,
+        noise,
+    )
+
+
+def mean_body(space: ShapeSpace, stature: float, yaw: float, pose: FloatArray) -> Fit:
+    """Return the mean body, scaled to a stature [m], turned and posed, at the origin."""
+    scale = stature / float(np.ptp(space.base.bind_vertices[:, 1]))
+    return first_fit(space, Start(yaw, scale, np.zeros(3), "", 0.0), pose)
+
+
+def _race(space: ShapeSpace, guesses: Iterable[tuple[View, ...]], evidence: Evidence, noise: float) -> Solution:
+    """Return what the best of the guesses leads to."""
+    everywhere = np.ones(len(space.base.vertices))
+
+    def some(guesses: Iterable[tuple[View, ...]], begun: int, steps: int) -> list[Solution]:
+        # a hand held before the belly must not pass for a belly: the arms are found while the shape is stiff
+        found = [advance(space, views, evidence, everywhere, noise, steps, _STIFF, begun) for views in guesses]
+        return sorted(found, key=lambda solution: sum(solution.wrong))
+
+    first = some(guesses, 0, _RACE_STEPS)[:_RACED]
+    return some([solution.views for solution in first], _RACE_STEPS, _MORE_STEPS)[0]
+
+
+def _arms_ahead(space: ShapeSpace, pose: FloatArray, swing: float, bend: float) -> FloatArray:
+    """Return the pose with both arms swung forward and their elbows bent by so much [rad]."""
+    pose = pose.copy()
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        shoulder, elbow = (space.base.joint_names.index(f"{side}_{joint}") for joint in ("shoulder", "elbow"))
+        pose[shoulder] = (Rotation.from_rotvec([-swing, 0.0, 0.0]) * Rotation.from_rotvec(pose[shoulder])).as_rotvec()
+        x, y, _ = arm_axis()
+        pose[elbow] = bend * np.array([y, -sign * x, 0.0])
+    return pose
+
+
+def _place(
+    space: ShapeSpace, outline: ImageOutline, mask: NDArray[np.bool_], yaw: float, pose: FloatArray, evidence: Evidence
+) -> View:
+    """Place the mean body, scaled to the stature, behind an outline."""
+    rows, columns = np.nonzero(mask)
+    height, width = mask.shape
+    camera = Camera((rows.max() + 1 - rows.min()) * evidence.distance / evidence.stature, width, height)
+    fit = mean_body(space, evidence.stature, yaw, pose)
+    metres = evidence.distance / camera.focal
+    middle = np.array([np.median(columns), rows.max() + 0.5]) - camera.middle
+    place = np.array([middle[0] * metres, -middle[1] * metres, -evidence.distance])
+    return View(outline, fit.pose, replace(fit, translation=fit.translation + place), camera)
