@@ -139,10 +139,13 @@ class _Outfit:
             garment = Garment(alone.mesh, garment.rest)
             if not beneath:
                 return garment
-        solid = dressed(self._still, [one.garment.mesh for one in beneath]) if beneath else self._still
+        if not beneath:
+            return Garment(drape(garment, self._still, layer.fabric, settings, job).mesh, garment.rest)
+        solid = dressed(self._still, [one.garment.mesh for one in beneath])
+        settings["clear_rounds"] = 0  # a coarse triangle may cut a corner of the room that the solid has to spare
         try:
             mesh = drape(garment, solid, layer.fabric, settings, job).mesh
-        except IntersectingError as error:  # the solid is a means: whether anything crosses is asked at the end
+        except IntersectingError as error:
             found = error.partial["draped"]
             assert isinstance(found, TriangleMesh)
             mesh = found
