@@ -91,6 +91,7 @@ class WornOn(PacedBody):
     def contacts(self, positions: FloatArray, span: Round) -> Contacts:
         """See `Collider.contacts`; one surface for each coefficient, touched by the vertices that have it."""
         found = super().contacts(positions, span)
-        active = found.active & self._of_kind
-        planes = (np.repeat(part, len(self._kinds), axis=0) for part in (found.point, found.normal, found.offset))
-        return Contacts(active, *planes, self._kinds)
+        point, normal, offset = (
+            np.repeat(part, len(self._kinds), axis=0) for part in (found.point, found.normal, found.offset)
+        )
+        return Contacts(found.active & self._of_kind, point, normal, offset, self._kinds)
