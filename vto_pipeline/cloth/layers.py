@@ -142,7 +142,10 @@ class _Outfit:
         if not beneath:
             return Garment(drape(garment, self._still, layer.fabric, settings, job).mesh, garment.rest)
         solid = dressed(self._still, [one.garment.mesh for one in beneath])
-        settings["clear_rounds"] = 0  # a coarse triangle may cut a corner of the room that the solid has to spare
+        settings |= {
+            "grow_above_mm": 0.0,  # pushed out as the solid grows, cloth stays where it is along the body
+            "clear_rounds": 0,  # a coarse triangle may cut a corner of the room that the solid has to spare
+        }
         try:
             mesh = drape(garment, solid, layer.fabric, settings, job).mesh
         except IntersectingError as error:
