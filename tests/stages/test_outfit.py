@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
@@ -14,7 +15,7 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.render import GlbPart
 from vto_pipeline.stages import CATALOGUE
-from vto_pipeline.stages.outfit import garment_names, names_in_run, outfit_tables, spelt_out
+from vto_pipeline.stages.outfit import document_schema, garment_names, names_in_run, outfit_tables, spelt_out
 
 HEAD = "schema: 1\n"
 GIVEN = """given:
@@ -32,6 +33,14 @@ def written(folder: Path, text: str) -> Path:
         (folder / name).write_text("")
     (folder / "outfit.yaml").write_text(text)
     return folder / "outfit.yaml"
+
+
+def test_the_schema_takes_what_the_engine_takes(tmp_path: Path) -> None:
+    check = jsonschema.Draft202012Validator(document_schema(CATALOGUE))
+    check.validate(load_yaml(written(tmp_path, HEAD + GIVEN + WANT)).data)
+    for change in (("{mesh: shirt.ply}", "{mesh: 3}"), ("    shirt:", "    Shirt!:"), ("mesh: shirt.ply", "mush: a")):
+        text = (HEAD + GIVEN + WANT).replace(*change)
+        assert not check.is_valid(load_yaml(written(tmp_path, text)).data)
 
 
 def test_each_garment_has_its_rows_and_one_drape_takes_all(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from vto_pipeline.model.garment import Garment
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.outfit import Layer
 from vto_pipeline.pipeline.catalogue import Catalogue
+from vto_pipeline.pipeline.schema import json_schema
 from vto_pipeline.pipeline.stage import Stage
 from vto_pipeline.stages.outfit_page import OWN_PARTS, outfit_page
 
@@ -134,6 +135,23 @@ def outfit_tables(tables: Catalogue, names: Sequence[str]) -> Catalogue:
     for name in names:
         given |= {f"garments.{name}.{key}": f"{name}_{key}" for key in _KEYS}
     return Catalogue(tuple(rows), (*own, *rest), given)
+
+
+def document_schema(tables: Catalogue) -> dict[str, Any]:
+    """Return the JSON schema of a document, for one garment or, if these tables know garments, several."""
+    schema = json_schema(tables)
+    if "garment.mesh" not in tables.given:
+        return schema
+    several = json_schema(outfit_tables(tables, ("name",)))
+    schema["$defs"]["Garment"] = several["$defs"]["Given_garments_name"] | {"title": "Garment"}
+    schema["$defs"]["Given"]["properties"]["garments"] = {
+        "type": "object",
+        "minProperties": 1,
+        "propertyNames": {"pattern": f"^{_NAME.pattern}$"},
+        "additionalProperties": {"$ref": "#/$defs/Garment"},
+        "description": "In place of garment: several by name, worn one over the other, inner first.",
+    }
+    return schema
 
 
 def _own(artifact: str, name: str) -> str:
