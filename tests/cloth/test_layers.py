@@ -124,8 +124,21 @@ def test_both_ride_on_a_body_that_swells():
 def test_one_garment_twice_is_refused():
     with pytest.raises(InputError, match="shirt and jacket are the same garment in the same place"):
         drape_layers([vest("shirt"), vest("jacket")], pear())
+    with pytest.raises(InputError, match="no garment"):
+        drape_layers([], pear())
     with pytest.raises(InputError, match="two garments are called shirt"):
         drape_layers([vest("shirt"), vest("shirt", 0.12)], pear())
+
+
+def test_layers_that_end_the_wrong_way_about_are_told_with_places():
+    with pytest.raises(
+        IntersectingError, match=r"vertices of inner garments lie outside outer ones, near \("
+    ) as caught:
+        drape_layers([SHIRT, WAISTCOAT], pear(), {**QUICK, "time_budget_s": 0.01})  # no time to put anything on
+    partial = caught.value.partial
+    beyond = outside(partial["shirt_draped"], partial["waistcoat_draped"], pear())
+    assert partial["audit"]["out_of_order_vertices"] == len(beyond) > 100
+    assert partial["audit"]["order_kept"] is False
 
 
 def test_settings_are_checked():

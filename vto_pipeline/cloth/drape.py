@@ -145,7 +145,7 @@ def refuse_crossings(findings: Mapping[str, object], partial: Mapping[str, objec
     kinds = {"body": "garment and body", "self": "the garment with itself", "layer": "one garment and another"}
     crossing = [
         f"{findings[f'{kind}_intersections']} pairs of triangles of {what} still cross, near "
-        f"{_named(findings[f'{kind}_intersection_places'])}"
+        f"{named(findings[f'{kind}_intersection_places'])}"
         for kind, what in kinds.items()
         if findings.get(f"{kind}_intersections")
     ]
@@ -157,7 +157,7 @@ def refuse_crossings(findings: Mapping[str, object], partial: Mapping[str, objec
         )
 
 
-def _named(places: object) -> str:
+def named(places: object) -> str:
     """Name some places [m] of those that the judge lists."""
     assert isinstance(places, list)
     chosen = [places[k] for k in np.unique(np.linspace(0, len(places) - 1, _SHOWN).astype(int))] if places else []

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from vto_pipeline.cloth.build import at_rest
-from vto_pipeline.cloth.drape import drape, refuse_crossings
+from vto_pipeline.cloth.drape import drape, named, refuse_crossings
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.dressed import dressed
 from vto_pipeline.cloth.joined import WornOn, join
@@ -30,6 +30,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.outfit import DrapedOutfit, Layer
 
 _NEARLY = 10.0  # times the bounds of rest: near enough for a garment that others are still to be put over
+_STRAY = 0.01  # of a garment's vertices: so many may peep out at a rim or an armhole
 _ALONE = 0.6  # of the progress, and of the time there is: putting the garments on
 
 
@@ -53,10 +54,12 @@ def drape_layers(
 
     Raises:
         ConfigError, DivergedError: as `drape`.
-        InputError: as `drape`, or the same garment twice.
-        IntersectingError: something crosses, or an inner garment lies outside an outer one; `partial` holds the
-            garments as "NAME_draped", and "audit" and "trace".
+        InputError: as `drape`, the same garment twice, or none.
+        IntersectingError: something crosses, or more than a trace of an inner garment lies outside an outer one;
+            `partial` holds the garments as "NAME_draped", and "audit" and "trace".
     """
+    if not layers:
+        raise InputError("no garment to drape")
     config, job = checked(DrapeConfig, settings), job or Job()
     if isinstance(body, TriangleMesh):
         body = MovingBody(body.vertices[None], body.faces)
@@ -211,12 +214,14 @@ class _Outfit:
                 for one, span in zip(worn, joined.vertices, strict=True)
             },
         )
-        refuse_crossings(
-            findings,
-            {
-                **{f"{one.name}_draped": one.garment.mesh for one in worn},
-                "audit": findings,
-                "trace": tuple(settling.trace),
-            },
-        )
+        partial: dict[str, object] = {f"{one.name}_draped": one.garment.mesh for one in worn}
+        partial |= {"audit": findings, "trace": tuple(settling.trace)}
+        refuse_crossings(findings, partial)
+        if findings["out_of_order_share"] > _STRAY:
+            raise IntersectingError(
+                f"{findings['out_of_order_vertices']} vertices of inner garments lie outside outer ones, near "
+                f"{named(findings['out_of_order_places'])}",
+                hint="is the inner garment given first, and is there time enough to put each on?",
+                partial=partial,
+            )
         return DrapedOutfit({one.name: one.garment.mesh for one in worn}, tuple(settling.trace), findings)

@@ -55,7 +55,8 @@ def audit_outfit(
         Under "layers" what `audit.audit` and `tight.warn_if_too_small` find of each garment, a vertex that another
         garment may bear counted as held. Of all: the sum of their crossings, and the worst of what else is in
         its findings; layer_intersections (pairs of triangles of two garments), min_layer_gap_mm (None above 5 mm),
-        out_of_order_vertices (of inner garments, outside an outer one), order_kept, and the places of these [m].
+        out_of_order_vertices (of inner garments, outside an outer one), the largest out_of_order_share of a garment's,
+        order_kept (there are none), and the places of these [m].
     """
     x = np.vstack([layer.garment.mesh.vertices for layer in layers])
     touching = skin + _JUST
@@ -125,13 +126,14 @@ def _together(each: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 def _order(layers: Sequence[Layer], body: TriangleMesh, job: Job) -> dict[str, Any]:
     """Return which vertices of inner garments lie outside outer ones, and where."""
-    count, where = 0, []
+    count, share, where = 0, 0.0, []
     for inner, outer in combinations(layers, 2):
         mesh = inner.garment.mesh
         beyond = outside(mesh, outer.garment.mesh, body)
         if len(beyond):
-            count += len(beyond)
+            count, share = count + len(beyond), max(share, len(beyond) / len(mesh.vertices))
             chosen = beyond[np.linspace(0, len(beyond) - 1, min(_PLACES, len(beyond))).astype(int)]
             where += [[float(part) for part in point] for point in mesh.vertices[chosen]]
             job.warn(f"{len(beyond)} of {len(mesh.vertices)} vertices of {inner.name} lie outside {outer.name}")
-    return {"out_of_order_vertices": count, "out_of_order_places": where, "order_kept": count == 0}
+    found = {"out_of_order_vertices": count, "out_of_order_share": share, "out_of_order_places": where}
+    return {**found, "order_kept": count == 0}
