@@ -161,7 +161,7 @@ def test_what_crosses_at_the_end_is_told_with_places_and_every_garment(monkeypat
 
 def test_a_shirt_hangs_over_trousers():
     body, names = wearer("average").avatar.mesh, {"trousers": "denim", "shirt": "cotton_poplin"}
-    layers = [Layer(name, WARDROBE[name](wearer("average"), 60.0), read_fabric(cloth)) for name, cloth in names.items()]
+    layers = [Layer(name, WARDROBE[name](wearer("average"), 50.0), read_fabric(cloth)) for name, cloth in names.items()]
     outfit = drape_layers(layers, body, STAYS)
     clean_and_in_order(outfit, body)
     assert outfit.audit["settled"] is True
