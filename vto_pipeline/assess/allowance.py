@@ -44,14 +44,18 @@ class Allowance:
     source: str
 
 
+def known_kinds() -> list[str]:
+    """Return the kinds of garment in the table."""
+    return sorted({row.garment for row in _table().rows})
+
+
 def read_allowances(garment: str) -> dict[str, Allowance]:
     """Return zone -> allowance for a kind of garment; rows for any garment fill what its own rows leave open.
 
     Raises:
         ConfigError: an unknown kind of garment.
     """
-    table: AllowanceTable = check_schema(load_yaml(_TABLE), AllowanceTable)
-    kinds = sorted({row.garment for row in table.rows})
+    table, kinds = _table(), known_kinds()
     if garment not in kinds:
         raise ConfigError(f"assess.garment: unknown kind (got {garment!r})", hint=suggest(garment, kinds))
     ranked = sorted(table.rows, key=lambda row: row.garment == garment)  # its own rows last, so that they win
@@ -62,3 +66,8 @@ def read_allowances(garment: str) -> dict[str, Allowance]:
         for row in ranked
         if row.garment in ("any", garment)
     }
+
+
+def _table() -> AllowanceTable:
+    table: AllowanceTable = check_schema(load_yaml(_TABLE), AllowanceTable)
+    return table

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -13,7 +15,15 @@ _WANT = ("draped", "audit", "trace", "render_mesh", "fit_report", "page")
 
 
 @click.command("drape")
-@click.option("--garment", type=PATH, required=True, metavar="FILE", help="Garment mesh.")
+@click.option(
+    "--garment",
+    "garments",
+    type=PATH,
+    required=True,
+    multiple=True,
+    metavar="FILE",
+    help="Garment mesh; of several worn one over the other, the inner first.",
+)
 @click.option("--body", type=PATH, metavar="FILE", help="Avatar, another model's body, or a mesh as it stands.")
 @click.option("--measurements", type=PATH, metavar="FILE", help="Make the body from these, in place of --body.")
 @click.option(
@@ -23,43 +33,70 @@ _WANT = ("draped", "audit", "trace", "render_mesh", "fit_report", "page")
     help="What the garment was on: avatar or mesh. Absent: the garment is put where it belongs on the body.",
 )
 @click.option(
-    "--fabric", default="cotton_poplin", show_default=True, metavar="NAME|FILE", help="Preset or fabric file."
+    "--fabric",
+    "fabrics",
+    default=("cotton_poplin",),
+    show_default=True,
+    multiple=True,
+    metavar="NAME|FILE",
+    help="Preset or fabric file: one for all garments, or one for each.",
 )
 @click.option("--regraded", is_flag=True, help="Show how it would look in the customer's size, not whether it fits.")
 @running
 @pass_session
 def drape_command(
     session: Session,
-    garment: Path,
+    garments: tuple[Path, ...],
     body: Path | None,
     measurements: Path | None,
     source_body: Path | None,
-    fabric: str,
+    fabrics: tuple[str, ...],
     regraded: bool,
     output: Path | None,
     overrides: tuple[str, ...],
     force_all: bool,
 ) -> None:
-    """Drape a garment on a body.
+    """Drape a garment on a body, or several, one over the other.
 
     \b
     vto drape --garment shirt.ply --source-body form.ply --measurements customer.yaml --fabric denim
     vto drape --garment shirt.ply --source-body form.ply --body customer.ply --regraded -o runs/shirt
+    vto drape --garment trousers.ply --fabric denim --garment shirt.ply --fabric cotton_poplin --body customer.ply
     """
     from vto_pipeline.cli.work import carry_out, catalogue, typed_document
 
     if (body is None) == (measurements is None):
         raise click.UsageError("give the body: either --body or --measurements")
     given = {
-        "garment.mesh": garment,
+        **_garments(garments, fabrics),
         f"mannequin.{'avatar' if _is_avatar(source_body) else 'surface'}": source_body,
         f"body.{'avatar' if _is_avatar(body) else 'mesh'}": body,
         "body.measurements": measurements,
-        "fabric": fabric,
     }
     document = typed_document("the command line", given, _WANT, {"grade": {"mode": "regraded"}} if regraded else {})
-    name = Path("runs") / f"drape_{garment.resolve().stem}"
+    name = Path("runs") / f"drape_{'_'.join(garment.resolve().stem for garment in garments)}"
     carry_out(document, Path.cwd(), output or name, overrides, force_all, session, catalogue())
+
+
+def _garments(garments: tuple[Path, ...], fabrics: tuple[str, ...]) -> dict[str, Any]:
+    """Return what is given of the garments: of several, each has the name of its file.
+
+    Raises:
+        click.UsageError: two have the same, or the fabrics are neither one nor as many.
+    """
+    if len(fabrics) not in (1, len(garments)):
+        raise click.UsageError(
+            f"{len(fabrics)} fabrics for {len(garments)} garments: give one for all, or one for each"
+        )
+    if len(garments) == 1:
+        return {"garment.mesh": garments[0], "fabric": fabrics[0]}
+    found: dict[str, Any] = {}
+    for garment, fabric in zip(garments, fabrics * (len(garments) // len(fabrics)), strict=True):
+        name = re.sub(r"[^a-z0-9]+", "_", garment.stem.lower()).strip("_")
+        if name in found:
+            raise click.UsageError(f"two garments are called {name}: rename a file, or name them in a document")
+        found[name] = {"mesh": str(garment), "fabric": fabric}
+    return {"garments": found}
 
 
 def _is_avatar(path: Path | None) -> bool:

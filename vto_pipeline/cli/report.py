@@ -16,8 +16,8 @@ from vto_pipeline.cli.session import Session, pass_session
 @pass_session
 def report_command(session: Session, folder: Path) -> None:
     """Make the page of a run again, from what lies in RUN/out. Works for a failed run too."""
-    from vto_pipeline.cli.work import catalogue
+    from vto_pipeline.cli.work import catalogue, run_tables
     from vto_pipeline.pipeline.final import make_finals_again
 
-    written = [str(path) for path in make_finals_again(folder, catalogue())]
+    written = [str(path) for path in make_finals_again(folder, run_tables(folder, catalogue()))]
     session.answer({"written": written}, written)

@@ -20,7 +20,7 @@ def schema_command(session: Session) -> None:
     vto schema > vto.schema.json
     """
     from vto_pipeline.cli.work import catalogue
-    from vto_pipeline.pipeline.schema import json_schema
+    from vto_pipeline.stages.outfit import document_schema
 
-    schema = json_schema(catalogue())
+    schema = document_schema(catalogue())
     session.answer(schema, [json.dumps(schema, indent=1, ensure_ascii=False)])

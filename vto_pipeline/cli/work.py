@@ -9,9 +9,10 @@ from typing import Any
 from vto_pipeline.cli.progress import show_progress
 from vto_pipeline.cli.session import Session
 from vto_pipeline.errors import ComputationError, InputError
-from vto_pipeline.io.documents import Document, load_yaml
+from vto_pipeline.io.documents import Document, load_yaml, read_json
 from vto_pipeline.io.sniff import find_kind
 from vto_pipeline.pipeline.catalogue import Catalogue
+from vto_pipeline.pipeline.folder import RECORD, existing_run
 from vto_pipeline.pipeline.plan import Plan, make_plan
 from vto_pipeline.pipeline.request import Request, read_request
 from vto_pipeline.pipeline.run import run
@@ -26,8 +27,28 @@ def catalogue() -> Catalogue:
 
 def planned(path: Path, overrides: Sequence[str], tables: Catalogue) -> tuple[Request, Plan]:
     """A document's request and plan."""
-    request = read_request(load_yaml(path), path.resolve().parent, tables, overrides)
+    document, tables = _for_its_garments(load_yaml(path), tables)
+    request = read_request(document, path.resolve().parent, tables, overrides)
     return request, make_plan(request, tables)
+
+
+def _for_its_garments(document: Document, tables: Catalogue) -> tuple[Document, Catalogue]:
+    """The document spelt out, and the tables with a row for each of its garments, where it has several."""
+    from vto_pipeline.stages.outfit import garment_names, outfit_tables, spelt_out
+
+    names = garment_names(document)
+    return spelt_out(document, names), outfit_tables(tables, names)
+
+
+def run_tables(folder: Path, tables: Catalogue) -> Catalogue:
+    """The tables that a run was made with.
+
+    Raises:
+        InputError: it is not the folder of a run.
+    """
+    from vto_pipeline.stages.outfit import names_in_run, outfit_tables
+
+    return outfit_tables(tables, names_in_run(read_json(existing_run(folder) / RECORD)))
 
 
 def captured_kind(path: Path, session: Session) -> str:
@@ -81,6 +102,7 @@ def carry_out(
     Raises:
         VtoError: of whatever kind; a failed computation is recorded in run.json and its partial result named.
     """
+    document, tables = _for_its_garments(document, tables)
     request = read_request(document, base, tables, overrides)
     plan = make_plan(request, tables)
     with show_progress(session) as listener:

@@ -53,7 +53,7 @@ def audit(
             then judged.
         friction: Against the body; the fabric's own when None.
         touching: A body this near may bear the cloth [m].
-        pinned: Vertices that were held.
+        pinned: Vertices that were held, or that something else may bear.
 
     Returns:
         finite, settled, body_intersections and self_intersections (pairs of triangles) and where the first of them are
@@ -74,7 +74,7 @@ def audit(
         "settled": settled,
         **_against_body(mesh, body, nearest),
         "self_intersections": len(crossing),
-        "self_intersection_places": _places(mesh, crossing[:, 0]),
+        "self_intersection_places": places(mesh, crossing[:, 0]),
         "min_self_gap_mm": 1e3 * gap if gap < _NEAR else None,
         "rms_stretch": float(np.sqrt(np.mean(stretch**2))),
         "max_stretch": float(stretch.max()),
@@ -109,7 +109,7 @@ def _against_body(mesh: TriangleMesh, body: TriangleMesh | None, nearest: Neares
     crossing = intersecting_faces(mesh, body)
     return {
         "body_intersections": len(crossing),
-        "body_intersection_places": _places(mesh, crossing[:, 0]),
+        "body_intersection_places": places(mesh, crossing[:, 0]),
         "penetration_mm": float(1e3 * max(0.0, -clearance.min())),
         "penetrating_vertices": int((clearance < 0.0).sum()),
         "min_clearance_mm": float(1e3 * clearance.min()),
@@ -128,7 +128,7 @@ def _strains(mesh: TriangleMesh, rest: RestShape) -> dict[str, object]:
     return {**found, "largest_strain": float(principal.max()), "least_strain": float(principal.min())}
 
 
-def _places(mesh: TriangleMesh, faces: NDArray[np.int32]) -> list[list[float]]:
+def places(mesh: TriangleMesh, faces: NDArray[np.int32]) -> list[list[float]]:
     """Return the middle of some of these faces, spread over them [m]."""
     chosen = np.unique(faces)
     chosen = chosen[np.linspace(0, len(chosen) - 1, min(_PLACES, len(chosen))).astype(int)]

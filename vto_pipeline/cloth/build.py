@@ -35,7 +35,7 @@ class ClothModel:
         edge_length: Median rest length of the edges [m].
         gravity: [m/s²], shape (3,).
         reach: Half the distance each vertex keeps from the rest of the cloth [m], shape (V,).
-        friction: Coulomb coefficient, cloth against cloth.
+        friction: Coulomb coefficient of each vertex, cloth against cloth, shape (V,).
     """
 
     faces: IntArray
@@ -45,7 +45,7 @@ class ClothModel:
     edge_length: float
     gravity: FloatArray
     reach: FloatArray
-    friction: float
+    friction: FloatArray
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ def build(
         edge_length=float(np.median(edges)),
         gravity=np.array(gravity, dtype=np.float64),
         reach=_reaches(corners, mesh.faces, count, fabric.thickness),
-        friction=fabric.friction,
+        friction=np.full(count, fabric.friction),
     )
 
 
@@ -172,7 +172,7 @@ def model_of(
         edge_length,
         np.array(gravity, dtype=np.float64),
         np.zeros(len(mass)),
-        0.0,
+        np.zeros(len(mass)),
     )
 
 

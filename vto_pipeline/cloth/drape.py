@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.judge.balance import knows
 from vto_pipeline.cloth.pace import covered_way
 from vto_pipeline.cloth.phases import Phases
-from vto_pipeline.cloth.place import place
+from vto_pipeline.cloth.place import put
 from vto_pipeline.cloth.reshape import reshape
 from vto_pipeline.cloth.settings import checked
 from vto_pipeline.cloth.tight import warn_if_too_small
@@ -113,7 +112,7 @@ def drape(
         job.warn(
             f"not at rest: {error_mm:.1f} mm still to come" if error_mm else "not at rest, and too early to say how far"
         )
-    _refuse_crossings(findings, {"draped": draped, "audit": findings, "trace": tuple(settling.trace)})
+    refuse_crossings(findings, {"draped": draped, "audit": findings, "trace": tuple(settling.trace)})
     return Draped(draped, state.velocities, None, tuple(settling.trace), findings)
 
 
@@ -121,10 +120,7 @@ def _begin(garment: Garment, body: MovingBody, config: DrapeConfig, job: Job) ->
     """Return garment and body as the simulation takes them up."""
     start = TriangleMesh(body.keyframes[0], body.faces)
     if len(body.keyframes) == 1:
-        placed = place(garment.mesh, start, config, job)
-        mesh = TriangleMesh(placed.put(garment.mesh.vertices), garment.mesh.faces, garment.mesh.colors)
-        rest = replace(garment.rest, positions=placed.turned(garment.rest.positions))  # the warp is its vertical
-        return Garment(mesh, rest), body
+        return put(garment, start, config, job), body
     way = 1e3 * covered_way(body, garment.mesh)
     if way <= config.ride_up_to_mm:
         job.note(f"the body under the garment changes by up to {way:.0f} mm: the garment rides along")
@@ -136,14 +132,22 @@ def _begin(garment: Garment, body: MovingBody, config: DrapeConfig, job: Job) ->
     return Garment(reshaped, garment.rest), MovingBody(body.keyframes[-1:], body.faces)
 
 
-def _refuse_crossings(findings: Mapping[str, object], partial: Mapping[str, object]) -> None:
-    """Fail where anything still crosses, and say where."""
-    kinds = {"body": "garment and body", "self": "the garment with itself"}
+def refuse_crossings(findings: Mapping[str, object], partial: Mapping[str, object]) -> None:
+    """Fail where anything still crosses, and say where.
+
+    Args:
+        findings: Of an audit: pairs and places of each kind of crossing.
+        partial: What was reached, artifact -> value.
+
+    Raises:
+        IntersectingError: something does.
+    """
+    kinds = {"body": "garment and body", "self": "the garment with itself", "layer": "one garment and another"}
     crossing = [
         f"{findings[f'{kind}_intersections']} pairs of triangles of {what} still cross, near "
-        f"{_named(findings[f'{kind}_intersection_places'])}"
+        f"{named(findings[f'{kind}_intersection_places'])}"
         for kind, what in kinds.items()
-        if findings[f"{kind}_intersections"]
+        if findings.get(f"{kind}_intersections")
     ]
     if crossing:
         raise IntersectingError(
@@ -153,7 +157,7 @@ def _refuse_crossings(findings: Mapping[str, object], partial: Mapping[str, obje
         )
 
 
-def _named(places: object) -> str:
+def named(places: object) -> str:
     """Name some places [m] of those that the judge lists."""
     assert isinstance(places, list)
     chosen = [places[k] for k in np.unique(np.linspace(0, len(places) - 1, _SHOWN).astype(int))] if places else []

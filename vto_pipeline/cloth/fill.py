@@ -64,7 +64,7 @@ class Cubes:
         # garment cubes lie on the body's lattice, so that the shifts found include "none"
         low = garment.vertices.min(axis=0)
         self._low = self._body_low + np.floor((low - self._body_low) / cube) * cube
-        inside = _solid(_closed(garment), self._low, cube)
+        inside = _solid(closed(garment), self._low, cube)
         cloth = np.zeros_like(inside)
         points = np.vstack([garment.vertices, garment.vertices[garment.faces].mean(axis=1)])
         cloth[tuple(((points - self._low) / cube).astype(np.int64).T)] = True
@@ -102,7 +102,7 @@ def _solid(mesh: TriangleMesh, low: FloatArray, cube: float) -> NDArray[np.bool_
     return (np.abs(winding) > 0.5).reshape(counts)
 
 
-def _closed(garment: TriangleMesh) -> TriangleMesh:
+def closed(garment: TriangleMesh) -> TriangleMesh:
     """Return the garment with a fan over each opening."""
     vertices, faces = [garment.vertices], [garment.faces]
     count = len(garment.vertices)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from vto_pipeline.cloth.fill import Cubes, Fill, quarter_turns
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.garment import Garment
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
@@ -121,6 +123,16 @@ def place(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig, job: J
         f"fills it best; as it stood, {share:.0%} as good"
     )
     return Placement(scale, best.turn, stretch, best.shift)
+
+
+def put(garment: Garment, body: TriangleMesh, config: PlaceConfig, job: Job) -> Garment:
+    """Return the garment in its place, with its rest shape in metres and turned alike: the warp is its vertical.
+
+    Args, Raises: See `place`.
+    """
+    placed = place(garment.mesh, body, config, job)
+    mesh = TriangleMesh(placed.put(garment.mesh.vertices), garment.mesh.faces, garment.mesh.colors)
+    return Garment(mesh, replace(garment.rest, positions=placed.turned(garment.rest.positions)))
 
 
 def _best_way(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig) -> tuple[Fill, Fill]:

@@ -45,19 +45,24 @@ def json_schema(catalogue: Catalogue) -> dict[str, Any]:
 
 
 def _given_model(catalogue: Catalogue) -> type[BaseModel]:
-    """One field per section of `given`: a sub-model where keys have two parts, else the value itself."""
-    groups: dict[str, dict[str, Any]] = {}
-    fields: dict[str, Any] = {}
+    """A model of `given`: one of its own for each part of a key but the last, which is the value itself."""
+    tree: dict[str, Any] = {}
     for key, artifact in catalogue.given.items():
-        section, _, leaf = key.partition(".")
-        kind = catalogue.kind(artifact)
+        kind, branch = catalogue.kind(artifact), tree
+        *sections, leaf = key.split(".")
+        for section in sections:
+            branch = branch.setdefault(section, {})
         value = str if kind.inline is None else str | dict[str, Any]
-        field = (value, Field(default=None, description=kind.about))
-        if leaf:
-            groups.setdefault(section, {})[leaf] = field
-        else:
-            fields[section] = field
-    for section, members in groups.items():
-        model = create_model(f"Given_{section}", __config__=_STRICT, **members)
-        fields[section] = (model, Field(default=model()))
-    return create_model("Given", __config__=_STRICT, **fields)
+        branch[leaf] = (value, Field(default=None, description=kind.about))
+    return _branch_model("Given", tree)
+
+
+def _branch_model(name: str, branch: dict[str, Any]) -> type[BaseModel]:
+    fields = {}
+    for key, inner in branch.items():
+        if isinstance(inner, dict):
+            model: Any = _branch_model(f"{name}_{key}", inner)
+            inner = (model, Field(default=model()))
+        fields[key] = inner
+    made: type[BaseModel] = create_model(name, __config__=_STRICT, **fields)
+    return made

@@ -10,7 +10,7 @@ from vto_pipeline.report.chart import log_chart
 from vto_pipeline.report.layers import list_layers
 from vto_pipeline.report.scene import build_scene, script_json
 from vto_pipeline.report.tables import left_out_rows, measurement_rows
-from vto_pipeline.report.verdicts import collect_verdicts
+from vto_pipeline.report.verdicts import collect_verdicts, fit_reports
 from vto_pipeline.report.wording import centimetres, duration, figure, label, number
 
 _HERE = Path(__file__).parent
@@ -22,8 +22,8 @@ def build_page(run_record: Mapping[str, Any], parts: Mapping[str, Any]) -> str:
     Args:
         run_record: What run.json holds.
         parts: Artifact -> value, as far as there are any: meshes and avatar for the 3D view with "fit_maps" and
-            "labels" for its colours and "crossings" where cloth crosses something, "fit_report", "measurements",
-            "openings", "audit", "trace". Others are ignored.
+            "labels" for its colours and "crossings" where cloth crosses something, "fit_report" or, of several
+            garments, "fit_reports" by name, "measurements", "openings", "audit", "trace". Others are ignored.
     """
     from jinja2 import Environment, StrictUndefined
 
@@ -38,7 +38,7 @@ def build_page(run_record: Mapping[str, Any], parts: Mapping[str, Any]) -> str:
         viewer=_asset("viewer.js"),
         scene=script_json(build_scene(layers)) if layers else "",
         verdicts=collect_verdicts(run_record, parts),
-        fit=parts.get("fit_report"),
+        fits=fit_reports(parts),
         measurements=measurement_rows(parts.get("measurements"), parts.get("body_measurements")),
         openings=parts.get("openings", []),
         audit=parts.get("audit", {}),

@@ -26,6 +26,12 @@ _ORDER = ("bad", "warn", "good")
 _POOR = ("stretched", "tight", "loose")
 
 
+def fit_reports(parts: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the garments' fit reports by name; the name of an only garment is empty."""
+    reports: Mapping[str, Any] = parts.get("fit_reports", {})
+    return {"": parts["fit_report"]} if "fit_report" in parts else reports
+
+
 def collect_verdicts(run_record: Mapping[str, Any], parts: Mapping[str, Any]) -> list[Verdict]:
     """Return all verdicts, the worst first; the order is otherwise that of the run."""
     found = []
@@ -33,10 +39,9 @@ def collect_verdicts(run_record: Mapping[str, Any], parts: Mapping[str, Any]) ->
         if stage["status"] == "failed":
             found.append(Verdict("bad", f"failed: {stage['reason']}", stage["name"]))
         found += [Verdict("warn", warning, stage["name"]) for warning in stage.get("warnings", [])]
-    if "fit_report" in parts:
-        zones = parts["fit_report"].get("zones", [])
-        tone = "warn" if any(zone["verdict"] in _POOR for zone in zones) else "good"
-        found.append(Verdict(tone, parts["fit_report"]["verdict"], "fit"))
+    for name, report in fit_reports(parts).items():
+        tone = "warn" if any(zone["verdict"] in _POOR for zone in report.get("zones", [])) else "good"
+        found.append(Verdict(tone, report["verdict"], f"fit of {name}" if name else "fit"))
     if not found:
         found.append(Verdict("good", "No stage failed or gave a warning.", "run"))
     return sorted(found, key=lambda verdict: _ORDER.index(verdict.tone))

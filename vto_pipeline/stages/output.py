@@ -67,9 +67,9 @@ def _page(inputs: Inputs, settings: Config, job: Job) -> Outputs:
 
 
 def _crossings(audit: Mapping[str, Any]) -> list[list[float]]:
-    """Return where the garment was found to cross the body or itself [m]."""
-    kinds = ("body_intersection_places", "self_intersection_places")
-    return [place for kind in kinds for place in audit.get(kind, [])]
+    """Return where a garment was found to cross the body, itself or another, or to lie outside an outer one [m]."""
+    kinds = ("body_intersection", "self_intersection", "layer_intersection", "out_of_order")
+    return [place for kind in kinds for place in audit.get(f"{kind}_places", [])]
 
 
 STAGES: tuple[Stage, ...] = (

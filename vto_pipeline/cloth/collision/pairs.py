@@ -125,7 +125,7 @@ def near_pairs(x, end, features, owners, to_face, to_edge, reach, recovery, apar
         reach: Distance each vertex contributes to what two features keep [m], shape (V,).
         recovery: How far those already nearer may be led apart [m].
         apart: How far ways may be from what they are by themselves [m].
-        friction: Coulomb coefficient.
+        friction: Coulomb coefficient of each vertex, shape (V,); of a pair it is the geometric mean.
     """
     room = len(to_face) + len(to_edge)
     key, gap = np.empty(room, np.int64), np.empty(room)
@@ -168,7 +168,7 @@ def near_pairs(x, end, features, owners, to_face, to_edge, reach, recovery, apar
         weights[:count],
         normal[:count],
         gap[:count],
-        np.full(count, friction),
+        np.sqrt(friction[vertices[:count, 0]] * friction[vertices[:count, 3]]),
         none,
         none.copy(),
     )

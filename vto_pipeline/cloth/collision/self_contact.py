@@ -86,7 +86,7 @@ class SelfContact:
     Args:
         faces: Shape (F, 3).
         reach: Half the distance each vertex keeps from the rest of the cloth [m], shape (V,).
-        friction: Coulomb coefficient, cloth against cloth.
+        friction: Coulomb coefficient, cloth against cloth: one, or of each vertex, shape (V,).
         bodies: From which the cloth keeps its reach between its vertices, too.
         crossed: Vertices of what crosses from the start, and takes no part until it is free, shape (V,).
         force_all: Search always, to compare.
@@ -99,7 +99,7 @@ class SelfContact:
         self,
         faces: IntArray,
         reach: FloatArray,
-        friction: float,
+        friction: float | FloatArray,
         *,
         bodies: Sequence[BodyCollider] = (),
         crossed: NDArray[np.bool_] | None = None,
@@ -109,13 +109,14 @@ class SelfContact:
         self._cloth = self._features = features(faces, len(reach))
         self._bodies: BodyFeatures | None = None
         self._reach = self._all_reach = reach
+        self._friction = np.array(np.broadcast_to(friction, reach.shape), np.float64)
         if bodies:
             self._bodies = BodyFeatures(bodies, self._cloth, len(reach))
             self._features = self._bodies.features
             self._all_reach = np.concatenate([reach, np.zeros(len(self._bodies.friction))])
+            self._friction = np.concatenate([self._friction, self._bodies.friction])
         self._owners = owners(self._features, len(self._all_reach))
         self._pieces = pieces(faces, len(reach))
-        self._friction = friction
         self._crossed = np.zeros(len(reach), np.bool_) if crossed is None else crossed.copy()
         self._force_all = force_all
         self._tree: bvh.Bvh | None = None
