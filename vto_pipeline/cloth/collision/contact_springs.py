@@ -13,6 +13,7 @@ _SOFT = 1e2  # times mass / h², of pairs
 _FIRM = 4.0  # last force / gap: with that stiffness, as much again would take a quarter of the gap
 _LOST = 0.5  # share of the gap; where more is lost, the spring was too soft for what it bears
 _NO_LENGTH = 1e-300  # m
+_NOTHING = 1e-6  # m: of a gap smaller than this nothing can be lost
 _STIFFER = 1e3  # times mass / h²: a free vertex at rest on a plane sinks g h² / 1000, 3 µm at 1/60 s
 
 
@@ -208,7 +209,7 @@ def revise(contacts, x, y, allowed):
             continue
         push = -contacts.spring[c] * gap
         total += push
-        if not _is_against_other(contacts, c) and gap + contacts.lift[c] < -_LOST * contacts.level[c]:
+        if not _is_against_other(contacts, c) and gap + contacts.lift[c] < -max(_LOST * contacts.level[c], _NOTHING):
             amiss += push
         contacts.force[c] = push
         if contacts.friction[c] == 0.0:
