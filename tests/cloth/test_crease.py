@@ -8,10 +8,12 @@ from numpy.testing import assert_allclose
 from vto_pipeline.cloth.build import at_rest, build
 from vto_pipeline.cloth.collision.body import BodyCollider
 from vto_pipeline.cloth.collision.contacts import Round
+from vto_pipeline.cloth.joined import WornOn
 from vto_pipeline.cloth.stepper import StepConfig, Stepper
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.garment import RestShape
+from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
 SKIN = 2e-3
@@ -115,3 +117,21 @@ def test_what_was_touched_is_remembered_when_the_nearest_flank_changes():
         found = collider.contacts(point + np.array([x, 0.0, 0.0]), span)
         first.append(found.normal[0, 0, 0])
     assert_allclose(first, np.tile(first[0], (4, 1)), rtol=0, atol=1e-9)
+
+
+def test_fabrics_of_different_friction_have_both_flanks():
+    body = groove(np.radians(90.0))
+    points = np.array([[0.001, 0.0045, 0.0], [0.001, 0.0045, 0.05], [0.001, 0.0045, -0.05]])
+    worn = WornOn(body, np.array([0.2, 0.5, 0.2]), Job())
+    alone = BodyCollider(MovingBody(body.vertices[None], body.faces), 0.0, 0.3)
+    for shift in np.linspace(-0.003, 0.0, 9):
+        span = Round(0.0, 1 / 60, 5e-3, np.full(3, SKIN), 0.5)
+        here = points + np.array([shift, 0.0, 0.0])
+        found, wanted = worn.contacts(here, span), alone.contacts(here, span)
+    assert wanted.active.sum() == 6
+    for vertex, friction in enumerate([0.2, 0.5, 0.2]):
+        planes = np.flatnonzero(found.active[:, vertex])
+        assert_allclose(found.friction[planes], [friction, friction], rtol=0, atol=0)
+        assert_allclose(found.normal[planes, vertex], wanted.normal[:, vertex], rtol=0, atol=0)
+        assert_allclose(found.point[planes, vertex], wanted.point[:, vertex], rtol=0, atol=0)
+        assert_allclose(found.offset[planes, vertex], wanted.offset[:, vertex], rtol=0, atol=0)

@@ -89,9 +89,12 @@ class WornOn(PacedBody):
         self._of_kind = friction == self._kinds[:, None]
 
     def contacts(self, positions: FloatArray, span: Round) -> Contacts:
-        """See `Collider.contacts`; one surface for each coefficient, touched by the vertices that have it."""
+        """See `Collider.contacts`; each plane once for each coefficient, touched by the vertices that have it."""
         found = super().contacts(positions, span)
+        active = found.active[:, None] & self._of_kind
         point, normal, offset = (
             np.repeat(part, len(self._kinds), axis=0) for part in (found.point, found.normal, found.offset)
         )
-        return Contacts(found.active & self._of_kind, point, normal, offset, self._kinds)
+        return Contacts(
+            active.reshape(len(offset), -1), point, normal, offset, np.tile(self._kinds, len(found.friction))
+        )
