@@ -1,5 +1,7 @@
 """Cloth against itself: pairs against brute force, safe moves and whole scenes against ipctk, momentum."""
 
+from dataclasses import replace
+
 import ipctk
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from vto_pipeline.cloth import Plane, simulate
 from vto_pipeline.cloth.collision.self_contact import SelfContact
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.numerics.threads import limited_threads
+from vto_pipeline.units import GRAVITY
 
 FABRIC = fabric(stretch=1000.0, shear=200.0, bending=1e-5, density=0.2, friction=0.3)
 
@@ -165,3 +168,24 @@ def test_sheets_that_collide_keep_their_momentum():
     assert not crosses(ended.positions, mesh.faces)
     assert (model.mass[:count] @ ended.velocities[:count])[1] < 0.2 * before[1]  # some of it was handed over
     assert_allclose(after, before, rtol=0, atol=1e-9 * np.abs(before).max())  # solved to rounding for a free piece
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_cloth_slides_on_cloth_as_on_a_plane(friction):
+    """Edges and corners of the cloth beneath do not catch what slides over them."""
+    slope, seconds = np.arctan(0.6), 0.1
+    floor = sheet(31, 31, 0.5, 0.5, upright=False)
+    patch = moved(sheet(7, 7, 0.1, 0.1, upright=False), 0.1033, 3e-4, 0.2217)
+    level, count = stack(floor, patch), len(floor.vertices)
+    axes = np.array([[np.cos(slope), -np.sin(slope), 0.0], [np.sin(slope), np.cos(slope), 0.0], [0.0, 0.0, 1.0]])
+    tilted = TriangleMesh(level.vertices @ axes, level.faces)
+    found = simulate(
+        tilted,
+        replace(FABRIC, friction=friction),
+        pinned=np.arange(count),
+        seconds=seconds,
+        settings={"solver": "newton", "substeps": 16},
+    )
+    way = (found.positions - tilted.vertices)[count:].mean(axis=0) @ axes[0]
+    fall = 0.5 * GRAVITY * seconds**2 * (1 + 1 / found.report["steps"])
+    assert_allclose((np.sin(slope) - way / fall) / np.cos(slope), friction, rtol=0, atol=0.01)

@@ -2,7 +2,8 @@
 
 Two features come nearest to each other at a vertex and a face, a vertex and an edge, two vertices, or inside two edges.
 A vertex and a face give all but the last; what lies on an edge or a corner of the face comes from its owner alone, so
-that a fold is not held as many times as faces meet there.
+that a fold is not held as many times as faces meet there, and not at all where the vertex is nearer to another face
+that has this edge or corner: the way there is slanted, and what slides over the mesh would catch on every edge.
 """
 
 from __future__ import annotations
@@ -14,10 +15,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from vto_pipeline.cloth.collision.features import Features
-from vto_pipeline.numerics.distance import EDGE, FACE, VERTEX, closest_on_segments, closest_on_triangle
+from vto_pipeline.numerics.distance import EDGE, FACE, VERTEX, blend, closest_on_segments, closest_on_triangle
 from vto_pipeline.numerics.vector import add, axpy, cross, dot, load, norm, scale, store, sub
 
 _REGAINED = 0.2  # of a gap that is lost, at most, in a step: at once, layers would be thrown apart
+_NEARER = 0.99  # of a distance: a face that near has what the vertex comes to first
 _PARALLEL = 1e-8  # sine squared between edges under which their nearest points mean nothing
 
 
@@ -131,12 +133,15 @@ def near_pairs(x, end, features, owners, to_face, to_edge, reach, recovery, apar
     key, gap = np.empty(room, np.int64), np.empty(room)
     vertices, weights, normal = np.empty((room, 4), np.int32), np.empty((room, 4)), np.empty((room, 3))
     faces, edges = features.faces, features.edges
+    on_faces, features_at, distance = _places(x, faces, to_face)
     count = 0
     for p in range(len(to_face)):
         v, f = to_face[p, 0], to_face[p, 1]
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-        on, feature = closest_on_triangle(load(x, v), load(x, a), load(x, b), load(x, c))
-        if feature != FACE and not _answers(owners, faces, v, f, feature):
+        on, feature = load(on_faces, p), features_at[p]
+        if feature != FACE and (
+            not _answers(owners, faces, v, f, feature) or _is_passed(faces, to_face, features_at, distance, p)
+        ):
             continue
         vertices[count, 0], vertices[count, 1], vertices[count, 2], vertices[count, 3] = v, a, b, c
         weights[count, 0], weights[count, 1], weights[count, 2], weights[count, 3] = 1.0, -on[0], -on[1], -on[2]
@@ -184,6 +189,41 @@ def _answers(owners, faces, v, f, feature):
     else:
         owner = owners.of_corner[f, feature - VERTEX]
     return owner == f or faces[owner, 0] == v or faces[owner, 1] == v or faces[owner, 2] == v
+
+
+@njit(cache=True, error_model="numpy")
+def _places(x, faces, to_face):
+    """Return the places on faces nearest to vertices: weights (N, 3), features (N,) and distances (N,) [m]."""
+    on, feature, distance = np.empty((len(to_face), 3)), np.empty(len(to_face), np.int8), np.empty(len(to_face))
+    for p in range(len(to_face)):
+        v, f = to_face[p, 0], to_face[p, 1]
+        a, b, c = load(x, faces[f, 0]), load(x, faces[f, 1]), load(x, faces[f, 2])
+        weights, feature[p] = closest_on_triangle(load(x, v), a, b, c)
+        store(on, p, weights)
+        distance[p] = norm(sub(load(x, v), blend(weights, a, b, c)))
+    return on, feature, distance
+
+
+@njit(cache=True, error_model="numpy")
+def _is_passed(faces, to_face, feature, distance, p):
+    """Return whether the vertex of candidate p is nearer to another face that has the edge or corner it lies on."""
+    v, f = to_face[p, 0], to_face[p, 1]
+    first = last = faces[f, (feature[p] - EDGE if feature[p] >= EDGE else feature[p] - VERTEX)]
+    if feature[p] >= EDGE:
+        last = faces[f, (feature[p] - EDGE + 1) % 3]
+    start = p
+    while start > 0 and to_face[start - 1, 0] == v:
+        start -= 1
+    for q in range(start, len(to_face)):
+        if to_face[q, 0] != v:
+            break
+        if distance[q] < _NEARER * distance[p]:
+            g = to_face[q, 1]
+            has_first = faces[g, 0] == first or faces[g, 1] == first or faces[g, 2] == first
+            has_last = faces[g, 0] == last or faces[g, 1] == last or faces[g, 2] == last
+            if has_first and has_last:
+                return True
+    return False
 
 
 @njit(cache=True, error_model="numpy")
