@@ -126,6 +126,7 @@ class Phases:
             finest=self._config.finest,
             deadline=deadline,
         )
+        stepper.prepare(state.positions)
         if self._config.substeps is None and stepper.rests_exactly:
             stepper.substeps = min(stepper.substeps, _LONG)
         bounds = replace(limits, error=_NEARLY * limits.error, residual=_NEARLY * limits.residual)
