@@ -26,6 +26,7 @@ from vto_pipeline.numerics.pseudonormals import Pseudonormals, pseudonormals, up
 _SURELY = (
     0.55  # winding number above which a point is inside an open body; straight behind an open sheet it is one half
 )
+_BESIDE = 1.5  # skins: the other flank of a crease that is farther is not touched yet
 _FAR = 1e6  # m; the first search has no limit, since cloth may start anywhere in the body
 
 
@@ -143,7 +144,7 @@ class BodyCollider:
         near = surface.searched.nearest(positions, reach, self._guess)
         found = surface.on_body(near)
         side, distance = self._sides(positions, before, found)
-        outside = np.where(side == OUTSIDE, span.skin + look, 0.0)
+        outside = np.where(side == OUTSIDE, _BESIDE * span.skin, 0.0)
         flank = other_flank(surface.searched, positions, near, (self._flank, self._guess), outside)
         self._guess, self._distance = near.triangle, np.where(side == INSIDE, -distance, distance)
         self._flank = flank.triangle
