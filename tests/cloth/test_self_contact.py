@@ -172,10 +172,10 @@ def test_sheets_that_collide_keep_their_momentum():
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_cloth_slides_on_cloth_as_on_a_plane(friction):
-    """Edges and corners of the cloth beneath do not catch what slides over them."""
-    slope, seconds = np.arctan(0.6), 0.1
+    """Edges and corners of the cloth beneath do not catch what slides over them, by up to an edge a step."""
+    slope, seconds = np.arctan(0.6), 0.2
     floor = sheet(31, 31, 0.5, 0.5, upright=False)
-    patch = moved(sheet(7, 7, 0.1, 0.1, upright=False), 0.1033, 3e-4, 0.2217)
+    patch = moved(sheet(7, 7, 0.1, 0.1, upright=False), 0.2033, 3e-4, 0.2217)
     level, count = stack(floor, patch), len(floor.vertices)
     axes = np.array([[np.cos(slope), -np.sin(slope), 0.0], [np.sin(slope), np.cos(slope), 0.0], [0.0, 0.0, 1.0]])
     tilted = TriangleMesh(level.vertices @ axes, level.faces)
@@ -184,7 +184,7 @@ def test_cloth_slides_on_cloth_as_on_a_plane(friction):
         replace(FABRIC, friction=friction),
         pinned=np.arange(count),
         seconds=seconds,
-        settings={"solver": "newton", "substeps": 16},
+        settings={"solver": "newton", "substeps": 1},
     )
     way = (found.positions - tilted.vertices)[count:].mean(axis=0) @ axes[0]
     fall = 0.5 * GRAVITY * seconds**2 * (1 + 1 / found.report["steps"])

@@ -67,7 +67,12 @@ class Choice:
 
 
 def choose(
-    model: ClothModel, positions: FloatArray, method: str | None, substeps: float | None, sweeps: int | None
+    model: ClothModel,
+    positions: FloatArray,
+    method: str | None,
+    substeps: float | None,
+    sweeps: int | None,
+    frequency: float = 0.0,
 ) -> Choice:
     """Return the method to take: what was asked for, and the rest by the scene.
 
@@ -75,6 +80,7 @@ def choose(
         model: The cloth.
         positions: Where it starts [m], shape (V, 3).
         method, substeps, sweeps: What was asked for; None where the scene decides.
+        frequency: The highest of what is not part of the model [rad/s].
 
     Raises:
         ConfigError: no such method.
@@ -85,7 +91,7 @@ def choose(
         reason = "asked for"
     else:
         raise ConfigError(f"solver is {method!r}; allowed: {', '.join(METHODS)}")
-    usual = _usual(method, model, positions)
+    usual = _usual(method, model, positions, frequency)
     return Choice(method, substeps or usual[0], sweeps or usual[1], reason)
 
 
@@ -101,11 +107,11 @@ def _by_scene(model: ClothModel, positions: FloatArray) -> tuple[str, str]:
     )
 
 
-def _usual(method: str, model: ClothModel, positions: FloatArray) -> tuple[int, int]:
+def _usual(method: str, model: ClothModel, positions: FloatArray, frequency: float) -> tuple[int, int]:
     if method in _USUAL:
         return _USUAL[method]
     if method in _EXPLICIT:
-        steps = FRAME * highest_frequency(model, positions) / _EXPLICIT[method]
+        steps = FRAME * max(highest_frequency(model, positions), frequency) / _EXPLICIT[method]
         return max(1, ceil(min(steps, _MOST))), 1
     return _ITERATED if method in SOLVERS else _IMPLICIT
 

@@ -18,13 +18,17 @@ from vto_pipeline.cloth.collision.body import BodyCollider
 from vto_pipeline.cloth.collision.contacts import Collider, Round, gather, nothing
 from vto_pipeline.cloth.collision.hold_apart import hold_apart
 from vto_pipeline.cloth.collision.pairs import no_pairs
+from vto_pipeline.cloth.collision.penalty import FREQUENCY, Penalty
 from vto_pipeline.cloth.collision.self_contact import SelfContact
+from vto_pipeline.cloth.integrators import INTEGRATORS
+from vto_pipeline.cloth.integrators.integrator import Integrator
 from vto_pipeline.cloth.methods import FRAME, METHODS, Choice, Method, choose
 from vto_pipeline.cloth.solvers.newton import Newton
-from vto_pipeline.errors import DivergedError
+from vto_pipeline.errors import ConfigError, DivergedError
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.settings import Config
 
+_HARD = 0.2  # of the distance layers keep: how much of it is not given way by contact forces
 _OUT_OF_BOUNDS = 1e9  # m, m/s
 _WHOLE = 1e-6  # steps: what rounding may add to a whole number of them
 
@@ -45,6 +49,11 @@ class StepConfig(Config):
         False,
         description="Whether corners and edges of mesh bodies push cloth between its vertices, with self_collision: "
         "needed where the body is sharper than the cloth is fine; slower, and later at rest",
+    )
+    contact_forces: bool = Field(
+        False,
+        description="Whether contacts are penalty springs, dampers and friction forces; for integrators of forces, to "
+        "compare: cloth sinks in. By default contacts are solved for",
     )
     recovery_speed: float = Field(0.5, gt=0, le=10, description="Speed at which cloth inside a body is led out [m/s]")
 
@@ -107,6 +116,7 @@ class Stepper:
                 model.reach,
                 model.friction,
                 bodies=[one for one in colliders if config.body_features and isinstance(one, BodyCollider)],
+                at_once=config.contact_forces,
                 crossed=crossed,
                 force_all=force_all,
             )
@@ -115,17 +125,25 @@ class Stepper:
         """Choose the method, and let it make what it needs, for a cloth that starts here [m], shape (V, 3). Once.
 
         Raises:
-            ConfigError: no such method.
+            ConfigError: no such method, or none that knows forces where contacts are to be forces.
         """
         if self._method is not None:
             return
         config = self._config
-        self.choice = choose(self._model, positions, config.solver, config.substeps, config.sweeps)
+        besides = FREQUENCY if config.contact_forces else 0.0
+        self.choice = choose(self._model, positions, config.solver, config.substeps, config.sweeps, besides)
         self.substeps = self.choice.substeps
         self._method = METHODS[self.choice.method](
             self._model, sweeps=self.choice.sweeps, damping=self._damping, max_speed=self._max_speed
         )
-        if isinstance(self._method, Newton):
+        if config.contact_forces:
+            if not isinstance(self._method, Integrator):
+                raise ConfigError(
+                    f"contact_forces is set, and solver {self.choice.method!r} knows no forces; allowed: "
+                    f"{', '.join(INTEGRATORS)}"
+                )
+            self._method.system.penalty = Penalty(self._model)
+        if isinstance(self._method, Newton | Integrator):
             self._method.self_contact = self.self_contact
 
     def run(self, state: ClothState, seconds: float) -> ClothState:
@@ -174,7 +192,8 @@ class Stepper:
     def _round(self, state: ClothState, h: float, count: int) -> ClothState:
         travel = max(self._config.travel_mm * 1e-3, 2.0 * self._speed(state) * h)
         move = count * h * state.velocities
-        span = Round(state.time, state.time + count * h, travel, self.skin, self._config.recovery_speed, move)
+        recovery = np.inf if self._config.contact_forces else self._config.recovery_speed
+        span = Round(state.time, state.time + count * h, travel, self.skin, recovery, move)
         self._contacts = gather(self._colliders, state.positions, span)
         assert self._method is not None  # `run` prepared it
         before = state
@@ -212,8 +231,9 @@ class Stepper:
         if self.self_contact is None:
             return False
         self.self_contact.at(state.time, state.time + seconds)
-        end = state.positions + seconds * (state.velocities + 0.5 * seconds * self._model.gravity)
-        return len(self.self_contact.near(state.positions, end, seconds).key) > 0
+        drift = seconds * state.velocities
+        end = state.positions + drift + 0.5 * seconds**2 * self._model.gravity
+        return len(self.self_contact.near(state.positions, end, seconds, drift).key) > 0
 
     def _apart(self, state: ClothState, after: ClothState, seconds: float) -> ClothState:
         """Put right what a method did that knows nothing of the cloth's contacts with itself."""
@@ -221,6 +241,8 @@ class Stepper:
         positions = after.positions.copy()
         self.self_contact.at(state.time, state.time + seconds)
         pairs = self.self_contact.near(state.positions, positions, seconds)
+        if self._config.contact_forces:  # a spring bears only so much
+            pairs = pairs._replace(gap=_HARD * pairs.gap)
         hold_apart(pairs, self._model.inverse_mass, state.positions, positions)
         positions, _ = self.self_contact.safe(state.positions, positions)
         velocities = after.velocities + (positions - after.positions) / seconds

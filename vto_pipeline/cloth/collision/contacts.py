@@ -39,7 +39,7 @@ class Round(NamedTuple):
         start, end: [s].
         travel: No vertex moves farther in it [m].
         skin: Distance to keep from surfaces, of each vertex [m], shape (V,).
-        recovery: Speed at which cloth inside a surface is led out [m/s].
+        recovery: Speed at which cloth inside a surface is led out [m/s]; infinite where contacts give way.
         move: Where each vertex is heading in the round, if known [m], shape (V, 3); a plane is then chosen that is not
             in its way unless the surface is.
     """
@@ -93,6 +93,8 @@ def ride(
         span: The round.
     """
     offset = np.empty((len(distance), 2))
-    np.minimum(span.skin, distance, out=offset[:, 0])
-    np.minimum(span.skin, offset[:, 0] + span.recovery * (span.end - span.start), out=offset[:, 1])
+    offset[:] = span.skin[:, None]
+    if span.recovery < np.inf:
+        np.minimum(span.skin, distance, out=offset[:, 0])
+        np.minimum(span.skin, offset[:, 0] + span.recovery * (span.end - span.start), out=offset[:, 1])
     return Contacts(near[None], point[None], normal[None], offset[None], np.array([friction]))

@@ -3,7 +3,9 @@
 Two features come nearest to each other at a vertex and a face, a vertex and an edge, two vertices, or inside two edges.
 A vertex and a face give all but the last; what lies on an edge or a corner of the face comes from its owner alone, so
 that a fold is not held as many times as faces meet there, and not at all where the vertex is nearer to another face
-that has this edge or corner: the way there is slanted, and what slides over the mesh would catch on every edge.
+that has this edge or corner: the way there is slanted, and what slides over the mesh would catch on every edge. For the
+same reason what has yet to come near is seen from where it will pass, and left out where it will pass by: it is found
+again, on its way as solved, by the search for what would pass through (`safe`).
 """
 
 from __future__ import annotations
@@ -16,10 +18,11 @@ from numpy.typing import NDArray
 
 from vto_pipeline.cloth.collision.features import Features
 from vto_pipeline.numerics.distance import EDGE, FACE, VERTEX, blend, closest_on_segments, closest_on_triangle
-from vto_pipeline.numerics.vector import add, axpy, cross, dot, load, norm, scale, store, sub
+from vto_pipeline.numerics.vector import axpy, cross, dot, load, norm, store, sub, unit
 
-_REGAINED = 0.2  # of a gap that is lost, at most, in a step: at once, layers would be thrown apart
 _NEARER = 0.99  # of a distance: a face that near has what the vertex comes to first
+_HEAD_ON = 0.1  # of what is kept: what passes nearer than that does not pass by
+_CLOSE = 1.5  # times what is kept: what is that near is held, whatever it is about to do
 _PARALLEL = 1e-8  # sine squared between edges under which their nearest points mean nothing
 
 
@@ -117,17 +120,20 @@ def against_bodies(
 
 
 @njit(cache=True, error_model="numpy")
-def near_pairs(x, end, features, owners, to_face, to_edge, reach, recovery, apart, friction):
+def near_pairs(x, end, drift, features, owners, to_face, to_edge, reach, recovery, regained, apart, friction, coming):
     """Return those candidates that are, or come by straight ways, nearer than they may.
 
     Args:
         x, end: Positions at the begin and where vertices would go by themselves [m], shape (V, 3).
+        drift: How far by their speed alone [m], shape (V, 3).
         features, owners: Of the cloth, and of bodies.
         to_face, to_edge: Candidates, shapes (N, 2) and (M, 2), sorted.
         reach: Distance each vertex contributes to what two features keep [m], shape (V,).
         recovery: How far those already nearer may be led apart [m].
+        regained: Of the gap that they have lost, at most.
         apart: How far ways may be from what they are by themselves [m].
         friction: Coulomb coefficient of each vertex, shape (V,); of a pair it is the geometric mean.
+        coming: Whether to leave out what is not near yet and by its speed will pass by.
     """
     room = len(to_face) + len(to_edge)
     key, gap = np.empty(room, np.int64), np.empty(room)
@@ -146,7 +152,13 @@ def near_pairs(x, end, features, owners, to_face, to_edge, reach, recovery, apar
         vertices[count, 0], vertices[count, 1], vertices[count, 2], vertices[count, 3] = v, a, b, c
         weights[count, 0], weights[count, 1], weights[count, 2], weights[count, 3] = 1.0, -on[0], -on[1], -on[2]
         own = reach[v] + min(reach[a], min(reach[b], reach[c]))
-        if _is_near(x, end, vertices[count], weights[count], own, recovery, apart, normal, gap, count):
+        way, comes = _sum(x, vertices[count], weights[count]), True
+        if feature != FACE:
+            begin = norm(way)
+            way, comes = _passing(way, _sum(drift, vertices[count], weights[count]), own)
+            if coming and not comes and begin > _CLOSE * own:
+                continue
+        if _is_near(x, end, vertices[count], weights[count], way, own, recovery, regained, apart, normal, gap, count):
             key[count] = np.int64(v) * len(faces) + f
             count += 1
     first = np.int64(len(x)) * len(faces)
@@ -163,7 +175,11 @@ def near_pairs(x, end, features, owners, to_face, to_edge, reach, recovery, apar
         vertices[count, 0], vertices[count, 1], vertices[count, 2], vertices[count, 3] = a, b, c, d
         weights[count, 0], weights[count, 1], weights[count, 2], weights[count, 3] = 1.0 - s, s, t - 1.0, -t
         own = min(reach[a], reach[b]) + min(reach[c], reach[d])
-        if _is_near(x, end, vertices[count], weights[count], own, recovery, apart, normal, gap, count):
+        way = _sum(x, vertices[count], weights[count])
+        moved = _sum(drift, vertices[count], weights[count])
+        if coming and norm(way) > _CLOSE * own and not _meet_inside(way, moved, u, w, s, t):
+            continue
+        if _is_near(x, end, vertices[count], weights[count], way, own, recovery, regained, apart, normal, gap, count):
             key[count] = first + np.int64(e) * len(edges) + f
             count += 1
     none = np.zeros((count, 3))
@@ -227,19 +243,59 @@ def _is_passed(faces, to_face, feature, distance, p):
 
 
 @njit(cache=True, error_model="numpy")
-def _is_near(x, end, vertices, weights, own, recovery, apart, normal, gap, place):
-    """Write normal and gap of a pair; return whether it is near enough to matter."""
-    way, moved = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    for s in range(4):
-        i = vertices[s]
-        way = axpy(weights[s], load(x, i), way)
-        moved = axpy(weights[s], sub(load(end, i), load(x, i)), moved)
-    distance = norm(way)
-    if distance == 0.0:  # they cross: there is no side to keep
+def _passing(way, moved, own):
+    """Return the way between two points where, going on as they do, they are nearest to each other [m].
+
+    What slides on the other side of a rim before a vertex is on its way past it, not into it. Where they meet head on
+    it is the way at the begin.
+    """
+    square = dot(moved, moved)
+    share = -dot(way, moved) / square if square > 0.0 else 0.0
+    nearest = axpy(min(max(share, 0.0), 1.0), moved, way)
+    return nearest if norm(nearest) > _HEAD_ON * min(own, norm(way)) else way, 0.0 < share < 1.0
+
+
+@njit(cache=True, error_model="numpy")
+def _meet_inside(way, moved, u, w, s, t):
+    """Return whether two edges, going on as they do, meet where both have their place on the other.
+
+    Args:
+        way, moved: From the nearest place on the second to that on the first, and how it will change [m].
+        u, w: From end to end [m].
+        s, t: The nearest places, as shares.
+    """
+    across = cross(u, w)
+    size = norm(across)
+    n = unit(across)
+    towards = dot(n, moved)
+    if dot(n, way) * towards >= 0.0:
         return False
-    n = scale(1.0 / distance, way)
-    if dot(n, add(way, moved)) > own + apart and distance > own:
+    when = -dot(n, way) / towards
+    if when > 1.0:
+        return False
+    left = axpy(when, moved, way)
+    return 0.0 <= s - dot(n, cross(left, w)) / size <= 1.0 and 0.0 <= t - dot(n, cross(left, u)) / size <= 1.0
+
+
+@njit(cache=True, error_model="numpy")
+def _sum(x, vertices, weights):
+    """Return Σ w x."""
+    total = (0.0, 0.0, 0.0)
+    for s in range(4):
+        total = axpy(weights[s], load(x, vertices[s]), total)
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def _is_near(x, end, vertices, weights, along, own, recovery, regained, apart, normal, gap, place):
+    """Write normal, along a given way, and gap of a pair; return whether it is near enough to matter."""
+    way, there = _sum(x, vertices, weights), _sum(end, vertices, weights)
+    if norm(way) == 0.0:  # they cross: there is no side to keep
+        return False
+    n = unit(along)
+    distance = dot(n, way)
+    if dot(n, there) > own + apart and distance > own:
         return False
     store(normal, place, n)
-    gap[place] = min(own, distance + min(recovery, _REGAINED * (own - distance)))
+    gap[place] = min(own, distance + min(recovery, regained * (own - distance)))
     return True

@@ -25,6 +25,7 @@ from vto_pipeline.numerics import bvh
 from vto_pipeline.units import GRAVITY
 
 _RECOVERY = 0.1  # m/s: speed at which layers nearer than their thickness are led apart
+_REGAINED = 0.2  # of a gap that is lost, at most, in a step: at once, layers would be thrown apart
 _ROOM = 0.1  # of an edge: the most that layers are looked for beyond their thickness, or none could be proven apart
 _LOOK = 50  # searches after which to see whether the tree is still good, and what has come free
 _WIDER = 0.3  # of the longest way: how much farther than asked for a search looks, to serve the rest of the step too
@@ -88,6 +89,7 @@ class SelfContact:
         reach: Half the distance each vertex keeps from the rest of the cloth [m], shape (V,).
         friction: Coulomb coefficient, cloth against cloth: one, or of each vertex, shape (V,).
         bodies: From which the cloth keeps its reach between its vertices, too.
+        at_once: Whether what is too near is to keep all its distance by the end of a step, as where contacts give way.
         crossed: Vertices of what crosses from the start, and takes no part until it is free, shape (V,).
         force_all: Search always, to compare.
 
@@ -102,6 +104,7 @@ class SelfContact:
         friction: float | FloatArray,
         *,
         bodies: Sequence[BodyCollider] = (),
+        at_once: bool = False,
         crossed: NDArray[np.bool_] | None = None,
         force_all: bool = False,
     ) -> None:
@@ -119,6 +122,7 @@ class SelfContact:
         self._pieces = pieces(faces, len(reach))
         self._crossed = np.zeros(len(reach), np.bool_) if crossed is None else crossed.copy()
         self._force_all = force_all
+        self._recovery, self._regained = (np.inf, 1.0) if at_once else (_RECOVERY, _REGAINED)
         self._tree: bvh.Bvh | None = None
         self._length: float | None = None
         self._found = self._beside = _NOTHING
@@ -128,7 +132,7 @@ class SelfContact:
         if self._bodies is not None:
             self._bodies.at(begin, end)
 
-    def near(self, x: FloatArray, end: FloatArray, seconds: float) -> Pairs:
+    def near(self, x: FloatArray, end: FloatArray, seconds: float, drift: FloatArray | None = None) -> Pairs:
         """Return the pairs that are, or come by straight ways, nearer than they may; see `pairs.near_pairs`.
 
         So are those that come near where one falls and the other is held. Vertices before faces of a body are not among
@@ -137,12 +141,13 @@ class SelfContact:
         Args:
             x, end: Positions at the begin and where vertices would go by themselves [m], shape (V, 3).
             seconds: How long that takes [s].
+            drift: How far by their speed alone [m], shape (V, 3); all the way when None.
         """
         apart = min(GRAVITY * seconds**2, _ROOM * self._edge(x))
         found = self._candidates(x, _together(x, end), 0.5 * apart)
         if self._bodies is not None:
             found = found.joined(self._beyond_planes(self._outside(self._bodies, x, end), len(x)))
-        return self._pairs(x, end, found, _RECOVERY * seconds, apart)
+        return self._pairs(x, end, end - x if drift is None else drift, found, self._recovery * seconds, apart, True)
 
     def _edge(self, x: FloatArray) -> float:
         """Return the median length of the cloth's edges when first asked [m]."""
@@ -192,7 +197,9 @@ class SelfContact:
             stuck = hit
         self.tally.uncut += int((stuck & moving).sum())
         self.tally.shortened += int((share[: len(x)] < 1.0).sum())
-        return there[: len(x)], self._pairs(x, end, self._beyond_planes(found.chosen(hit), len(x)), 0.0, 0.0)
+        return there[: len(x)], self._pairs(
+            x, end, end - x, self._beyond_planes(found.chosen(hit), len(x)), 0.0, 0.0, False
+        )
 
     def _beyond_planes(self, found: Candidates, count: int) -> Candidates:
         """Return those that are not of a vertex of the cloth and a face of a body: planes hold these."""
@@ -205,14 +212,35 @@ class SelfContact:
         self._crossed &= meeting_vertices(self_intersections(TriangleMesh(x, faces)), faces, len(x))
         self._found = _NOTHING  # what was found without them no longer holds
 
-    def _pairs(self, x: FloatArray, end: FloatArray, found: Candidates, recovery: float, apart: float) -> Pairs:
+    def _pairs(
+        self,
+        x: FloatArray,
+        end: FloatArray,
+        drift: FloatArray,
+        found: Candidates,
+        recovery: float,
+        apart: float,
+        coming: bool,
+    ) -> Pairs:
         if found.number == 0:
             return no_pairs()
         start, bodies = x, self._bodies
         if bodies is not None:
             start, end = bodies.beside(x, False), bodies.beside(end, True)
+            drift = np.concatenate([drift, bodies.end - bodies.begin])
         pairs = near_pairs(
-            start, end, self._features, self._owners, *found, self._all_reach, recovery, apart, self._friction
+            start,
+            end,
+            drift,
+            self._features,
+            self._owners,
+            *found,
+            self._all_reach,
+            recovery,
+            self._regained,
+            apart,
+            self._friction,
+            coming,
         )
         if bodies is None:
             return pairs

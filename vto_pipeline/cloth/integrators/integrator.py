@@ -7,8 +7,10 @@ from abc import ABC, abstractmethod
 import numpy as np
 
 from vto_pipeline.cloth.build import ClothModel, ClothState
-from vto_pipeline.cloth.collision.contacts import Contacts
+from vto_pipeline.cloth.collision.contacts import Contacts, nothing
+from vto_pipeline.cloth.collision.pairs import Pairs, no_pairs
 from vto_pipeline.cloth.collision.respond import respond
+from vto_pipeline.cloth.collision.self_contact import SelfContact
 from vto_pipeline.cloth.constraints.rigid import refuse_rigid
 from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM
 from vto_pipeline.cloth.integrators.air import AirDrag
@@ -31,6 +33,7 @@ class Integrator(ABC):
     Attributes:
         system: The forces.
         tolerance: [m].
+        self_contact: What keeps the cloth from itself where contacts are forces, if anything; may be set between runs.
     """
 
     def __init__(
@@ -47,6 +50,7 @@ class Integrator(ABC):
         self._model = own(model)
         self.system = ForceSystem(self._model, damping, air)
         self._max_speed = max_speed
+        self.self_contact: SelfContact | None = None
         self._h = 0.0
         self._last: ClothState | None = None
 
@@ -71,11 +75,26 @@ class Integrator(ABC):
         x, v = state.positions, self.system.free * state.velocities
         with np.errstate(over="ignore", invalid="ignore"):  # beyond its limit of stability a method grows until inf
             for step in range(substeps):
-                new_x, new_v = self.step(self.system, x, v, h)
-                x, v = self._respond(x, new_x, new_v, contacts, step / substeps, (step + 1) / substeps, h)
+                t0, t1, penalty = step / substeps, (step + 1) / substeps, self.system.penalty
+                if penalty is None:
+                    new_x, new_v = self.step(self.system, x, v, h)
+                    x, v = self._respond(x, new_x, new_v, contacts, t0, t1, h)
+                else:
+                    x = x.copy()  # what was kept for a step from here was without its contacts
+                    penalty.begin(contacts, self._pairs(x, v, state.time + step * h, h), t0, t1, x, h)
+                    new_x, new_v = self.step(self.system, x, v, h)
+                    x, v = self._respond(x, new_x, new_v, nothing(len(x)), t0, t1, h)
+                    penalty.end(x)
                 slip(x, self._model.constraints)
         self._h, self._last = h, ClothState(x, v, state.time + substeps * h, remember(self._model))
         return self._last
+
+    def _pairs(self, x: FloatArray, v: FloatArray, time: float, h: float) -> Pairs:
+        """Return where the cloth comes near itself and what bodies have beside faces."""
+        if self.self_contact is None:
+            return no_pairs()
+        self.self_contact.at(time, time + h)
+        return self.self_contact.near(x, x + h * v + h * h * self._model.gravity, h, h * v)
 
     def _respond(
         self, start: FloatArray, x: FloatArray, v: FloatArray, contacts: Contacts, t0: float, t1: float, h: float

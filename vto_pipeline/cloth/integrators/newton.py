@@ -17,17 +17,18 @@ _ARMIJO = 1e-4
 def newton_step(potential: IncrementalPotential, x: FloatArray, v: FloatArray) -> FloatArray:
     """Return where one linear system leads, with forces linearised about x and v: Baraff & Witkin 1998, eq. 6.
 
-    Φ linearised about x alone has the resistance about (x - o)/τ, which is nothing, and not about v; what that makes,
-    r(v) - (∂r/∂v) v, is added.
+    Φ linearised about x alone has the resistance about u = (x - o)/τ, and not about v; what that makes,
+    r(v) - r(u) - (∂r/∂v) (v - u), is added.
     """
     system = potential.system
     gradient = potential.at(x)[1]
     if potential.resisted:
+        begin = potential.velocity(x)
         elastic, whole = np.empty_like(v), np.empty_like(v)
-        multiply(system.matrix(x, v, 1.0 / potential.square, 0.0), v, elastic)
-        multiply(potential.hessian(x, v), v, whole)
-        resistance = system.resistance(potential.around, v)[1]
-        gradient -= system.free * (resistance + potential.span * (whole - elastic))
+        multiply(system.matrix(x, v, 1.0 / potential.square, 0.0), v - begin, elastic)
+        multiply(potential.hessian(x, v), v - begin, whole)
+        change = system.resistance(potential.around, v)[1] - system.resistance(potential.around, begin)[1]
+        gradient -= system.free * (change + potential.span * (whole - elastic))
     else:
         potential.hessian(x, v)
     return x + system.solve(-gradient, _SINGLE_TOLERANCE)

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from vto_pipeline.cloth.build import ClothModel
+from vto_pipeline.cloth.collision.penalty import Penalty
 from vto_pipeline.cloth.constraints.sweep import add_damping_forces, add_forces
 from vto_pipeline.cloth.integrators.air import AirDrag, add_drag, add_drag_rate
 from vto_pipeline.cloth.stiffness import Stiffness
@@ -30,6 +31,7 @@ class ForceSystem:
         inverse_mass: [1/kg], zero for held vertices, shape (V, 1).
         weight: [N], shape (V, 3).
         damping: α [1/s].
+        penalty: Contacts as forces, if they are; may be set between runs.
     """
 
     def __init__(self, model: ClothModel, damping: float = 0.0, air: AirDrag | None = None) -> None:
@@ -38,6 +40,7 @@ class ForceSystem:
         self.free = (self.inverse_mass > 0.0).astype(np.float64)
         self.weight = self.mass * model.gravity
         self.damping = damping
+        self.penalty: Penalty | None = None
         self._model = model
         self._air = (air or AirDrag()).strength
         self._viscous = any(data.damping > 0.0 for data in model.constraints)
@@ -46,6 +49,8 @@ class ForceSystem:
         """Return U [J] and f = -∇U [N], shape (V, 3), at positions x [m], shape (V, 3)."""
         forces = self.weight.copy()
         energy = add_forces(x, self._model.constraints, forces)
+        if self.penalty is not None:
+            energy += self.penalty.add_forces(x, forces)
         return energy - float(np.vdot(self.weight, x)), forces
 
     def resistance(self, x: FloatArray, v: FloatArray) -> tuple[float, FloatArray]:
@@ -57,6 +62,8 @@ class ForceSystem:
         if self._viscous:
             add_damping_forces(x, v, self._model.constraints, forces)
         power = -0.5 * float(np.vdot(v, forces))
+        if self.penalty is not None:
+            power += self.penalty.add_resistance(x, v, forces)
         drag = self._drag(x, v)
         return power - float(np.vdot(v, drag)) / 3.0, forces + drag
 
@@ -81,6 +88,8 @@ class ForceSystem:
         if self._air > 0.0 and rate > 0.0:
             places = np.where(self._model.inverse_mass > 0.0, matrix.diagonal, np.int32(-1))
             add_drag_rate(x, v, self._model.faces, self._air, rate, matrix.blocks, places)
+        if self.penalty is not None:
+            self.penalty.add_to(matrix, x, rate)
         return matrix
 
     def solve(self, right: FloatArray, tolerance: float) -> FloatArray:
@@ -125,4 +134,4 @@ class ForceSystem:
     @property
     def resists(self) -> bool:
         """Whether anything depends on velocity."""
-        return self.damping > 0.0 or self._viscous or self._air > 0.0
+        return self.damping > 0.0 or self._viscous or self._air > 0.0 or self.penalty is not None

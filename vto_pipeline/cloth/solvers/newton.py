@@ -130,7 +130,7 @@ class Newton:
         x[led] += h * v[led]
         target = x + move + (~held)[:, None] * (h * h * model.gravity)
         itself = self.self_contact
-        pairs = no_pairs() if itself is None else itself.near(start, target, h)
+        pairs = no_pairs() if itself is None else itself.near(start, target, h, move)
         guess, mass = target - start, model.inverse_mass
         self._active = active_set(contacts, pairs, t0, t1, mass, start, guess, move, self._active)
         if led.any():  # what they pull at their neighbours by being led is no measure
