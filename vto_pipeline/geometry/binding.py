@@ -1,8 +1,8 @@
-"""The render mesh rides on the simulation mesh.
+"""One mesh rides on another: a render mesh on a simulation mesh, a fine simulation mesh on a coarse one.
 
 A vertex is bound to the nearest triangle that faces the same way, at barycentric coordinates, and at a height along the
 interpolated vertex normal. What that leaves over (at the rim, where the projection falls outside) is kept in the
-frame of the triangle and turns with it, so the rest pose gives the render mesh back exactly.
+frame of the triangle and turns with it, so the pose it was bound in gives the mesh back exactly.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ _FACING = 0.0  # least cosine between the normals of a vertex and its triangle: 
 
 @dataclass(frozen=True)
 class Binding:
-    """Where each render vertex sits on the simulation mesh.
+    """Where each vertex of the riding mesh sits on the other.
 
     Args:
-        corners: Simulation vertices of its triangle, shape (R, 3).
+        corners: Vertices of its triangle of the other, shape (R, 3).
         weights: Barycentric, rows sum to 1, shape (R, 3).
         height: Along the interpolated vertex normal [m], shape (R,).
         residual: The rest, in the frame of the triangle [m], shape (R, 3).
-        faces: Of the simulation mesh, shape (F, 3).
-        count: Vertices of the simulation mesh.
-        turned_away: Render vertices for which no triangle near by faces the same way.
+        faces: Of the other, shape (F, 3).
+        count: Vertices of the other.
+        turned_away: Vertices for which no triangle near by faces the same way.
     """
 
     corners: IntArray
@@ -42,29 +42,29 @@ class Binding:
     turned_away: int
 
 
-def bind(render_mesh: TriangleMesh, sim_mesh: TriangleMesh) -> Binding:
-    """Bind a render mesh to the simulation mesh it was made from or that was made from it.
+def bind(rider: TriangleMesh, mesh: TriangleMesh) -> Binding:
+    """Bind a mesh to the one it was made from or that was made from it.
 
     Args:
-        render_mesh: In the pose of `sim_mesh` [m].
-        sim_mesh: What will move.
+        rider: In the pose of `mesh` [m].
+        mesh: What will move.
     """
-    points, normals = render_mesh.vertices, vertex_normals(render_mesh)
-    face = SurfaceDistance(sim_mesh).nearest(points).face
-    away = np.einsum("ij,ij->i", normals, face_normals(sim_mesh)[face]) < _FACING
-    face, turned_away = _facing_faces(face, away, points, normals, sim_mesh)
-    corners = sim_mesh.faces[face]
-    weights = _barycentric(points, sim_mesh.vertices[corners])
-    surface, up = _on_surface(sim_mesh.vertices, vertex_normals(sim_mesh), corners, weights)
+    points, normals = rider.vertices, vertex_normals(rider)
+    face = SurfaceDistance(mesh).nearest(points).face
+    away = np.einsum("ij,ij->i", normals, face_normals(mesh)[face]) < _FACING
+    face, turned_away = _facing_faces(face, away, points, normals, mesh)
+    corners = mesh.faces[face]
+    weights = _barycentric(points, mesh.vertices[corners])
+    surface, up = _on_surface(mesh.vertices, vertex_normals(mesh), corners, weights)
     height = np.einsum("ij,ij->i", points - surface, up)
     left = points - surface - height[:, None] * up
-    frames = _frames(sim_mesh.vertices[corners])
+    frames = _frames(mesh.vertices[corners])
     residual = np.einsum("nij,nj->ni", frames, left)
-    return Binding(corners, weights, height, residual, sim_mesh.faces, len(sim_mesh.vertices), turned_away)
+    return Binding(corners, weights, height, residual, mesh.faces, len(mesh.vertices), turned_away)
 
 
 def apply(binding: Binding, positions: FloatArray) -> FloatArray:
-    """Return the render vertices [m], shape (R, 3), for simulated positions [m], shape (V, 3)."""
+    """Return the riding vertices [m], shape (R, 3), for positions of the other mesh [m], shape (V, 3)."""
     normals = vertex_normals(TriangleMesh(positions, binding.faces))
     surface, up = _on_surface(positions, normals, binding.corners, binding.weights)
     frames = _frames(positions[binding.corners])
