@@ -113,7 +113,7 @@ class _Descent:
         phases = Phases(model, garment.rest, self._fabric, config, job)
         first = TriangleMesh(body.keyframes[0], body.faces)
         state = phases.free(at_rest(garment.mesh.vertices))
-        if level in (0, len(self._coarser)):  # between the two, what cuts the body without a vertex in it is no matter
+        if level == len(self._coarser):  # the others start outside the body, but for corners that edges have cut
             state = phases.free(phases.grow(state, first), first)
         collider = phases.collider(body, TriangleMesh(state.positions, model.faces))
         stepper = phases.stepper(model, collider, config.damping)
