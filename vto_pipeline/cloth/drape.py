@@ -9,11 +9,10 @@ import numpy as np
 
 from vto_pipeline.cloth.audit import audit
 from vto_pipeline.cloth.balance import elastic_energy
-from vto_pipeline.cloth.build import at_rest, build
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.judge.balance import knows
+from vto_pipeline.cloth.levels import come_to_rest
 from vto_pipeline.cloth.pace import covered_way
-from vto_pipeline.cloth.phases import Phases
 from vto_pipeline.cloth.place import put
 from vto_pipeline.cloth.reshape import reshape
 from vto_pipeline.cloth.settings import checked
@@ -73,21 +72,13 @@ def drape(
     deadline = np.inf if config.time_budget_s is None else began + config.time_budget_s
 
     garment, body = _begin(garment, body, config, job)
-    mesh, start = garment.mesh, TriangleMesh(body.keyframes[0], body.faces)
-    model = build(mesh, garment.rest, fabric, materials=config, job=job)
-    phases = Phases(model, garment.rest, fabric, config, job)
-    state = phases.free(at_rest(mesh.vertices))
+    mesh = garment.mesh
     try:
-        state = phases.free(phases.grow(state, start), start)
-        collider = phases.collider(body, TriangleMesh(state.positions, model.faces))
-        stepper = phases.stepper(model, collider, config.damping)
-        stepper.prepare(state.positions)
-        job.note(f"{stepper.choice.method}, {stepper.substeps} steps per 1/60 s: {stepper.choice.reason}")
-        state = phases.ride(state, stepper, collider, body.final)
-        settling = phases.settle(state, stepper, body.final, deadline)
+        reached = come_to_rest(garment, body, fabric, config, job, deadline)
     except DivergedError as error:
         error.partial["draped"] = mesh
         raise
+    model, stepper, settling = reached.model, reached.stepper, reached.settling
     state = settling.state
     draped = TriangleMesh(state.positions, model.faces, mesh.colors)
     findings = {
@@ -106,7 +97,7 @@ def drape(
         **warn_if_too_small(draped, garment.rest, config.stretch_limit, job),
     }
     error_mm = 1e3 * settling.error if np.isfinite(settling.error) else None
-    phases.account()
+    reached.phases.account()
     job.measure(seconds=time.perf_counter() - began, steps=stepper.steps, error_mm=error_mm, **findings)
     if not settling.settled:
         job.warn(

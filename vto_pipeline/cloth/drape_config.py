@@ -31,6 +31,9 @@ class DrapeConfig(StepConfig, PlaceConfig, Materials):
     grow_above_mm: float = Field(
         10.0, ge=0, le=1000, description="Cloth that starts deeper in the body than this has it grow from inside [mm]"
     )
+    coarsen_above: int = Field(
+        4000, ge=100, description="A garment of more vertices comes to rest on a mesh of a quarter as many first"
+    )
     damping: float = Field(5.0, ge=0, le=1000, description="Rate at which velocities fade [1/s]")
     max_speed: float = Field(1.0, gt=0, le=1000, description="No vertex moves faster [m/s]")
     target_error_mm: float = Field(0.5, gt=0, le=100, description="Predicted motion at which it is at rest, rms [mm]")

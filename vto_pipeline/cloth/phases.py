@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +25,9 @@ from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
-_NEARLY = 10.0  # times the bounds of rest: near enough to see where the cloth lies across the body
+NEARLY = 10.0
+"""Times the bounds of rest: near enough to see where the cloth lies across the body, or for a finer mesh to go on."""
+
 _TURNS = 5  # of coming to rest and being cleared
 _LONG = 0.5  # steps per 1/60 s on the way to rest: backward Euler takes the more motion out, the longer they are
 _CALM = 20.0  # 1/s: velocities fade this fast while the body grows, where the way does not matter
@@ -112,8 +115,23 @@ class Phases:
         )
         return self.free(state, body)
 
-    def settle(self, state: ClothState, stepper: Stepper, body: TriangleMesh, deadline: float) -> Settling:
-        """Return the cloth at rest and clear of the body, or as near to it as allowed."""
+    def settle(
+        self,
+        state: ClothState,
+        stepper: Stepper,
+        body: TriangleMesh,
+        deadline: float,
+        bounds: Sequence[float] = (NEARLY, 1.0),
+    ) -> Settling:
+        """Return the cloth at rest and clear of the body, or as near to it as allowed.
+
+        Args:
+            state: Where to begin.
+            stepper: The cloth among its colliders.
+            body: Where it is now.
+            deadline: `time.perf_counter` at which to stop.
+            bounds: Times those of rest, for each coming to rest; what was pushed off the body does so again.
+        """
 
         def watch(done: float, error: float) -> None:
             known = f"{1e3 * error:.2f} mm to come" if np.isfinite(error) else "falling into place"
@@ -129,18 +147,18 @@ class Phases:
         stepper.prepare(state.positions)
         if self._config.substeps is None and stepper.rests_exactly:
             stepper.substeps = min(stepper.substeps, _LONG)
-        bounds = replace(limits, error=_NEARLY * limits.error, residual=_NEARLY * limits.residual)
         trace: list[TraceRow] = []
-        for _ in range(_TURNS):
-            settling = settle(stepper, state, bounds, watch)
+        for turn in range(_TURNS):
+            times = bounds[min(turn, len(bounds) - 1)]
+            enough = replace(limits, error=times * limits.error, residual=times * limits.residual)
+            settling = settle(stepper, state, enough, watch)
             spent = trace[-1].seconds if trace else 0.0
             trace += [replace(row, seconds=spent + row.seconds) for row in settling.trace]
             state = self._cleared(settling.state, stepper, body)
             lies_clear = state is settling.state
             settling.state, settling.trace = state, trace
-            if lies_clear and bounds is limits:
+            if lies_clear and turn + 1 >= len(bounds):
                 break
-            bounds = limits  # what was pushed off the body comes to rest, too
         return settling
 
     def _cleared(self, state: ClothState, stepper: Stepper, body: TriangleMesh) -> ClothState:

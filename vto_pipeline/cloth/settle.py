@@ -92,7 +92,9 @@ def settle(
         if not exact:
             result.error += np.inf if coarse is None else _rms(result.state.positions - coarse) / 3.0
         result.residual = stepper.residual(result.state)
-        result.trace.append(TraceRow(time.perf_counter() - began, stepper.steps, 1e3 * result.error, result.residual))
+        seconds = time.perf_counter() - began
+        row = TraceRow(seconds, stepper.steps, 1e3 * result.error, result.residual, contacts=stepper.bearing)
+        result.trace.append(row)
         watch((result.state.time - state.time) / limits.seconds, result.error)
         first = coarse is None and not exact
         bound = _COARSE * limits.error if first else (1.0 if exact else 0.5) * limits.error

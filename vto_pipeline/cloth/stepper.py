@@ -176,6 +176,11 @@ class Stepper:
         """Whether the state of rest does not depend on the length of steps; after `prepare`."""
         return getattr(self._method, "rests_exactly", True)
 
+    @property
+    def bearing(self) -> int:
+        """How many contacts pushed in the last step, as far as the method counts them."""
+        return getattr(self._method, "bearing", 0)
+
     def _speed(self, state: ClothState) -> float:
         return float(np.abs(state.velocities).max() * np.sqrt(3.0))  # a bound, which does not overflow
 

@@ -11,7 +11,7 @@ from vto_pipeline.errors import FormatError
 from vto_pipeline.io.files import check_file, replacing
 from vto_pipeline.model.cloth import TraceRow
 
-_COLUMNS = ("seconds", "step", "error_mm", "residual")
+_COLUMNS = ("seconds", "step", "error_mm", "residual", "level", "contacts")
 _LIMIT_BYTES = 100_000_000
 
 
@@ -20,7 +20,10 @@ def write_trace(path: Path, trace: Sequence[TraceRow]) -> None:
     stream = io.StringIO()
     table = csv.writer(stream, lineterminator="\n")
     table.writerow(_COLUMNS)
-    table.writerows((float(row.seconds), int(row.step), float(row.error_mm), float(row.residual)) for row in trace)
+    table.writerows(
+        (float(row.seconds), int(row.step), float(row.error_mm), float(row.residual), int(row.level), int(row.contacts))
+        for row in trace
+    )
     with replacing(path) as beside:
         beside.write_text(stream.getvalue(), encoding="utf-8")
 
@@ -36,6 +39,6 @@ def read_trace(path: Path) -> tuple[TraceRow, ...]:
     try:
         if tuple(header) != _COLUMNS:
             raise ValueError(f"columns {header}")
-        return tuple(TraceRow(float(s), int(n), float(e), float(r)) for s, n, e, r in rows)
+        return tuple(TraceRow(float(s), int(n), float(e), float(r), int(k), int(c)) for s, n, e, r, k, c in rows)
     except ValueError as e:
         raise FormatError(f"not a trace: {e}", where=str(path)) from None

@@ -14,16 +14,20 @@ class TraceRow:
     """One line of a drape's error against run time.
 
     Args:
-        seconds: Wall time since the first step [s].
-        step: Steps taken.
-        error_mm: Predicted distance to the state of rest [mm].
+        seconds: Wall time since the drape began [s].
+        step: Steps taken on this mesh.
+        error_mm: Predicted distance to the state of rest of this mesh [mm].
         residual: Out-of-balance force, rms over vertices, as a share of a vertex's weight.
+        level: 0 on the garment's own mesh, 1 on the next coarser one, and so on.
+        contacts: That pushed in the last step, where the method counts them.
     """
 
     seconds: float
     step: int
     error_mm: float
     residual: float
+    level: int = 0
+    contacts: int = 0
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from vto_pipeline.numerics.elimination import BINS, Elimination
 _SIDE_BY_SIDE = 4e6  # flops; with less, starting the threads costs more than they save
 _TALL = 192  # rows that a front passes on; with more, all threads share it
 _STRIP = 16  # of those rows, that a thread takes at a time
+_ROWS = 4  # that are reduced together
 
 
 class Factor(NamedTuple):
@@ -149,33 +150,65 @@ def _scatter(source, within, first, target, shift):
 @njit(cache=True, error_model="numpy")
 def _eliminate(panel):
     """Factor the columns of a front, in place: row p becomes column p of the factor."""
-    for q in range(len(panel)):
-        target = panel[q, q:]
-        _subtract(panel, q, q, target)
-        if not target[0] > 0.0:
-            return False
-        inverse = 1.0 / sqrt(target[0])
-        for i in range(len(target)):
-            target[i] *= inverse
+    wide = len(panel)
+    for first in range(0, wide, _ROWS):
+        last = min(first + _ROWS, wide)
+        _subtract(panel, first, panel, first, last, 0)
+        for q in range(first, last):
+            target = panel[q, q:]
+            for p in range(first, q):
+                _subtract_one(panel[p, q:], target)
+            if not target[0] > 0.0:
+                return False
+            inverse = 1.0 / sqrt(target[0])
+            for i in range(len(target)):
+                target[i] *= inverse
     return True
 
 
 @njit(cache=True, error_model="numpy")
-def _subtract(panel, count, q, target):
-    """Subtract from row q of a front, from its diagonal on, what the first columns of the factor make of it."""
+def _subtract(panel, count, rows, first, last, shift):
+    """Subtract from at most _ROWS rows of a front, from the diagonal of the first on, what some pivots make of them.
+
+    Args:
+        panel: The pivots' rows.
+        count: Of pivots.
+        rows: Where the rows lie.
+        first, last: Which of them.
+        shift: Columns of the front before those of `rows`.
+    """
     p = 0
-    while p + 4 <= count:  # four at a time: the target is read and written less often
-        one, two, three, four = panel[p, q:], panel[p + 1, q:], panel[p + 2, q:], panel[p + 3, q:]
-        a, b, c, d = one[0], two[0], three[0], four[0]
-        for i in range(len(target)):
-            target[i] -= a * one[i] + b * two[i] + c * three[i] + d * four[i]
-        p += 4
-    while p < count:
-        one = panel[p, q:]
-        a = one[0]
-        for i in range(len(target)):
-            target[i] -= a * one[i]
-        p += 1
+    q = shift + first
+    if last - first == _ROWS:  # four by four, so that each number that is read serves four times
+        r, s, t, u = rows[first, first:], rows[first + 1, first:], rows[first + 2, first:], rows[first + 3, first:]
+        while p + 4 <= count:
+            _subtract_four(panel[p, q:], panel[p + 1, q:], panel[p + 2, q:], panel[p + 3, q:], r, s, t, u)
+            p += 4
+    for k in range(first, last):
+        for rest in range(p, count):
+            _subtract_one(panel[rest, shift + k :], rows[k, k:])
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _subtract_four(one, two, three, four, r, s, t, u):
+    """Subtract from rows r to u the products of pivots one to four; contracting a product and a sum loses nothing."""
+    r1, r2, r3, r4 = one[0], two[0], three[0], four[0]
+    s1, s2, s3, s4 = one[1], two[1], three[1], four[1]
+    t1, t2, t3, t4 = one[2], two[2], three[2], four[2]
+    u1, u2, u3, u4 = one[3], two[3], three[3], four[3]
+    for i in range(len(r)):
+        a, b, c, d = one[i], two[i], three[i], four[i]
+        r[i] -= r1 * a + r2 * b + r3 * c + r4 * d
+        s[i] -= s1 * a + s2 * b + s3 * c + s4 * d
+        t[i] -= t1 * a + t2 * b + t3 * c + t4 * d
+        u[i] -= u1 * a + u2 * b + u3 * c + u4 * d
+
+
+@njit(cache=True, error_model="numpy")
+def _subtract_one(one, target):
+    a = one[0]
+    for i in range(len(target)):
+        target[i] -= a * one[i]
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
@@ -192,8 +225,8 @@ def _pass_on_parallel(panel, rest):
 def _pass_on(panel, rest, begin, end):
     """Subtract from some rows of what is passed on the products of the eliminated columns."""
     wide = len(panel)
-    for j in range(begin, end):
-        _subtract(panel, wide, wide + j, rest[j, j:])
+    for first in range(begin, end, _ROWS):
+        _subtract(panel, wide, rest, first, min(first + _ROWS, end), wide)
 
 
 @njit(cache=True, error_model="numpy")

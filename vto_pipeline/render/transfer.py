@@ -1,45 +1,12 @@
-"""The render mesh rides on the simulation mesh.
-
-A vertex is bound to the nearest triangle that faces the same way, at barycentric coordinates, and at a height along the
-interpolated vertex normal. What that leaves over (at the rim, where the projection falls outside) is kept in the
-frame of the triangle and turns with it, so the rest pose gives the render mesh back exactly.
-"""
+"""The render mesh rides on the simulation mesh."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-import numpy as np
-
-from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import face_normals, vertex_normals
-from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.geometry import binding
+from vto_pipeline.geometry.binding import Binding, apply
 from vto_pipeline.model.mesh import TriangleMesh
 
-_FACING = 0.0  # least cosine between the normals of a vertex and its triangle: the other layer of a fold faces away
-
-
-@dataclass(frozen=True)
-class Binding:
-    """Where each render vertex sits on the simulation mesh.
-
-    Args:
-        corners: Simulation vertices of its triangle, shape (R, 3).
-        weights: Barycentric, rows sum to 1, shape (R, 3).
-        height: Along the interpolated vertex normal [m], shape (R,).
-        residual: The rest, in the frame of the triangle [m], shape (R, 3).
-        faces: Of the simulation mesh, shape (F, 3).
-        count: Vertices of the simulation mesh.
-        turned_away: Render vertices for which no triangle near by faces the same way.
-    """
-
-    corners: IntArray
-    weights: FloatArray
-    height: FloatArray
-    residual: FloatArray
-    faces: IntArray
-    count: int
-    turned_away: int
+__all__ = ["Binding", "apply", "bind"]
 
 
 def bind(render_mesh: TriangleMesh, sim_mesh: TriangleMesh) -> Binding:
@@ -49,78 +16,4 @@ def bind(render_mesh: TriangleMesh, sim_mesh: TriangleMesh) -> Binding:
         render_mesh: In the pose of `sim_mesh` [m].
         sim_mesh: What will move.
     """
-    points, normals = render_mesh.vertices, vertex_normals(render_mesh)
-    face = SurfaceDistance(sim_mesh).nearest(points).face
-    away = np.einsum("ij,ij->i", normals, face_normals(sim_mesh)[face]) < _FACING
-    face, turned_away = _facing_faces(face, away, points, normals, sim_mesh)
-    corners = sim_mesh.faces[face]
-    weights = _barycentric(points, sim_mesh.vertices[corners])
-    surface, up = _on_surface(sim_mesh.vertices, vertex_normals(sim_mesh), corners, weights)
-    height = np.einsum("ij,ij->i", points - surface, up)
-    left = points - surface - height[:, None] * up
-    frames = _frames(sim_mesh.vertices[corners])
-    residual = np.einsum("nij,nj->ni", frames, left)
-    return Binding(corners, weights, height, residual, sim_mesh.faces, len(sim_mesh.vertices), turned_away)
-
-
-def apply(binding: Binding, positions: FloatArray) -> FloatArray:
-    """Return the render vertices [m], shape (R, 3), for simulated positions [m], shape (V, 3)."""
-    normals = vertex_normals(TriangleMesh(positions, binding.faces))
-    surface, up = _on_surface(positions, normals, binding.corners, binding.weights)
-    frames = _frames(positions[binding.corners])
-    left = np.einsum("nij,ni->nj", frames, binding.residual)
-    return surface + binding.height[:, None] * up + left
-
-
-def _facing_faces(
-    face: IntArray, away: np.ndarray, points: FloatArray, normals: FloatArray, sim: TriangleMesh
-) -> tuple[IntArray, int]:
-    """Return for each vertex whose nearest face looks away the nearest one that does not, and how many have none."""
-    from scipy.spatial import cKDTree
-
-    if not away.any():
-        return face, 0
-    facing = face_normals(sim)
-    centres = sim.vertices[sim.faces].mean(axis=1)
-    _, near = cKDTree(centres).query(points[away], k=min(32, len(centres)))
-    near = near.reshape(int(away.sum()), -1)
-    fits = np.einsum("nkj,nj->nk", facing[near], normals[away]) >= _FACING
-    found = near[np.arange(len(near)), fits.argmax(axis=1)]
-    face = face.copy()
-    face[away] = np.where(fits.any(axis=1), found, face[away])
-    return face, int((~fits.any(axis=1)).sum())
-
-
-def _barycentric(points: FloatArray, corners: FloatArray) -> FloatArray:
-    """Return the weights of the point of each triangle (R, 3, 3) nearest in its plane, kept inside, shape (R, 3)."""
-    a, ab, ac = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    ap = points - a
-    aa, bb, cc = _dot(ab, ab), _dot(ab, ac), _dot(ac, ac)
-    p, q = _dot(ab, ap), _dot(ac, ap)
-    det = np.maximum(aa * cc - bb * bb, 1e-300)
-    v, w = (cc * p - bb * q) / det, (aa * q - bb * p) / det
-    weights = np.clip(np.column_stack([1.0 - v - w, v, w]), 0.0, None)
-    return weights / weights.sum(axis=1, keepdims=True)
-
-
-def _on_surface(
-    positions: FloatArray, normals: FloatArray, corners: IntArray, weights: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the surface point and the unit interpolated normal at the weights, shape (R, 3) each."""
-    surface = np.einsum("nk,nkj->nj", weights, positions[corners])
-    up = np.einsum("nk,nkj->nj", weights, normals[corners])
-    length = np.linalg.norm(up, axis=1, keepdims=True)
-    return surface, np.divide(up, length, out=np.zeros_like(up), where=length > 0.0)
-
-
-def _frames(corners: FloatArray) -> FloatArray:
-    """Return an orthonormal frame of each triangle (R, 3, 3), rows: first edge, in-plane, normal."""
-    along = corners[:, 1] - corners[:, 0]
-    normal = np.cross(along, corners[:, 2] - corners[:, 0])
-    along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
-    normal = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    return np.stack([along, np.cross(normal, along), normal], axis=1)
-
-
-def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
-    return np.einsum("ij,ij->i", a, b)
+    return binding.bind(render_mesh, sim_mesh)

@@ -51,6 +51,7 @@ _SHORTEST = 1e-10  # share of a Newton step: from a point, cloth begins to grow 
 _ROUNDING = 1e-9  # relative change of the objective that is no change
 _CONTACT_ROUNDS = 20  # solutions with a revised set of contacts, an iteration, at most
 _CHANGED = 0.05  # of the contact forces: amiss by less, their set is good enough
+_FEW = 4.0  # contacts' mean force, amiss: with more, what lies on a fine mesh breaks loose in the next step
 _EXTENSIONS = 2  # times an iteration is solved again with what it would have passed through
 _CROSSED = 0.01  # of an edge: how far a plane may be crossed without solving again
 
@@ -120,6 +121,11 @@ class Newton:
                 self.self_contact.at(state.time + step * h, state.time + (step + 1) * h)
             self._step(x, v, contacts, step / substeps, (step + 1) / substeps, h)
         return ClothState(x, v, state.time + substeps * h, remember(self._model))
+
+    @property
+    def bearing(self) -> int:
+        """How many contacts pushed in the last step."""
+        return int(self._active.pushing.sum())
 
     def _step(self, x: FloatArray, v: FloatArray, contacts: Contacts, t0: float, t1: float, h: float) -> None:
         model, held = self._model, self._held
@@ -221,6 +227,7 @@ class Newton:
         elif self._sweeps > 1:  # who asks for more wants to get to the end
             self._whole = forces
         bare = matrix.blocks[matrix.diagonal]
+        good = _CHANGED
         move, pushes, changed = guess.copy(), (0.0, 0.0, 0.0), 0.0
         rounds, extensions = _CONTACT_ROUNDS, _EXTENSIONS
         while True:
@@ -237,9 +244,10 @@ class Newton:
             if touches:
                 pushes = tuple(contact_energy(self._active, x, y + share * move) for share in (0.0, 0.5, 1.0))
                 changed = revise(self._active, x, y + move, _CROSSED * model.edge_length)
-            if changed >= _CHANGED and rounds > 0:
+                good = min(_CHANGED, _FEW / max(self.bearing, 1))
+            if changed >= good and rounds > 0:
                 continue
-            if changed >= _CHANGED or extensions == 0 or not self._take_on(x, y + move):
+            if changed >= good or extensions == 0 or not self._take_on(x, y + move):
                 break
             extensions -= 1
             rounds = max(rounds, 1)
