@@ -16,6 +16,7 @@ from vto_pipeline.avatar.scan_report import CORE, check, ends, report
 from vto_pipeline.avatar.scan_start import Start, upright_starts
 from vto_pipeline.avatar.settle import part_thighs, settle
 from vto_pipeline.avatar.shape import SEX_SHARE, ShapeSpace, shape_space
+from vto_pipeline.avatar.slide import slide
 from vto_pipeline.avatar.stance import stance
 from vto_pipeline.avatar.upright import in_metres
 from vto_pipeline.model.arrays import FloatArray
@@ -24,12 +25,12 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
 
-_FINER = 3
-"""So many times more points of the scan are used while displacing."""
 _UNDER_CLOTHES = 0.1
 """What a point outside the body counts there: the cloth's inmost places lie on the body, the others off it."""
 _CLOTHED_STIFFNESS = 2
 """How many of the displacement's stiffnesses are gone through there: folds are not the body's."""
+_UNLIKE = {"wrist": 1.0, "ankle": 0.9}
+"""How little of the scan is followed beyond these joints: our hands are mittens and our feet have no toes."""
 _NOISE_SHARE = 0.2
 """Spread that distances are taken to have, as a share of the reach."""
 
@@ -38,7 +39,7 @@ class ScanConfig(Config):
     """Settings of the registration."""
 
     sex: Literal["female", "male", "neutral"] = Field(default="neutral", description="whose mean body to begin with")
-    probes: int = Field(default=3000, ge=500, le=50_000, description="scan points used while fitting pose and shape")
+    probes: int = Field(default=10_000, ge=500, le=100_000, description="points of the scan that the body is fitted to")
     iterations: int = Field(default=20, ge=5, le=200, description="Gauss-Newton steps over pose and shape")
     reach_mm: float = Field(
         default=60.0, gt=0, le=300, description="distance at which a point begins to count little, at first [mm]"
@@ -80,16 +81,17 @@ def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | No
     scores = [_score(space, target, fit) for fit in tries]
     fit = _pose_and_shape(space, target, tries[int(np.argmin(scores))], config, job, steps=config.iterations)
     job.progress(0.6, "displace the body onto the scan")
-    fine = Target(kept, _FINER * config.probes, job.seed, outside)
-    vertices = _displaced(space, fit, fine, config)
+    vertices = _displaced(space, fit, target, part_thighs(space, fit, model(space, fit)), config)
     check(kept, space, vertices, config.max_mean_mm)
     stands = stance(space, fit)
     if stands.stands:
         job.progress(0.75, "find the body's own levels")
         upright = (vertices - stands.translation) @ stands.yaw
-        space = with_rows_at(space, fit.parameters, upright, find_levels(upright, space.base))
+        levelled = with_rows_at(space, fit.parameters, upright, find_levels(upright, space.base))
+        risen = slide(vertices, space.base.faces, levelled.base.bind_vertices - space.base.bind_vertices)
+        space = levelled
         stands = stance(space, fit)
-        vertices = _displaced(space, fit, fine, config)
+        vertices = _displaced(space, fit, target, risen, config)
     else:
         job.warn(
             f"the body does not stand: a part of it leans {np.rad2deg(stands.lean):.0f} degrees; its "
@@ -107,12 +109,11 @@ def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | No
     return body
 
 
-def _displaced(space: ShapeSpace, fit: Fit, target: Target, config: ScanConfig) -> FloatArray:
-    posed = part_thighs(space, fit, model(space, fit))
-    hands = [k for k, name in enumerate(space.base.joint_names) if name.endswith("wrist")]
-    trust = 1 - space.base.weights[:, hands].sum(axis=1)
+def _displaced(space: ShapeSpace, fit: Fit, target: Target, start: FloatArray, config: ScanConfig) -> FloatArray:
+    unlike = np.array([_UNLIKE.get(name.rpartition("_")[2], 0.0) for name in space.base.joint_names])
+    trust = 1 - space.base.weights @ unlike
     stiffness = config.stiffness[:_CLOTHED_STIFFNESS] if config.clothed else config.stiffness
-    vertices = displace(target, posed, space.base.faces, trust, stiffness, config.rounds)
+    vertices = displace(target, start, space.base.faces, trust, ends(space) < CORE, stiffness, config.rounds)
     return part_thighs(space, fit, vertices)
 
 
