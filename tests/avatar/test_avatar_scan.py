@@ -19,7 +19,7 @@ from vto_pipeline.avatar.scan_start import upright_starts
 from vto_pipeline.avatar.settle import settle
 from vto_pipeline.avatar.shape import shape_space
 from vto_pipeline.avatar.stance import ARM, stance
-from vto_pipeline.avatar.template import membership
+from vto_pipeline.avatar.template import beyond_armscye, membership
 from vto_pipeline.avatar.upright import in_metres, turns_upright, without_floor
 from vto_pipeline.bench.body.people import cloud_of, person
 from vto_pipeline.errors import AvatarError
@@ -30,6 +30,7 @@ from vto_pipeline.scan.surface import SurfaceConfig, reconstruct_cloud
 
 BODIES = Path(__file__).parents[3] / "shared" / "data" / "bodies"
 YAW = 2.1
+TRUNK = ("chest", "underbust", "waist", "navel", "hip")
 QUICK = ScanConfig(probes=2000, iterations=12)
 
 
@@ -63,7 +64,7 @@ def girths_at_levels(fitted: Avatar, truth: np.ndarray, faces: np.ndarray) -> di
     ahead = truth @ Rotation.from_rotvec(fitted.pose[0].copy()).as_matrix()  # so that arms lie beside the trunk in x
     middle = float(np.median(ahead[:, 0]))
     wrong = {}
-    for row in ("chest", "underbust", "waist", "navel", "hip"):
+    for row in TRUNK:
         height = float(fitted.vertices[fitted.loops[row], 1].mean())
         wrong[row] = read[f"{row}_girth"] - independent_girth(ahead, faces, height, middle)
     return wrong
@@ -240,7 +241,13 @@ def test_own_bodies_are_found_again(sex: str, seed: int) -> None:
     away = distances(on_body[core], fitted.vertices, fitted.faces)
     assert 0.2e-3 < away.mean() < 1.0e-3
     assert np.quantile(away, 0.95) < 2.5e-3
-    wrong = girths_at_levels(fitted, body.vertices, body.faces)
+    trunk = body.faces[~beyond_armscye()[body.faces].any(axis=1)]  # some stand with their arms on the chest
+    read = measure(fitted).values
+    wrong = {
+        row: read[f"{row}_girth"]
+        - independent_girth(body.vertices, trunk, float(fitted.vertices[fitted.loops[row], 1].mean()), None)
+        for row in TRUNK
+    }
     assert max(map(abs, wrong.values())) < 3e-3, wrong
 
 

@@ -17,9 +17,9 @@ from vto_pipeline.model.mesh import TriangleMesh
 _FIRST_REACH_M, _LAST_REACH_M = 0.03, 0.008
 _MAX_MOVE_M = 0.01
 _HOLD = 1e-4
-_NOISE_LIKENESS = 0.1
+_NOISE_LIKENESS = 0.05
 """Where neighbouring points of the scan err together less than this, what is left is noise."""
-_UNTANGLE_ROUNDS, _SMOOTH_ONLY = 40, 10
+_UNTANGLE_ROUNDS, _SMOOTH_ONLY, _WIDER = 40, 10, 5
 _GIVE_BACK = 0.8
 
 
@@ -31,8 +31,8 @@ def displace(
     judged: NDArray[np.bool_],
     stiffness: tuple[float, ...],
     rounds: int,
-) -> FloatArray:
-    """Return the vertices moved onto the scan, shape (V, 3).
+) -> tuple[FloatArray, float]:
+    """Return the vertices moved onto the scan, shape (V, 3), and the stiffness at which only noise was left.
 
     Minimises the distances along the normals, in both directions, plus stiffness times the squared Laplacian of the
     whole displacement. Moving along normals only keeps the vertices from sliding over each other. The stiffness falls
@@ -57,7 +57,7 @@ def displace(
             reach = max(0.9 * reach, _LAST_REACH_M)
         if _left_over(target, vertices, faces, judged) < _NOISE_LIKENESS:
             break
-    return vertices
+    return vertices, weight
 
 
 def _step(
@@ -118,11 +118,10 @@ def untangle(start: FloatArray, vertices: FloatArray, faces: IntArray) -> tuple[
             break
         touched = np.zeros(len(vertices))
         touched[faces[bad].ravel()] = 1.0
-        for _ in range(2 + turn // _SMOOTH_ONLY):
+        for _ in range(turn // _WIDER):  # where little did not help, around it too
             touched = np.sign(near @ touched)
         inside = touched > 0
-        for _ in range(5):
-            moved[inside] -= 0.5 * (laplace @ moved)[inside]
+        moved[inside] -= 0.5 * (laplace @ moved)[inside]
         if turn >= _SMOOTH_ONLY:  # smooth already: go back towards the start
             moved[inside] *= _GIVE_BACK
     return start + moved, len(bad)

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
+from vto_pipeline.avatar.bust import toward_bust_points
 from vto_pipeline.avatar.correspondence import Target, closest_points
 from vto_pipeline.avatar.displacement import displace
 from vto_pipeline.avatar.levels import find_levels, with_rows_at
@@ -81,17 +82,24 @@ def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | No
     scores = [_score(space, target, fit) for fit in tries]
     fit = _pose_and_shape(space, target, tries[int(np.argmin(scores))], config, job, steps=config.iterations)
     job.progress(0.6, "displace the body onto the scan")
-    vertices = _displaced(space, fit, target, part_thighs(space, fit, model(space, fit)), config)
+    stiffness = config.stiffness[:_CLOTHED_STIFFNESS] if config.clothed else config.stiffness
+    posed = part_thighs(space, fit, model(space, fit))
+    vertices, softest = _displaced(space, fit, target, posed, stiffness, config.rounds)
     check(kept, space, vertices, config.max_mean_mm)
     stands = stance(space, fit)
     if stands.stands:
         job.progress(0.75, "find the body's own levels")
         upright = (vertices - stands.translation) @ stands.yaw
-        levelled = with_rows_at(space, fit.parameters, upright, find_levels(upright, space.base))
-        risen = slide(vertices, space.base.faces, levelled.base.bind_vertices - space.base.bind_vertices)
+        found = find_levels(upright, space.base)
+        levelled = with_rows_at(space, fit.parameters, upright, found)
+        shift = (levelled.base.bind_vertices - space.base.bind_vertices) @ stands.yaw.T
+        if "chest" in found:
+            seen = (kept.vertices - stands.translation) @ stands.yaw
+            shift += toward_bust_points(upright + shift @ stands.yaw, seen, space.base) @ stands.yaw.T
+        risen = slide(vertices, space.base.faces, shift)
         space = levelled
         stands = stance(space, fit)
-        vertices = _displaced(space, fit, target, risen, config)
+        vertices, _ = _displaced(space, fit, target, risen, (softest,), config.rounds)
     else:
         job.warn(
             f"the body does not stand: a part of it leans {np.rad2deg(stands.lean):.0f} degrees; its "
@@ -109,12 +117,13 @@ def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | No
     return body
 
 
-def _displaced(space: ShapeSpace, fit: Fit, target: Target, start: FloatArray, config: ScanConfig) -> FloatArray:
+def _displaced(
+    space: ShapeSpace, fit: Fit, target: Target, start: FloatArray, stiffness: tuple[float, ...], rounds: int
+) -> tuple[FloatArray, float]:
     unlike = np.array([_UNLIKE.get(name.rpartition("_")[2], 0.0) for name in space.base.joint_names])
     trust = 1 - space.base.weights @ unlike
-    stiffness = config.stiffness[:_CLOTHED_STIFFNESS] if config.clothed else config.stiffness
-    vertices = displace(target, start, space.base.faces, trust, ends(space) < CORE, stiffness, config.rounds)
-    return part_thighs(space, fit, vertices)
+    vertices, softest = displace(target, start, space.base.faces, trust, ends(space) < CORE, stiffness, rounds)
+    return part_thighs(space, fit, vertices), softest
 
 
 def _pose_and_shape(

@@ -149,7 +149,9 @@ def _links(body: Avatar, row: str) -> IntArray:
     side = row.partition("_")[0]
     inside = membership("arm") < 0.5
     if side in ("left", "right"):
-        inside = (membership("leg") > _LEG) & (body.bind_vertices[body.loops[row], 0].mean() * body.bind_vertices[:, 0] >= 0)
+        inside = (membership("leg") > _LEG) & (
+            body.bind_vertices[body.loops[row], 0].mean() * body.bind_vertices[:, 0] >= 0
+        )
     links = edges(TriangleMesh(body.bind_vertices, body.faces))
     return links[inside[links].all(axis=1)].astype(np.int32)
 

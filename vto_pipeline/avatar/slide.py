@@ -9,7 +9,8 @@ from vto_pipeline.geometry.topology import vertex_normals
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 
-_ROUND = 0.75
+_ROUND = 0.5
+"""Where an edge's ends lie on a circle, half the way to their tangents is the circle, to second order."""
 
 
 def slide(vertices: FloatArray, faces: IntArray, shift: FloatArray) -> FloatArray:
