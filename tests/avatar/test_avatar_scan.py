@@ -23,6 +23,7 @@ from vto_pipeline.avatar.template import beyond_armscye, membership
 from vto_pipeline.avatar.upright import in_metres, turns_upright, without_floor
 from vto_pipeline.bench.body.people import cloud_of, person
 from vto_pipeline.errors import AvatarError
+from vto_pipeline.geometry.decimate import decimate
 from vto_pipeline.model.body import Avatar, Measurements
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -265,8 +266,8 @@ def test_real_bodies(name: str) -> None:
     assert not crossing(fitted.vertices, fitted.faces)
     wrong = girths_at_levels(fitted, mesh.vertices, mesh.faces)
     assert max(abs(wrong[row]) for row in ("underbust", "waist", "navel", "hip")) < 4e-3, wrong
-    # a bare nipple is narrower than an edge of ours, and a slice that hits it is up to 10 mm longer
-    assert abs(wrong["chest"]) < 11e-3
+    # a bare nipple is narrower than an edge of ours: one vertex stands on it, and a slice that hits it is longer still
+    assert abs(wrong["chest"]) < 6e-3
 
 
 @pytest.mark.slow
@@ -284,3 +285,16 @@ def test_facing_unit_axis_and_floor_do_not_matter() -> None:
     for name in plain:
         if name.endswith("_girth"):
             assert_allclose(again[name], plain[name], rtol=0, atol=1e-3, err_msg=name)
+
+
+@pytest.mark.slow
+@pytest.mark.real_data
+@pytest.mark.skipif(not BODIES.exists(), reason="shared data absent")
+def test_a_quarter_of_the_faces_will_do() -> None:
+    """The levels come from smoothed profiles, so that fewer facets do not move the tape."""
+    mesh = trimesh.load(BODIES / "mh_female_averageweight.ply", process=False)
+    whole = TriangleMesh(mesh.vertices, mesh.faces)
+    plain = measure(fit_scan(whole)).values
+    coarse = measure(fit_scan(decimate(whole, len(whole.faces) // 4, aggressiveness=5.0))).values
+    for row in (*TRUNK, "neck", "upper_arm", "forearm", "wrist", "thigh"):
+        assert_allclose(coarse[f"{row}_girth"], plain[f"{row}_girth"], rtol=0, atol=1e-3, err_msg=row)
