@@ -74,7 +74,7 @@ def test_bust_points_come_to_the_tips(body: Avatar) -> None:
     """A bump of 5 mm on a radius of 6 mm, between the vertices: a vertex is brought there."""
     at = body.bind_vertices[body.landmarks["left_bust_point"]]
     fine = trimesh.Trimesh(body.bind_vertices, body.faces, process=False).subdivide().subdivide().subdivide()
-    middle = at + [0.009, 0.006, 0.0]
+    middle = at + np.array([0.009, 0.006, 0.0])
     away = np.linalg.norm((fine.vertices - middle)[:, :2], axis=1)
     front = fine.vertices[:, 2] > at[2] - 0.03
     fine.vertices += np.outer(front * 0.005 * np.exp(-((away / 0.006) ** 2)), [0.0, 0.0, 1.0])

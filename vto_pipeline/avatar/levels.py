@@ -90,6 +90,8 @@ def find_levels(upright: FloatArray, body: Avatar) -> dict[str, float]:
         seen = [height for height in sides if height is not None]
         if seen:
             found[level.row] = float(np.mean(seen))
+    if "chest" in found:  # the fold under the breasts goes with them, not with the waist
+        found["underbust"] = _height(upright, body, "underbust") + found["chest"] - _height(upright, body, "chest")
     return found
 
 
