@@ -15,9 +15,11 @@ def crossing(vertices: np.ndarray, faces: np.ndarray) -> bool:
     return ipctk.has_intersections(ipctk.CollisionMesh(vertices, edges, faces), vertices)
 
 
-def independent_girth(vertices: np.ndarray, faces: np.ndarray, height: float, near: float) -> float:
-    """Hull of the trimesh section's loop whose middle is nearest to x = near."""
+def independent_girth(vertices: np.ndarray, faces: np.ndarray, height: float, near: float | None) -> float:
+    """Hull of the trimesh section's loop whose middle is nearest to x = near; of the whole section without one."""
     cut = trimesh.Trimesh(vertices, faces, process=False).section([0, 1, 0], [0, height, 0])
+    if near is None:
+        return ConvexHull(cut.vertices[:, [0, 2]]).area
     loop = min(cut.discrete, key=lambda points: abs(points[:, 0].mean() - near))
     return ConvexHull(loop[:, [0, 2]]).area
 

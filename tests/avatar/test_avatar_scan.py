@@ -19,10 +19,11 @@ from vto_pipeline.avatar.scan_start import upright_starts
 from vto_pipeline.avatar.settle import settle
 from vto_pipeline.avatar.shape import shape_space
 from vto_pipeline.avatar.stance import ARM, stance
-from vto_pipeline.avatar.template import membership
+from vto_pipeline.avatar.template import beyond_armscye, membership
 from vto_pipeline.avatar.upright import in_metres, turns_upright, without_floor
 from vto_pipeline.bench.body.people import cloud_of, person
 from vto_pipeline.errors import AvatarError
+from vto_pipeline.geometry.decimate import decimate
 from vto_pipeline.model.body import Avatar, Measurements
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -30,6 +31,7 @@ from vto_pipeline.scan.surface import SurfaceConfig, reconstruct_cloud
 
 BODIES = Path(__file__).parents[3] / "shared" / "data" / "bodies"
 YAW = 2.1
+TRUNK = ("chest", "underbust", "waist", "navel", "hip")
 QUICK = ScanConfig(probes=2000, iterations=12)
 
 
@@ -63,7 +65,7 @@ def girths_at_levels(fitted: Avatar, truth: np.ndarray, faces: np.ndarray) -> di
     ahead = truth @ Rotation.from_rotvec(fitted.pose[0].copy()).as_matrix()  # so that arms lie beside the trunk in x
     middle = float(np.median(ahead[:, 0]))
     wrong = {}
-    for row in ("chest", "underbust", "waist", "navel", "hip"):
+    for row in TRUNK:
         height = float(fitted.vertices[fitted.loops[row], 1].mean())
         wrong[row] = read[f"{row}_girth"] - independent_girth(ahead, faces, height, middle)
     return wrong
@@ -240,7 +242,13 @@ def test_own_bodies_are_found_again(sex: str, seed: int) -> None:
     away = distances(on_body[core], fitted.vertices, fitted.faces)
     assert 0.2e-3 < away.mean() < 1.0e-3
     assert np.quantile(away, 0.95) < 2.5e-3
-    wrong = girths_at_levels(fitted, body.vertices, body.faces)
+    trunk = body.faces[~beyond_armscye()[body.faces].any(axis=1)]  # some stand with their arms on the chest
+    read = measure(fitted).values
+    wrong = {
+        row: read[f"{row}_girth"]
+        - independent_girth(body.vertices, trunk, float(fitted.vertices[fitted.loops[row], 1].mean()), None)
+        for row in TRUNK
+    }
     assert max(map(abs, wrong.values())) < 3e-3, wrong
 
 
@@ -258,8 +266,8 @@ def test_real_bodies(name: str) -> None:
     assert not crossing(fitted.vertices, fitted.faces)
     wrong = girths_at_levels(fitted, mesh.vertices, mesh.faces)
     assert max(abs(wrong[row]) for row in ("underbust", "waist", "navel", "hip")) < 4e-3, wrong
-    # a bare nipple is narrower than an edge of ours, and a slice that hits it is up to 10 mm longer
-    assert abs(wrong["chest"]) < 11e-3
+    # a bare nipple is narrower than an edge of ours: one vertex stands on it, and a slice that hits it is longer still
+    assert abs(wrong["chest"]) < 6e-3
 
 
 @pytest.mark.slow
@@ -277,3 +285,17 @@ def test_facing_unit_axis_and_floor_do_not_matter() -> None:
     for name in plain:
         if name.endswith("_girth"):
             assert_allclose(again[name], plain[name], rtol=0, atol=1e-3, err_msg=name)
+
+
+@pytest.mark.slow
+@pytest.mark.real_data
+@pytest.mark.skipif(not BODIES.exists(), reason="shared data absent")
+@pytest.mark.xfail(strict=True, reason="the navel's girth, between two levels on a steep flank, changes by 1.5 mm")
+def test_a_quarter_of_the_faces_will_do() -> None:
+    """The levels come from smoothed profiles, so that fewer facets do not move the tape."""
+    mesh = trimesh.load(BODIES / "mh_female_averageweight.ply", process=False)
+    whole = TriangleMesh(mesh.vertices, mesh.faces)
+    plain = measure(fit_scan(whole)).values
+    coarse = measure(fit_scan(decimate(whole, len(whole.faces) // 4, aggressiveness=5.0))).values
+    for row in (*TRUNK, "neck", "upper_arm", "forearm", "wrist", "thigh"):
+        assert_allclose(coarse[f"{row}_girth"], plain[f"{row}_girth"], rtol=0, atol=1e-3, err_msg=row)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags
 from scipy.sparse.linalg import splu
 
 from vto_pipeline.avatar.correspondence import Target, barycentric, closest_points, robust
+from vto_pipeline.avatar.likeness import likeness
 from vto_pipeline.geometry.intersections import self_intersections
 from vto_pipeline.geometry.topology import vertex_normals
 from vto_pipeline.model.arrays import FloatArray, IntArray
@@ -15,48 +17,83 @@ from vto_pipeline.model.mesh import TriangleMesh
 _FIRST_REACH_M, _LAST_REACH_M = 0.03, 0.008
 _MAX_MOVE_M = 0.01
 _HOLD = 1e-4
-_UNTANGLE_ROUNDS, _SMOOTH_ONLY = 40, 10
+_NOISE_LIKENESS = 0.05
+"""Where neighbouring points of the scan err together less than this, what is left is noise."""
+_UNTANGLE_ROUNDS, _SMOOTH_ONLY, _WIDER = 40, 10, 5
 _GIVE_BACK = 0.8
 
 
 def displace(
-    target: Target, vertices: FloatArray, faces: IntArray, trust: FloatArray, stiffness: tuple[float, ...], rounds: int
-) -> FloatArray:
-    """Return the vertices moved onto the scan, shape (V, 3).
+    target: Target,
+    vertices: FloatArray,
+    faces: IntArray,
+    trust: FloatArray,
+    judged: NDArray[np.bool_],
+    stiffness: tuple[float, ...],
+    rounds: int,
+) -> tuple[FloatArray, float]:
+    """Return the vertices moved onto the scan, shape (V, 3), and the stiffness at which only noise was left.
 
     Minimises the distances along the normals, in both directions, plus stiffness times the squared Laplacian of the
-    whole displacement. Moving along normals only keeps the vertices from sliding over each other.
+    whole displacement. Moving along normals only keeps the vertices from sliding over each other. The stiffness falls
+    until only noise is left to follow.
 
     Args:
         target: The scan.
         vertices: The posed body [m].
         faces: Its faces.
         trust: How much a vertex may follow the scan, 0 to 1, shape (V,): our hands are mittens and follow no fingers.
+        judged: By which vertices shape is told from noise, shape (V,).
         stiffness: Weights of the Laplacian, falling.
         rounds: Solves at each.
     """
     start, count = vertices, len(vertices)
     laplace = _laplacian(faces, count)
     bend = (laplace.T @ laplace).tocsr()
-    hold = diags(np.full(count, _HOLD))
     reach = _FIRST_REACH_M
-    for weight in np.repeat(stiffness, rounds):
-        facing = vertex_normals(TriangleMesh(vertices, faces))
-        normals = _smooth_normals(facing, laplace)
-        at, toward, pull = target.onto_scan(vertices, facing, reach)
-        along = (normals * toward).sum(axis=1)
-        pull = pull * trust
-        back, missing = _from_probes(target, vertices, faces, normals, trust, reach)
-        moved = vertices - start
-        spread = [diags(normals[:, axis]) for axis in range(3)]
-        stiff = spread[0] @ bend @ spread[0] + spread[1] @ bend @ spread[1] + spread[2] @ bend @ spread[2]
-        drag = (normals * (bend @ moved)).sum(axis=1)
-        system = diags(pull * along**2) + back.T @ back + weight * stiff + hold
-        right = pull * along * ((at - vertices) * toward).sum(axis=1) + back.T @ missing - weight * drag
-        height = splu(system.tocsc()).solve(right - _HOLD * (moved * normals).sum(axis=1))
-        vertices = vertices + np.clip(height, -_MAX_MOVE_M, _MAX_MOVE_M)[:, None] * normals
-        reach = max(0.9 * reach, _LAST_REACH_M)
-    return vertices
+    for weight in stiffness:
+        for _ in range(rounds):
+            vertices = _step(target, start, vertices, faces, trust, laplace, bend, weight, reach)
+            reach = max(0.9 * reach, _LAST_REACH_M)
+        if _left_over(target, vertices, faces, judged) < _NOISE_LIKENESS:
+            break
+    return vertices, weight
+
+
+def _step(
+    target: Target,
+    start: FloatArray,
+    vertices: FloatArray,
+    faces: IntArray,
+    trust: FloatArray,
+    laplace: csr_matrix,
+    bend: csr_matrix,
+    weight: float,
+    reach: float,
+) -> FloatArray:
+    facing = vertex_normals(TriangleMesh(vertices, faces))
+    normals = _smooth_normals(facing, laplace)
+    at, toward, pull = target.onto_scan(vertices, facing, reach)
+    along = (normals * toward).sum(axis=1)
+    pull = pull * trust
+    back, missing = _from_probes(target, vertices, faces, normals, trust, reach)
+    moved = vertices - start
+    spread = [diags(normals[:, axis]) for axis in range(3)]
+    stiff = spread[0] @ bend @ spread[0] + spread[1] @ bend @ spread[1] + spread[2] @ bend @ spread[2]
+    drag = (normals * (bend @ moved)).sum(axis=1)
+    system = diags(pull * along**2 + _HOLD) + back.T @ back + weight * stiff
+    right = pull * along * ((at - vertices) * toward).sum(axis=1) + back.T @ missing - weight * drag
+    height = splu(system.tocsc()).solve(right - _HOLD * (moved * normals).sum(axis=1))
+    stepped: FloatArray = vertices + np.clip(height, -_MAX_MOVE_M, _MAX_MOVE_M)[:, None] * normals
+    return stepped
+
+
+def _left_over(target: Target, vertices: FloatArray, faces: IntArray, judged: NDArray[np.bool_]) -> float:
+    """How alike neighbouring points of the scan err that lie near the judged vertices."""
+    face, closest, distance = closest_points(target.probes, vertices, faces)
+    near = judged[faces[face]].all(axis=1) & (distance < _FIRST_REACH_M)
+    points, normals = target.probes[near], target.probe_normals[near]
+    return likeness(points, normals, ((points - closest[near]) * normals).sum(axis=1))
 
 
 def untangle(start: FloatArray, vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, int]:
@@ -81,11 +118,10 @@ def untangle(start: FloatArray, vertices: FloatArray, faces: IntArray) -> tuple[
             break
         touched = np.zeros(len(vertices))
         touched[faces[bad].ravel()] = 1.0
-        for _ in range(2 + turn // _SMOOTH_ONLY):
+        for _ in range(turn // _WIDER):  # where little did not help, around it too
             touched = np.sign(near @ touched)
         inside = touched > 0
-        for _ in range(5):
-            moved[inside] -= 0.5 * (laplace @ moved)[inside]
+        moved[inside] -= 0.5 * (laplace @ moved)[inside]
         if turn >= _SMOOTH_ONLY:  # smooth already: go back towards the start
             moved[inside] *= _GIVE_BACK
     return start + moved, len(bad)

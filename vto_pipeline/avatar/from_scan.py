@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
+from vto_pipeline.avatar.bust import toward_bust_points
 from vto_pipeline.avatar.correspondence import Target, closest_points
 from vto_pipeline.avatar.displacement import displace
 from vto_pipeline.avatar.levels import find_levels, with_rows_at
@@ -16,6 +17,7 @@ from vto_pipeline.avatar.scan_report import CORE, check, ends, report
 from vto_pipeline.avatar.scan_start import Start, upright_starts
 from vto_pipeline.avatar.settle import part_thighs, settle
 from vto_pipeline.avatar.shape import SEX_SHARE, ShapeSpace, shape_space
+from vto_pipeline.avatar.slide import slide
 from vto_pipeline.avatar.stance import stance
 from vto_pipeline.avatar.upright import in_metres
 from vto_pipeline.model.arrays import FloatArray
@@ -24,12 +26,12 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
 
-_FINER = 3
-"""So many times more points of the scan are used while displacing."""
 _UNDER_CLOTHES = 0.1
 """What a point outside the body counts there: the cloth's inmost places lie on the body, the others off it."""
 _CLOTHED_STIFFNESS = 2
 """How many of the displacement's stiffnesses are gone through there: folds are not the body's."""
+_UNLIKE = {"wrist": 1.0, "ankle": 0.9}
+"""How little of the scan is followed beyond these joints: our hands are mittens and our feet have no toes."""
 _NOISE_SHARE = 0.2
 """Spread that distances are taken to have, as a share of the reach."""
 
@@ -38,7 +40,7 @@ class ScanConfig(Config):
     """Settings of the registration."""
 
     sex: Literal["female", "male", "neutral"] = Field(default="neutral", description="whose mean body to begin with")
-    probes: int = Field(default=3000, ge=500, le=50_000, description="scan points used while fitting pose and shape")
+    probes: int = Field(default=10_000, ge=500, le=100_000, description="points of the scan that the body is fitted to")
     iterations: int = Field(default=20, ge=5, le=200, description="Gauss-Newton steps over pose and shape")
     reach_mm: float = Field(
         default=60.0, gt=0, le=300, description="distance at which a point begins to count little, at first [mm]"
@@ -80,16 +82,24 @@ def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | No
     scores = [_score(space, target, fit) for fit in tries]
     fit = _pose_and_shape(space, target, tries[int(np.argmin(scores))], config, job, steps=config.iterations)
     job.progress(0.6, "displace the body onto the scan")
-    fine = Target(kept, _FINER * config.probes, job.seed, outside)
-    vertices = _displaced(space, fit, fine, config)
+    stiffness = config.stiffness[:_CLOTHED_STIFFNESS] if config.clothed else config.stiffness
+    posed = part_thighs(space, fit, model(space, fit))
+    vertices, softest = _displaced(space, fit, target, posed, stiffness, config.rounds)
     check(kept, space, vertices, config.max_mean_mm)
     stands = stance(space, fit)
     if stands.stands:
         job.progress(0.75, "find the body's own levels")
         upright = (vertices - stands.translation) @ stands.yaw
-        space = with_rows_at(space, fit.parameters, upright, find_levels(upright, space.base))
+        found = find_levels(upright, space.base)
+        levelled = with_rows_at(space, fit.parameters, upright, found)
+        shift = (levelled.base.bind_vertices - space.base.bind_vertices) @ stands.yaw.T
+        if "chest" in found:
+            seen = (kept.vertices - stands.translation) @ stands.yaw
+            shift += toward_bust_points(upright + shift @ stands.yaw, seen, space.base) @ stands.yaw.T
+        risen = slide(vertices, space.base.faces, shift)
+        space = levelled
         stands = stance(space, fit)
-        vertices = _displaced(space, fit, fine, config)
+        vertices, _ = _displaced(space, fit, target, risen, (softest,), config.rounds)
     else:
         job.warn(
             f"the body does not stand: a part of it leans {np.rad2deg(stands.lean):.0f} degrees; its "
@@ -107,13 +117,13 @@ def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | No
     return body
 
 
-def _displaced(space: ShapeSpace, fit: Fit, target: Target, config: ScanConfig) -> FloatArray:
-    posed = part_thighs(space, fit, model(space, fit))
-    hands = [k for k, name in enumerate(space.base.joint_names) if name.endswith("wrist")]
-    trust = 1 - space.base.weights[:, hands].sum(axis=1)
-    stiffness = config.stiffness[:_CLOTHED_STIFFNESS] if config.clothed else config.stiffness
-    vertices = displace(target, posed, space.base.faces, trust, stiffness, config.rounds)
-    return part_thighs(space, fit, vertices)
+def _displaced(
+    space: ShapeSpace, fit: Fit, target: Target, start: FloatArray, stiffness: tuple[float, ...], rounds: int
+) -> tuple[FloatArray, float]:
+    unlike = np.array([_UNLIKE.get(name.rpartition("_")[2], 0.0) for name in space.base.joint_names])
+    trust = 1 - space.base.weights @ unlike
+    vertices, softest = displace(target, start, space.base.faces, trust, ends(space) < CORE, stiffness, rounds)
+    return part_thighs(space, fit, vertices), softest
 
 
 def _pose_and_shape(

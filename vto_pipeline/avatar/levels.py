@@ -10,7 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
+from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
 from scipy.spatial import ConvexHull
 
@@ -22,8 +24,13 @@ from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.body import Avatar
 from vto_pipeline.model.mesh import TriangleMesh
 
-_STEP_M, _BEYOND_M, _BESIDE = 0.004, 0.028, 7
-_STAY = ("thigh", "neck_base", "head")
+_STEP_M, _BEYOND = 0.002, 2.5
+"""Between the heights that are looked at, and how many widths beyond the reach: what lies there is smoothed in."""
+_STAY = ("neck_base", "head")
+_THIGH_OF_CROTCH = 0.95
+"""Height of the fold of the seat as a share of the crotch's, as `population` has it."""
+_LEG = 0.2
+_NEAR_CROTCH_M, _ON_THE_MEDIAN_M = 0.03, 1e-6
 _STEEPEST = 0.6
 """Rows may be pushed together to 1 - 0.6 of their distance, not nearer."""
 
@@ -34,48 +41,68 @@ class Level:
 
     Args:
         row: The template's row that belongs there.
-        extreme: "narrowest", "foremost" or "rearmost": smallest hull girth, or the farthest point forwards, backwards.
+        extreme: "narrowest", "widest", "foremost" or "rearmost": of the hull's girth, or the farthest point forwards,
+            backwards.
         reach: How far from the registered row it may lie: people of one stature differ by this [m].
+        width: Over which the profile is smoothed, its standard deviation [m]: an extreme of the smoothed profile stays
+            where it is when facets, noise or the model's vertices change.
         prominence: By how much it must stand out, so that noise on a flat chest is no bust [m].
+        above: How far the row lies above the extreme, as a share of its height.
     """
 
     row: str
     extreme: str
     reach: float
+    width: float
     prominence: float
+    above: float = 0.0
 
 
 LEVELS = (
-    Level("hip", "rearmost", 0.050, 0.002),
-    Level("waist", "narrowest", 0.045, 0.004),
-    Level("chest", "foremost", 0.040, 0.002),
-    Level("neck", "narrowest", 0.025, 0.004),
+    Level("ankle", "narrowest", 0.040, 0.006, 0.004),
+    Level("calf", "widest", 0.050, 0.020, 0.004),
+    Level("knee", "narrowest", 0.050, 0.012, 0.002, above=0.11),
+    Level("hip", "rearmost", 0.050, 0.020, 0.002),
+    Level("waist", "narrowest", 0.045, 0.015, 0.004),
+    Level("chest", "foremost", 0.040, 0.010, 0.002),
+    Level("neck", "narrowest", 0.025, 0.008, 0.004),
 )
 """Lowest first. Where a body has no such extreme within reach, as a belly without a waist, the row stays.
 
-The reach is about two standard deviations of the level's height among people of one stature and weight (ANSUR II).
+The reach is about two standard deviations of the level's height among people of one stature and weight (ANSUR II). The
+middle of the patella shows in no girth; the leg is narrowest under it, at the hollow of the knee (ANSUR II: popliteal
+height 0.89 of the height of mid-patella).
 """
 
 
 def find_levels(upright: FloatArray, body: Avatar) -> dict[str, float]:
-    """Return row -> height [m] of the levels that this body shows.
+    """Return row -> height [m] of the levels that this body shows; a limb's is the mean of both sides.
 
     Args:
         upright: A standing body of our topology, +Y up, facing +Z [m], shape (V, 3).
         body: Its topology and rows.
     """
-    trunk = membership("arm") < 0.5
-    links = edges(TriangleMesh(upright, body.faces))
-    links = links[trunk[links].all(axis=1)].astype(np.int64)
-    found = {}
+    floor = float(upright[:, 1].min())
+    # what the thighs' fold shows of itself is little, but it lies as far below the crotch as on others
+    found = {"thigh": floor + _THIGH_OF_CROTCH * (float(upright[_under_the_crotch(body), 1].min()) - floor)}
     for level in LEVELS:
-        span = level.reach + _BEYOND_M
-        at = _height(upright, body, level.row) + np.arange(-span, span + _STEP_M / 2, _STEP_M)
-        value = np.array([_value(_cut(upright, links, y), level.extreme) for y in at])
-        peak = _peak(at, value, level.reach, level.prominence)
-        if peak is not None:
-            found[level.row] = peak
+        sides = [_found(level, upright, body, row, floor) for row in _sides(body, level.row)]
+        seen = [height for height in sides if height is not None]
+        if seen:
+            found[level.row] = float(np.mean(seen))
+    if "chest" in found:  # the fold under the breasts goes with them, not with the waist
+        found["underbust"] = _height(upright, body, "underbust") + found["chest"] - _height(upright, body, "chest")
     return found
+
+
+def _found(level: Level, upright: FloatArray, body: Avatar, row: str, floor: float) -> float | None:
+    links = _links(body, row)
+    middle = floor + (float(upright[body.loops[row], 1].mean()) - floor) / (1 + level.above)
+    span = level.reach + _BEYOND * level.width
+    at = middle + np.arange(-span, span + _STEP_M / 2, _STEP_M)
+    value = np.array([_value(_cut(upright, links, y), level.extreme) for y in at])
+    peak = _peak(at, value, level)
+    return None if peak is None else floor + (1 + level.above) * (peak - floor)
 
 
 def with_rows_at(space: ShapeSpace, parameters: FloatArray, upright: FloatArray, found: dict[str, float]) -> ShapeSpace:
@@ -89,8 +116,9 @@ def with_rows_at(space: ShapeSpace, parameters: FloatArray, upright: FloatArray,
     """
     base, bind, joints = space.base, space.vertices(parameters), space.joints(parameters)
     rows = sorted([*_STAY, *found], key=lambda row: _height(bind, base, row))
-    at = np.array([_height(bind, base, row) for row in rows])
-    rise = np.array([found[row] - _height(upright, base, row) if row in found else 0.0 for row in rows])
+    # the soles stay on the floor
+    at = np.array([bind[:, 1].min(), *(_height(bind, base, row) for row in rows)])
+    rise = np.array([0.0, *(found[row] - _height(upright, base, row) if row in found else 0.0 for row in rows)])
     steepest = float(np.abs(np.diff(rise) / np.diff(at)).max())
     smooth = PchipInterpolator(at, rise * min(1.0, _STEEPEST / max(steepest, 1e-12)))
 
@@ -110,9 +138,30 @@ def with_rows_at(space: ShapeSpace, parameters: FloatArray, upright: FloatArray,
     return replace(space, base=slid)
 
 
+def _sides(body: Avatar, row: str) -> list[str]:
+    return [name for name in (row, f"left_{row}", f"right_{row}") if name in body.loops]
+
+
 def _height(vertices: FloatArray, body: Avatar, row: str) -> float:
-    rows = [body.loops[name] for name in (row, f"left_{row}", f"right_{row}") if name in body.loops]
-    return float(np.mean([vertices[loop, 1].mean() for loop in rows]))
+    return float(np.mean([vertices[body.loops[name], 1].mean() for name in _sides(body, row)]))
+
+
+def _links(body: Avatar, row: str) -> IntArray:
+    """Edges of the part that a row goes round: trunk, or one leg."""
+    side = row.partition("_")[0]
+    inside = membership("arm") < 0.5
+    if side in ("left", "right"):
+        inside = (membership("leg") > _LEG) & (
+            body.bind_vertices[body.loops[row], 0].mean() * body.bind_vertices[:, 0] >= 0
+        )
+    links = edges(TriangleMesh(body.bind_vertices, body.faces))
+    return links[inside[links].all(axis=1)].astype(np.int32)
+
+
+def _under_the_crotch(body: Avatar) -> NDArray[np.int64]:
+    """Vertices of the median plane between the legs."""
+    low = body.bind_vertices[body.landmarks["crotch_point"], 1] + _NEAR_CROTCH_M
+    return np.flatnonzero((np.abs(body.bind_vertices[:, 0]) < _ON_THE_MEDIAN_M) & (body.bind_vertices[:, 1] < low))
 
 
 def _cut(vertices: FloatArray, links: IntArray, y: float) -> FloatArray:
@@ -127,20 +176,18 @@ def _cut(vertices: FloatArray, links: IntArray, y: float) -> FloatArray:
 
 def _value(points: FloatArray, extreme: str) -> float:
     """What is largest at the level."""
-    if extreme == "narrowest":
-        return -float(ConvexHull(points[:, [0, 2]]).area)
+    if extreme in ("narrowest", "widest"):
+        return float(ConvexHull(points[:, [0, 2]]).area) * (1.0 if extreme == "widest" else -1.0)
     return float(points[:, 2].max() if extreme == "foremost" else -points[:, 2].min())
 
 
-def _peak(at: FloatArray, value: FloatArray, reach: float, prominence: float) -> float | None:
-    """Return where the highest prominent maximum lies, at most so far from the middle; None when there is none."""
-    inner = find_peaks(value, prominence=prominence)[0]
-    inner = inner[np.abs(at[inner] - at.mean()) <= reach]
+def _peak(at: FloatArray, value: FloatArray, level: Level) -> float | None:
+    """Return where the highest prominent maximum of the smoothed profile lies, within reach; None if there is none."""
+    smooth = gaussian_filter1d(value, level.width / _STEP_M, mode="nearest")
+    inner = find_peaks(smooth, prominence=level.prominence)[0]
+    inner = inner[np.abs(at[inner] - at.mean()) <= level.reach]
     if len(inner) == 0:
         return None
-    k = int(inner[np.argmax(value[inner])])
-    near = slice(max(k - _BESIDE, 0), k + _BESIDE + 1)
-    # the top of a parabola through the neighbourhood: one facet's corner does not decide
-    bend, slope, _ = np.polyfit(at[near] - at[k], value[near], 2)
-    step = (at[1] - at[0]) * _BESIDE
-    return float(at[k] + (np.clip(-slope / (2 * bend), -step, step) if bend < 0 else 0.0))
+    k = int(inner[np.argmax(smooth[inner])])
+    before, top, after = smooth[k - 1 : k + 2]
+    return float(at[k] + 0.5 * _STEP_M * (before - after) / (before - 2 * top + after))
