@@ -135,18 +135,17 @@ class Phases:
             settling = settle(stepper, state, bounds, watch)
             spent = trace[-1].seconds if trace else 0.0
             trace += [replace(row, seconds=spent + row.seconds) for row in settling.trace]
-            state = self._cleared(settling.state, stepper, body)
+            self._job.progress(0.9, "clearing the body")
+            state, crossing = clear_of_body(stepper, settling.state, self._model.faces, body, self._config.clear_rounds)
             lies_clear = state is settling.state
             settling.state, settling.trace = state, trace
+            if len(crossing) > 0:  # nor will waiting clear it
+                settling.settled = False
+                break
             if lies_clear and bounds is limits:
                 break
             bounds = limits  # what was pushed off the body comes to rest, too
         return settling
-
-    def _cleared(self, state: ClothState, stepper: Stepper, body: TriangleMesh) -> ClothState:
-        """Return the cloth where no triangle of it crosses the body, if rounds enough are allowed."""
-        self._job.progress(0.9, "clearing the body")
-        return clear_of_body(stepper, state, self._model.faces, body, self._config.clear_rounds)[0]
 
     def account(self) -> None:
         """Tell what the search for contacts of the cloth with itself took and saved."""
