@@ -24,7 +24,8 @@ from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
-_NEARLY = 10.0  # times the bounds of rest: near enough to see where the cloth lies across the body
+_ROUGHLY = 5e-3  # m: near enough to rest to see where the cloth lies across the body,
+_NEARLY = 10.0  # at so many times the left-over force of rest
 _TURNS = 5  # of coming to rest and being cleared
 _LONG = 0.5  # steps per 1/60 s on the way to rest: backward Euler takes the more motion out, the longer they are
 _CALM = 20.0  # 1/s: velocities fade this fast while the body grows, where the way does not matter
@@ -129,7 +130,7 @@ class Phases:
         stepper.prepare(state.positions)
         if self._config.substeps is None and stepper.rests_exactly:
             stepper.substeps = min(stepper.substeps, _LONG)
-        bounds = replace(limits, error=_NEARLY * limits.error, residual=_NEARLY * limits.residual)
+        bounds = replace(limits, error=_ROUGHLY, residual=_NEARLY * limits.residual)
         trace: list[TraceRow] = []
         for _ in range(_TURNS):
             settling = settle(stepper, state, bounds, watch)

@@ -46,6 +46,19 @@ class Tangent:
 
     def assemble(self, x: FloatArray) -> csc_array:
         """Return the stiffness [N/m] at positions x [m], shape (V, 3); symmetric, shape (3N, 3N)."""
+        blocks = self._differences(x)
+        size = 3 * len(self.free)
+        rows = 3 * self._row[:, None, None] + np.arange(3)[None, :, None] + np.zeros((1, 1, 3), np.int64)
+        columns = 3 * self._column[:, None, None] + np.arange(3)[None, None, :] + np.zeros((1, 3, 1), np.int64)
+        matrix = csc_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size))
+        return csc_array(0.5 * (matrix + matrix.T))
+
+    def add_to(self, blocks: FloatArray, x: FloatArray) -> None:
+        """Add the stiffness at positions x [m], shape (V, 3), to the blocks of the pattern, shape (B, 3, 3)."""
+        blocks[self._kept] += self._differences(x)
+
+    def _differences(self, x: FloatArray) -> FloatArray:
+        """Return the blocks of free vertices, in the order of the pattern."""
         step = _STEP * self._model.edge_length
         blocks = np.zeros((len(self._kept), 3, 3))
         order = np.argsort(self._colour[self._to], kind="stable")
@@ -62,11 +75,7 @@ class Tangent:
                 add_forces(x + change, self._model.constraints, ahead)
                 add_forces(x - change, self._model.constraints, behind)
                 blocks[chosen, :, k] = (behind - ahead)[self._from[chosen]] / (2.0 * step)
-        size = 3 * len(self.free)
-        rows = 3 * self._row[:, None, None] + np.arange(3)[None, :, None] + np.zeros((1, 1, 3), np.int64)
-        columns = 3 * self._column[:, None, None] + np.arange(3)[None, None, :] + np.zeros((1, 3, 1), np.int64)
-        matrix = csc_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size))
-        return csc_array(0.5 * (matrix + matrix.T))
+        return blocks
 
 
 @njit(cache=True)
