@@ -113,7 +113,7 @@ def settle(
             _polish(stepper, substeps, to_come < _VAGUE and balanced)
         if quiet < _QUIET:
             continue
-        if result.error < limits.error:
+        if result.error <= limits.error:
             result.settled = True
             break
         if exact:

@@ -165,8 +165,8 @@ class Stepper:
 
     @property
     def polishes(self) -> bool:
-        """Whether the method knows the exact stiffness; after `prepare`."""
-        return isinstance(self._method, Newton)
+        """Whether the method can use the exact stiffness; after `prepare`."""
+        return isinstance(self._method, Newton) and self._method.knows_exactly
 
     def polish(self, on: bool) -> None:
         """Let steps use the exact stiffness from now on, or no longer; after `prepare`."""

@@ -69,6 +69,11 @@ class LinearSystem:
             self.levels = self._bare._replace(links=link(vertices, weights, self._bare.up, self._bare.rows[:2]))
         return self.levels.links.blocks
 
+    @property
+    def eliminates(self) -> bool:
+        """Whether elimination is worth it, with what is coupled now."""
+        return self._up_to_date().flops <= _MOST
+
     def solve(
         self, right: FloatArray, x: FloatArray, reference: FloatArray, tolerance: float, *, exactly: bool
     ) -> None:

@@ -4,7 +4,7 @@ Each step minimises ½ |y - x̃|²_M / h² + E(y) over the positions y, x̃ bein
 (Martin et al. 2011, eq. 3). One Newton iteration from the begin of the step is the scheme of Baraff & Witkin 1998. It
 is enough while the objective falls as a parabola does; where cloth turns, or is thrown about, more are made. The
 stiffness is positive semidefinite (`cloth.stiffness`), the systems are solved by `linear_system`, and contacts are part
-of them. Near rest, where what is left out to keep it so is what cloth waits for, it may be exact (`cloth.tangent`).
+of them. Near rest, where what is left out to keep it so is what cloth waits for, it may be exact.
 """
 
 from __future__ import annotations
@@ -36,7 +36,6 @@ from vto_pipeline.cloth.losses import own, recall, remember, slip
 from vto_pipeline.cloth.solvers.linear_system import LinearSystem
 from vto_pipeline.cloth.solvers.momentum import keep_momentum, pieces
 from vto_pipeline.cloth.stiffness import Stiffness
-from vto_pipeline.cloth.tangent import Tangent
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.numerics.block_matrix import BlockMatrix, row_times
 from vto_pipeline.numerics.links import pull, pull_back
@@ -96,7 +95,6 @@ class Newton:
         self._max_speed = max_speed
         self.self_contact: SelfContact | None = None
         self.exact = self.definite = False
-        self._tangent: Tangent | None = None
         self._checked = False
         self._held = model.inverse_mass == 0.0
         self._stiffness = Stiffness(model)
@@ -106,6 +104,11 @@ class Newton:
         self._pieces = pieces(self._stiffness.matrix, self._held)
         self._allowed = 0.0  # what a step may cost in energy by being solved in part [J]
         self._whole = np.zeros((len(model.mass), 3))  # what the residuals of a step are measured against [N]
+
+    @property
+    def knows_exactly(self) -> bool:
+        """Whether systems with the exact stiffness can be solved: of very large cloth they are not factored."""
+        return self._system.eliminates
 
     def advance(self, state: ClothState, contacts: Contacts, h: float, substeps: int) -> ClothState:
         """Return the state after `substeps` steps of h [s]. The contacts hold for their whole span.
@@ -259,13 +262,9 @@ class Newton:
 
     def _assembled(self, y: FloatArray, h: float) -> BlockMatrix:
         """Return the matrix of a step of h [s] at positions y [m], without contacts."""
-        if not self.definite:
-            return self._stiffness.assemble(y, 1.0 / (h * h), 1.0, 1.0 / h)
-        if self._tangent is None:
-            self._tangent = Tangent(self._model, self._stiffness)
-        matrix = self._stiffness.assemble(y, 1.0 / (h * h), 0.0, 1.0 / h)
-        self._tangent.add_to(matrix.blocks, y)
-        return matrix
+        if self.definite:
+            return self._stiffness.assemble_exact(y, 1.0 / (h * h), 1.0 / h)
+        return self._stiffness.assemble(y, 1.0 / (h * h), 1.0, 1.0 / h)
 
     def _take_on(self, x: FloatArray, end: FloatArray) -> bool:
         """Add what a move from x to end would pass through to the contacts; return whether there was any."""
