@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from vto_pipeline.bench.bench import Row, Watch
 from vto_pipeline.bench.drape import budget, refinement, scanned
-from vto_pipeline.bench.drape.case import Case
+from vto_pipeline.bench.drape.case import Case, distance_mm
 from vto_pipeline.bench.samples.wearer import wearer
 from vto_pipeline.bench.timing import Timing
 from vto_pipeline.errors import InputError, IntersectingError
@@ -125,6 +125,19 @@ def test_the_picture_has_a_panel_for_each_kind(kinds):
 def test_rows_of_nothing_known_are_refused():
     with pytest.raises(InputError, match="none with a figure of a drape"):
         draw_drape({"bench": "drape", "rows": [Row("x", "y", {}, 1, 1.0, {"other": 1.0}).as_json()]})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("names", budget._CASES, ids=lambda names: ", ".join(names))
+def test_what_a_drape_promises_is_kept(names):
+    """True against predicted error at the end of a run, the truth being the same run continued."""
+    case, patient = Case(*names, edge_mm=25.0), {"settle_seconds": 60.0}
+    truth = case.drape({**patient, "target_error_mm": 0.005})
+    assert truth.audit["settled"]
+    for target in (4.0, 0.5):
+        found = case.drape({**patient, "target_error_mm": target})
+        true = distance_mm(found.mesh.vertices, truth.mesh.vertices)
+        assert true <= 1.5 * found.trace[-1].error_mm <= 1.5 * target
 
 
 @pytest.mark.slow

@@ -77,3 +77,15 @@ def test_rows_name_what_they_measure(monkeypatch):
         ("friction", 0, 2),
     ):
         assert {f"worn, {what} {least:g}", f"worn, {what} {most:g}"} <= {row.scene for row in found}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("what", "value"), [(what, value) for what in worn.EXTREMES for value in worn.EXTREMES[what]])
+def test_extreme_fabrics_end_finite_and_clean(what, value):
+    base = read_fabric("cotton_poplin")
+    case = Case("shirt", "average", base.name, 40.0)
+    found = case.drape({"target_error_mm": 2.0}, worn.extreme(base, what, value))
+    assert np.isfinite(found.mesh.vertices).all()
+    assert found.audit["finite"] is True
+    assert found.audit["body_intersections"] == found.audit["self_intersections"] == 0
+    assert found.audit["penetration_mm"] == 0.0
