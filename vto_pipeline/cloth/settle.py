@@ -17,6 +17,7 @@ from vto_pipeline.model.cloth import TraceRow
 _WINDOW = 0.1  # s of cloth time between looks
 _QUIET = 3  # looks in a row under the bound: an oscillating cloth stands still for an instant at each turn
 _COARSE = 2.0  # times the bound: waiting longer for a coarse answer, itself in error by more, is waste
+_STILL, _LONG = 1e-4, 10  # m, looks in a row: what stays within that is at rest, whatever forces contacts argue about
 _VAGUE = 1e-3  # m: what is not known to be stable may still buckle by as much
 _LONGEST = 1.0  # s: inertia holds nothing back in a step of that length that cloth still waits for
 _SLOWEST = 0.95  # a decay slower than this cannot be told from none
@@ -88,7 +89,7 @@ def settle(
     result = Settling(state)
     moves: list[float] = []
     coarse: FloatArray | None = None
-    quiet = 0
+    quiet = still = 0
     stepper.prepare(state.positions)
     exact, substeps = stepper.rests_exactly, stepper.substeps
     share = 0.0
@@ -107,7 +108,8 @@ def settle(
         watch(share, result.error)
         first = coarse is None and not exact
         bound = _COARSE * limits.error if first else (1.0 if exact else 0.5) * limits.error
-        balanced = result.residual < limits.residual or not exact
+        still = still + 1 if to_come < _STILL else 0
+        balanced = result.residual < limits.residual or not exact or still >= _LONG
         quiet = quiet + 1 if to_come < bound and balanced and (whole or not stepper.definite) else 0
         if stepper.polishes and limits.error < _VAGUE:
             _polish(stepper, substeps, to_come < _VAGUE and balanced)
