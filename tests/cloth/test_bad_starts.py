@@ -1,26 +1,22 @@
 """Starts that no one would choose: each ends clean, judged by ipctk, or fails with the places that still cross."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from bad_starts import finned, shifted, sleeves_up, two, upside_down
 from ipc_judge import crosses
 from numpy.testing import assert_allclose
 
 from vto_pipeline.bench.samples.form import make_form
 from vto_pipeline.bench.samples.shirt import make_shirt
 from vto_pipeline.cloth.drape import drape
-from vto_pipeline.cloth.place import PlaceConfig, place
 from vto_pipeline.errors import IntersectingError
 from vto_pipeline.garment.simulation_mesh import SimulationMeshConfig, remesh_for_simulation
 from vto_pipeline.geometry.repair import RepairConfig, repair
-from vto_pipeline.geometry.topology import edges, vertex_normals
+from vto_pipeline.geometry.topology import vertex_normals
 from vto_pipeline.io.fabrics import read_fabric
-from vto_pipeline.io.meshes import read_mesh
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
-DATA = Path(__file__).parents[3] / "shared" / "data"
 COARSE = SimulationMeshConfig(edge_mm=26)
 STAYS = {"place": "as_it_stands"}
 
@@ -32,37 +28,6 @@ def dressed():
     shirt = remesh_for_simulation(make_shirt(form), COARSE, Job())
     assert 1000 < len(shirt.vertices) < 2000
     return shirt, form.mesh
-
-
-def shifted(shirt, *way):
-    return TriangleMesh(shirt.vertices + np.array(way), shirt.faces)
-
-
-def sleeves_up(shirt):
-    """The sleeves turned up by 25 degrees at the shoulders, so that the arms leave them through their undersides."""
-    x = shirt.vertices.copy()
-    middle, width = x.mean(axis=0), np.ptp(x[:, 0])
-    for side in (1.0, -1.0):
-        sleeve = side * (x[:, 0] - middle[0]) > 0.25 * width
-        pivot = np.array([middle[0] + 0.25 * side * width, np.quantile(x[sleeve, 1], 0.7), 0.0])
-        c, s = np.cos(np.deg2rad(25)), side * np.sin(np.deg2rad(25))
-        x[sleeve] = (x[sleeve] - pivot) @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]).T + pivot
-    return TriangleMesh(x, shirt.faces)
-
-
-def finned(shirt):
-    """A hundred of its edges have a third face."""
-    pairs = edges(shirt)
-    chosen = pairs[np.random.default_rng(0).choice(len(pairs), 100, replace=False)]
-    tips = shirt.vertices[chosen].mean(axis=1) + 0.01 * vertex_normals(shirt)[chosen[:, 0]]
-    fins = np.column_stack([chosen, len(shirt.vertices) + np.arange(100)])
-    return TriangleMesh(np.vstack([shirt.vertices, tips]), np.vstack([shirt.faces, fins]))
-
-
-def two(shirt):
-    """Two shirts, the one 12 mm over the other."""
-    outer = shirt.vertices + 0.012 * vertex_normals(shirt)
-    return TriangleMesh(np.vstack([shirt.vertices, outer]), np.vstack([shirt.faces, shirt.faces + len(outer)]))
 
 
 def ends_clean(garment, body, settings=None, job=None):
@@ -147,8 +112,7 @@ def test_two_shirts_one_over_the_other(dressed):
 @pytest.mark.slow
 def test_a_shirt_left_upside_down_fails_with_places(dressed):
     shirt, form = dressed
-    middle = shirt.vertices.mean(axis=0)
-    stuck = TriangleMesh((shirt.vertices - middle) * [-1.0, -1.0, 1.0] + middle, shirt.faces)
+    stuck = upside_down(shirt)
     with pytest.raises(IntersectingError, match=r"garment and body still cross, near \(") as caught:
         drape(stuck, form, read_fabric("jersey"), STAYS)
     assert caught.value.exit_code == 4
@@ -156,21 +120,3 @@ def test_a_shirt_left_upside_down_fails_with_places(dressed):
     assert audit["finite"] is True
     places = np.array(audit["body_intersection_places"])
     assert (np.linalg.norm(form.vertices[:, None] - places[None], axis=2).min(axis=0) < 0.02).all()
-
-
-@pytest.mark.slow
-@pytest.mark.real_data
-@pytest.mark.skipif(not DATA.exists(), reason="the data folder is absent")
-@pytest.mark.parametrize("case", ["shifted", "sleeves up", "too small", "upside down, centimetres"])
-def test_a_real_shirt(case):
-    body = read_mesh(DATA / "bodies" / "mh_male_averageweight.ply")
-    shirt = read_mesh(DATA / "garments" / "tshirt.ply")
-    placed = TriangleMesh(place(shirt, body, PlaceConfig(), Job()).put(shirt.vertices), shirt.faces)
-    start, settings = {
-        "shifted": (shifted(placed, 0.0, 0.0, 0.05), STAYS),
-        "sleeves up": (sleeves_up(placed), STAYS),
-        "too small": (TriangleMesh(shirt.vertices / 1.3, shirt.faces), {}),
-        "upside down, centimetres": (TriangleMesh(100.0 * shirt.vertices * [-1.0, -1.0, 1.0], shirt.faces), {}),
-    }[case]
-    found = ends_clean(start, body, settings)
-    assert found.audit["too_small"] == (case == "too small")

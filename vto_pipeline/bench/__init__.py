@@ -46,7 +46,9 @@ BENCHES = {
         "energy, phase and momentum against closed forms", "vto_pipeline.bench.integrators", _draw_integrators
     ),
     "stability": Bench(
-        "stiff, distorted and extreme cases: what survives", "vto_pipeline.bench.stability.table", draw_verdicts
+        "stiff, distorted and extreme cases, extreme fabrics worn: what survives",
+        "vto_pipeline.bench.stability.table",
+        draw_verdicts,
     ),
     "physics": Bench(
         "elastica, buckling, drape: error against references", "vto_pipeline.bench.physics", _draw_physics
@@ -57,7 +59,7 @@ BENCHES = {
         draw_collision,
     ),
     "drape": Bench(
-        "garments on bodies: error against run time, honesty, refinement, extreme fabrics, rest shapes",
+        "garments on bodies: error against run time, honesty, refinement, rest shapes",
         "vto_pipeline.bench.drape",
         draw_drape,
     ),

@@ -25,9 +25,8 @@ from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
-NEARLY = 10.0
-"""Times the bounds of rest: near enough to see where the cloth lies across the body, or for a finer mesh to go on."""
-
+_ROUGHLY = 5e-3  # m: near enough to rest to see where the cloth lies across the body, or for a finer mesh to go on,
+_NEARLY = 10.0  # at so many times the left-over force of rest
 _TURNS = 5  # of coming to rest and being cleared
 _LONG = 0.5  # steps per 1/60 s on the way to rest: backward Euler takes the more motion out, the longer they are
 _CALM = 20.0  # 1/s: velocities fade this fast while the body grows, where the way does not matter
@@ -121,7 +120,7 @@ class Phases:
         stepper: Stepper,
         body: TriangleMesh,
         deadline: float,
-        bounds: Sequence[float] = (NEARLY, 1.0),
+        roughly: Sequence[bool] = (True, False),
     ) -> Settling:
         """Return the cloth at rest and clear of the body, or as near to it as allowed.
 
@@ -130,7 +129,7 @@ class Phases:
             stepper: The cloth among its colliders.
             body: Where it is now.
             deadline: `time.perf_counter` at which to stop.
-            bounds: Times those of rest, for each coming to rest; what was pushed off the body does so again.
+            roughly: For each coming to rest, whether nearly is enough; what was pushed off the body does so again.
         """
 
         def watch(done: float, error: float) -> None:
@@ -147,24 +146,23 @@ class Phases:
         stepper.prepare(state.positions)
         if self._config.substeps is None and stepper.rests_exactly:
             stepper.substeps = min(stepper.substeps, _LONG)
+        rough = replace(limits, error=max(_ROUGHLY, limits.error), residual=_NEARLY * limits.residual)
         trace: list[TraceRow] = []
         for turn in range(_TURNS):
-            times = bounds[min(turn, len(bounds) - 1)]
-            enough = replace(limits, error=times * limits.error, residual=times * limits.residual)
+            enough = rough if roughly[min(turn, len(roughly) - 1)] else limits
             settling = settle(stepper, state, enough, watch)
             spent = trace[-1].seconds if trace else 0.0
             trace += [replace(row, seconds=spent + row.seconds) for row in settling.trace]
-            state = self._cleared(settling.state, stepper, body)
+            self._job.progress(0.9, "clearing the body")
+            state, crossing = clear_of_body(stepper, settling.state, self._model.faces, body, self._config.clear_rounds)
             lies_clear = state is settling.state
             settling.state, settling.trace = state, trace
-            if lies_clear and turn + 1 >= len(bounds):
+            if len(crossing) > 0 and self._config.clear_rounds > 0:  # nor will waiting clear it
+                settling.settled = False
+                break
+            if lies_clear and turn + 1 >= len(roughly):
                 break
         return settling
-
-    def _cleared(self, state: ClothState, stepper: Stepper, body: TriangleMesh) -> ClothState:
-        """Return the cloth where no triangle of it crosses the body, if rounds enough are allowed."""
-        self._job.progress(0.9, "clearing the body")
-        return clear_of_body(stepper, state, self._model.faces, body, self._config.clear_rounds)[0]
 
     def account(self) -> None:
         """Tell what the search for contacts of the cloth with itself took and saved."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vto_pipeline.cloth.build import ClothState
+from vto_pipeline.cloth.methods import FRAME
 from vto_pipeline.cloth.stepper import Stepper
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.cloth import TraceRow
@@ -16,7 +17,9 @@ from vto_pipeline.model.cloth import TraceRow
 _WINDOW = 0.1  # s of cloth time between looks
 _QUIET = 3  # looks in a row under the bound: an oscillating cloth stands still for an instant at each turn
 _COARSE = 2.0  # times the bound: waiting longer for a coarse answer, itself in error by more, is waste
-_STILL = 0.1  # times the bound: what moves no farther is at rest, whatever force a few contacts argue about
+_STILL, _LONG = 1e-4, 10  # m, looks in a row: what stays within that is at rest, whatever forces contacts argue about
+_VAGUE = 1e-3  # m: what is not known to be stable may still buckle by as much
+_LONGEST = 1.0  # s: inertia holds nothing back in a step of that length that cloth still waits for
 _SLOWEST = 0.95  # a decay slower than this cannot be told from none
 
 
@@ -27,7 +30,7 @@ class SettleLimits:
     Args:
         error: Predicted distance to the state of rest, rms over vertices [m].
         residual: And left-over force, as a share of weight, by methods whose state of rest is exact.
-        seconds: Cloth time at most [s].
+        seconds: Cloth time at most [s]; in longer steps than usual, as if they were of that length.
         finest: Steps per 1/60 s that are not refined further.
         deadline: `time.perf_counter` at which to stop; without effect on the result unless it is reached.
     """
@@ -70,8 +73,14 @@ def settle(
     only in part, as one sweep of Gauss-Seidel does, leaves an error of order h² in the state of rest, so halving h
     shows three quarters of it (Richardson) and a third of that is left.
 
+    Cloth that buckles slowly hardly moves for a long while, so being quiet does not prove much. A method that knows the
+    exact stiffness goes on in steps that grow as long as the system is positive definite. With inertia gone it is a
+    Newton iteration (pseudo-transient continuation; Kelley & Keyes 1998): a step goes all the way that was to come, and
+    where it goes nowhere, the cloth is at rest, and stable.
+
     Args:
-        stepper: The cloth among its colliders; its steps are refined.
+        stepper: The cloth among its colliders; its steps are changed, and as they were at the end if the rest does not
+            depend on them.
         state: Where to begin.
         limits: When to stop.
         watch: Told the share of time used and the error [m] at each look.
@@ -80,36 +89,57 @@ def settle(
     result = Settling(state)
     moves: list[float] = []
     coarse: FloatArray | None = None
-    quiet = 0
+    quiet = still = 0
     stepper.prepare(state.positions)
-    exact = stepper.rests_exactly
-    while result.state.time - state.time < limits.seconds and time.perf_counter() < limits.deadline:
+    exact, substeps = stepper.rests_exactly, stepper.substeps
+    share = 0.0
+    while share < 1.0 and time.perf_counter() < limits.deadline:
         before = result.state.positions
-        result.state = stepper.run(result.state, _WINDOW)
+        result.state = stepper.run(result.state, max(_WINDOW, stepper.step))
         moves.append(_rms(result.state.positions - before))
-        to_come = _still_to_come(moves)
-        result.error = to_come
+        whole = stepper.definite and stepper.step >= _LONGEST and len(moves) > 1
+        to_come = max(moves[-2:]) if whole else _still_to_come(moves)
+        result.error = max(to_come, _VAGUE) if stepper.polishes and not whole else to_come
         if not exact:
             result.error += np.inf if coarse is None else _rms(result.state.positions - coarse) / 3.0
         result.residual = stepper.residual(result.state)
         seconds = time.perf_counter() - began
         row = TraceRow(seconds, stepper.steps, 1e3 * result.error, result.residual, contacts=stepper.bearing)
         result.trace.append(row)
-        watch((result.state.time - state.time) / limits.seconds, result.error)
+        share = len(result.trace) * _WINDOW / limits.seconds
+        watch(share, result.error)
         first = coarse is None and not exact
         bound = _COARSE * limits.error if first else (1.0 if exact else 0.5) * limits.error
-        balanced = result.residual < limits.residual or not exact or to_come < _STILL * bound
-        quiet = quiet + 1 if to_come < bound and balanced else 0
+        still = still + 1 if to_come < _STILL else 0
+        balanced = result.residual < limits.residual or not exact or still >= _LONG
+        quiet = quiet + 1 if to_come < bound and balanced and (whole or not stepper.definite) else 0
+        if stepper.polishes and limits.error < _VAGUE:
+            _polish(stepper, substeps, to_come < _VAGUE and balanced)
         if quiet < _QUIET:
             continue
-        if result.error < limits.error:
+        if result.error <= limits.error:
             result.settled = True
             break
+        if exact:
+            continue
         if 2 * stepper.substeps > limits.finest:
             break
         coarse, moves, quiet = result.state.positions, [], 0
         stepper.substeps *= 2
+    if exact:
+        stepper.substeps = substeps
+    stepper.polish(False)
     return result
+
+
+def _polish(stepper: Stepper, substeps: float, quiet: bool) -> None:
+    """Choose the next steps: longer with the exact stiffness while that will do, else shorter, down to the usual."""
+    if stepper.definite:
+        stepper.substeps = max(0.5 * stepper.substeps, FRAME / _LONGEST)
+    elif stepper.substeps < substeps:
+        stepper.substeps = min(2.0 * stepper.substeps, substeps)
+    else:
+        stepper.polish(quiet)
 
 
 def _rms(moves: FloatArray) -> float:

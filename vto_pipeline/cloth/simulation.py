@@ -35,6 +35,7 @@ from vto_pipeline.numerics.threads import limited_threads
 from vto_pipeline.units import GRAVITY
 
 _REST_MM = 0.1  # error at rest that is asked for when nobody says
+_BALANCED = 0.01  # left-over force at rest, as a share of weight
 
 AnyCollider = Sphere | Capsule | Ellipsoid | Box | Plane | MeshCollider | Moving
 
@@ -153,7 +154,7 @@ def simulate(
         deadline = np.inf if config.time_budget_s is None else began + config.time_budget_s
         if config.until == "rest":
             error = 1e-3 * (_REST_MM if config.target_error_mm is None else config.target_error_mm)
-            settling = settle(stepper, state, SettleLimits(error, 0.0, seconds, config.finest, deadline))
+            settling = settle(stepper, state, SettleLimits(error, _BALANCED, seconds, config.finest, deadline))
             state, trace = settling.state, settling.trace
             report.update(settled=settling.settled, error_mm=1e3 * settling.error)
         elif config.target_error_mm is None and config.time_budget_s is None:

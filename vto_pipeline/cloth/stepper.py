@@ -181,6 +181,26 @@ class Stepper:
         """How many contacts pushed in the last step, as far as the method counts them."""
         return getattr(self._method, "bearing", 0)
 
+    @property
+    def step(self) -> float:
+        """Length of a step [s]."""
+        return FRAME / self.substeps
+
+    @property
+    def polishes(self) -> bool:
+        """Whether the method can use the exact stiffness; after `prepare`."""
+        return isinstance(self._method, Newton) and self._method.knows_exactly
+
+    def polish(self, on: bool) -> None:
+        """Let steps use the exact stiffness from now on, or no longer; after `prepare`."""
+        if isinstance(self._method, Newton):
+            self._method.exact = on
+
+    @property
+    def definite(self) -> bool:
+        """Whether the last step did throughout: at no point was the cloth about to buckle."""
+        return isinstance(self._method, Newton) and self._method.definite
+
     def _speed(self, state: ClothState) -> float:
         return float(np.abs(state.velocities).max() * np.sqrt(3.0))  # a bound, which does not overflow
 

@@ -1,4 +1,8 @@
-"""The matrix of an implicit step, m M + s K: its pattern once for a cloth, its values at each position."""
+"""The matrix of an implicit step, m M + s K: its pattern once for a cloth, its values at each position.
+
+The stiffness that steps use as a rule is kept positive semidefinite by leaving out what pressure takes away. The exact
+one, indefinite where the cloth is about to buckle, is made of differences of the forces, stencil by stencil.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +10,11 @@ import numpy as np
 from numba import njit, prange
 
 from vto_pipeline.cloth.build import ClothModel
-from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM, stiffness_one, stiffness_scratch
+from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM, force_one, stiffness_one, stiffness_scratch
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.numerics.block_matrix import BlockMatrix, pattern
+
+_STEP = 1e-5  # of an edge: the error of central differences is its square, rounding a hundred-thousandth of an angle
 
 
 class Stiffness:
@@ -58,6 +64,17 @@ class Stiffness:
             _assemble(x, data, places, self._held, material, stiffness_factor, matrix.blocks)
         return matrix
 
+    def assemble_exact(self, x: FloatArray, mass_factor: float = 0.0, damping_factor: float = 0.0) -> BlockMatrix:
+        """Return m M - ∂f/∂x + d Σ β ∇Cᵀ α⁻¹ ∇C at positions x [m], shape (V, 3); symmetric but for rounding.
+
+        The matrix is overwritten by the next call.
+        """
+        matrix = self.assemble(x, mass_factor, 0.0, damping_factor)
+        here, forces = x.copy(), np.empty_like(x)
+        for data, places in zip(self._model.constraints, self._places, strict=True):
+            _differ(here, data, places, self._held, _STEP * self._model.edge_length, forces, matrix.blocks)
+        return matrix
+
 
 @njit(cache=True, error_model="numpy")
 def _clear(matrix, held, mass):
@@ -101,3 +118,42 @@ def _assemble_block(x, data, places, held, material, stress, blocks, block):
                 for k in range(3):
                     for m in range(3):
                         blocks[place, k, m] += local[a, b, k, m]
+
+
+@njit(cache=True, error_model="numpy")
+def _differ(x, data, places, held, step, forces, blocks):
+    for colour in range(len(data.colours) - 1):
+        first, last = data.colours[colour], data.colours[colour + 1]
+        if len(x) >= PARALLEL_FROM and last - first > 1:
+            _differ_colour(x, data, places, held, step, forces, blocks, first, last)
+        else:
+            for block in range(first, last):
+                _differ_block(x, data, places, held, step, forces, blocks, block)
+
+
+@njit(cache=True, error_model="numpy", parallel=True)
+def _differ_colour(x, data, places, held, step, forces, blocks, first, last):
+    for block in prange(first, last):
+        _differ_block(x, data, places, held, step, forces, blocks, block)
+
+
+@njit(cache=True, error_model="numpy")
+def _differ_block(x, data, places, held, step, forces, blocks, block):
+    """Add -∂f/∂x of each stencil: its vertices are moved, and back, which no other block of a colour has."""
+    for i in range(data.starts[block], data.starts[block + 1]):
+        corners = data.vertices[i]
+        for b in range(len(corners)):
+            if held[corners[b]]:
+                continue
+            for m in range(3):
+                here = x[corners[b], m]
+                for side in (-1.0, 1.0):
+                    for a in corners:
+                        forces[a] = 0.0
+                    x[corners[b], m] = here + side * step
+                    force_one(i, x, data, forces)
+                    for a in range(len(corners)):
+                        if not held[corners[a]]:
+                            for k in range(3):
+                                blocks[places[i, a, b], k, m] -= side * forces[corners[a], k] / (2.0 * step)
+                x[corners[b], m] = here

@@ -1,4 +1,4 @@
-"""How a drape does in one picture: error against run time, honesty, refinement, extreme fabrics, rest shapes."""
+"""How a drape does in one picture: error against run time, honesty, refinement, rest shapes."""
 
 from __future__ import annotations
 
@@ -7,14 +7,13 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from vto_pipeline.errors import InputError
-from vto_pipeline.report.figure import COLORS, ELSEWHERE, label_decades, look_of
+from vto_pipeline.report.figure import ELSEWHERE, label_decades, look_of
 from vto_pipeline.report.panels import Rows, draw_panels
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _LEAST = 1e-3  # mm, s: less is drawn here
-_GOOD, _BAD = COLORS[2], COLORS[1]
 
 
 def draw_drape(bench: Mapping[str, Any]) -> bytes:
@@ -22,7 +21,7 @@ def draw_drape(bench: Mapping[str, Any]) -> bytes:
 
     Args:
         bench: {"bench", "rows"}. Kinds are told by their errors: garments by "distance_mm" (with "predicted_mm" and
-            "honest"), refinement by "from_finest_mm", fabrics by "verdict", rest shapes by "from_scan_mm".
+            "honest"), refinement by "from_finest_mm", rest shapes by "from_scan_mm".
 
     Returns:
         A PNG.
@@ -35,7 +34,6 @@ def draw_drape(bench: Mapping[str, Any]) -> bytes:
         ("distance_mm", _honesty),
         ("from_finest_mm", _refinement),
         ("from_scan_mm", _rest_shapes),
-        ("verdict", _fabrics),
     ]
     chosen = [([row for row in bench["rows"] if name in row["errors"]], paint) for name, paint in panels]
     filled = [(rows, paint) for rows, paint in chosen if rows]
@@ -107,18 +105,6 @@ def _rest_shapes(axes: Axes, rows: Rows) -> None:
         axes.plot([], [], look_of(k).marker, color=look_of(k).color, label=mode)
     axes.set(title="rest shape: simulated to scan, error of lengths", xlabel="mean distance [mm]", xscale="log")
     axes.legend(fontsize=7)
-
-
-def _fabrics(axes: Axes, rows: Rows) -> None:
-    """Draw run times as a list, in the colour of the verdict."""
-    places = _list(axes, rows)
-    for row in rows:
-        verdict, place = row["errors"]["verdict"], places[row["scene"]]
-        seconds, color = max(row["seconds"], _LEAST), _GOOD if verdict == "passes" else _BAD
-        axes.plot(seconds, place, "o", color=color)
-        axes.annotate(verdict, (seconds, place), (5, -2), textcoords="offset points", size=7)
-    axes.set(title="extreme fabrics", xlabel="run time [s]", xscale="log")
-    axes.margins(x=0.25)
 
 
 def _list(axes: Axes, rows: Rows) -> dict[str, int]:

@@ -1,4 +1,4 @@
-"""Draping: error against run time and the honesty of its prediction, refinement, extreme fabrics, rest shapes."""
+"""Draping: error against run time and the honesty of its prediction, refinement, rest shapes."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ from collections.abc import Iterator
 
 from vto_pipeline.bench.bench import Row, Watch
 from vto_pipeline.bench.drape.budget import budget_rows
-from vto_pipeline.bench.drape.fabrics import fabric_rows
 from vto_pipeline.bench.drape.refinement import refinement_rows
 from vto_pipeline.bench.drape.scanned import scanned_rows
 
 
 def rows(quick: bool, watch: Watch) -> Iterator[Row]:
     """Measure all of them."""
-    for part in (budget_rows, refinement_rows, fabric_rows, scanned_rows):
+    for part in (budget_rows, refinement_rows, scanned_rows):
         yield from part(quick, watch)

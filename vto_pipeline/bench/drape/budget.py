@@ -1,4 +1,8 @@
-"""Error against run time: ten garments on bodies, each draped to several errors and, as the truth, to a hundredth."""
+"""Error against run time: ten garments on bodies, each draped to several errors and, as the truth, to a hundredth.
+
+With friction there are many states of rest, and which is reached depends on the way. So the truth is the one that the
+same run reaches when it goes on: what a drape does does not depend on when it is asked to stop.
+"""
 
 from __future__ import annotations
 

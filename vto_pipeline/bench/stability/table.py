@@ -1,4 +1,4 @@
-"""The table: every method on every case, where explicit methods break, and what is refused at the door."""
+"""The table: every method on every case, where explicit methods break, what is refused at the door, what is worn."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from vto_pipeline.bench.stability.refused import REFUSED, REFUSED_VERTICES, refu
 from vto_pipeline.bench.stability.sheets import quiet_sheet, sheet_cases
 from vto_pipeline.bench.stability.strands import strand_cases
 from vto_pipeline.bench.stability.trial import Maker, attempt, undisturbed
+from vto_pipeline.bench.stability.worn import worn_rows
 from vto_pipeline.bench.timing import timed
 from vto_pipeline.cloth.methods import FRAME, METHODS, choose
 
@@ -46,6 +47,7 @@ def rows(quick: bool, watch: Watch) -> Iterator[Row]:
     for case in cases:
         yield _default_cell(case, patience, watch)
     yield from _refusals(DEFAULT, None, watch)
+    yield from worn_rows(quick, DEFAULT, watch)
     for name in _QUICK_METHODS if quick else METHODS:
         for case in cases:
             told = replace(case, sweeps=_OWN_SWEEPS.get(name, case.sweeps))

@@ -42,11 +42,12 @@ def _project_one_compiled(i, x, start, inverse_mass, data, lambdas, h):
     )
 
 
-def _force_one(i, x, data, forces):
+def force_one(i, x, data, forces):
+    """Add the forces of one stencil of any kind [N] and return its energy [J]. From compiled code only."""
     raise NotImplementedError
 
 
-@overload(_force_one)
+@overload(force_one)
 def _force_one_compiled(i, x, data, forces):
     force = _BY_DATA[data.instance_class].force
     return lambda i, x, data, forces: force(i, x, data, forces)
@@ -140,7 +141,7 @@ def _project_compiled(x, start, inverse_mass, constraints, lambdas, h, threaded)
 def _force_block(x, data, forces, block):
     energy = 0.0
     for i in range(data.starts[block], data.starts[block + 1]):
-        energy += _force_one(i, x, data, forces)
+        energy += force_one(i, x, data, forces)
     return energy
 
 

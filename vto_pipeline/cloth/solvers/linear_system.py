@@ -69,6 +69,11 @@ class LinearSystem:
             self.levels = self._bare._replace(links=link(vertices, weights, self._bare.up, self._bare.rows[:2]))
         return self.levels.links.blocks
 
+    @property
+    def eliminates(self) -> bool:
+        """Whether elimination is worth it, with what is coupled now."""
+        return self._up_to_date().flops <= _MOST
+
     def solve(
         self, right: FloatArray, x: FloatArray, reference: FloatArray, tolerance: float, *, exactly: bool
     ) -> None:
@@ -80,7 +85,7 @@ class LinearSystem:
             reference, tolerance: When cycles are enough; see `pcg`.
             exactly: Whether the solution is wanted to rounding, if that can be had.
         """
-        if exactly and self._eliminated(right, x):
+        if exactly and self.eliminated(right, x):
             return
         blocks = self.levels.links.blocks
         if len(blocks) > 0:  # on all levels now
@@ -89,8 +94,12 @@ class LinearSystem:
         update(self.levels)
         pcg(self.levels, right, x, reference, tolerance, _MANY if exactly else _ROUGH, True)
 
-    def _eliminated(self, right: FloatArray, x: FloatArray) -> bool:
-        """Set x to the solution; return False where that is not worth it, or rounding has its way."""
+    def eliminated(self, right: FloatArray, x: FloatArray) -> bool:
+        """Set x to the solution of A x = right, shapes (N, 3), by elimination.
+
+        Returns:
+            False where that is not worth it, or A is not positive definite.
+        """
         plan = self._up_to_date()
         if plan.flops > _MOST:
             return False

@@ -4,7 +4,7 @@ Each step minimises ½ |y - x̃|²_M / h² + E(y) over the positions y, x̃ bein
 (Martin et al. 2011, eq. 3). One Newton iteration from the begin of the step is the scheme of Baraff & Witkin 1998. It
 is enough while the objective falls as a parabola does; where cloth turns, or is thrown about, more are made. The
 stiffness is positive semidefinite (`cloth.stiffness`), the systems are solved by `linear_system`, and contacts are part
-of them.
+of them. Near rest, where what is left out to keep it so is what cloth waits for, it may be exact.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from vto_pipeline.cloth.solvers.linear_system import LinearSystem
 from vto_pipeline.cloth.solvers.momentum import keep_momentum, pieces
 from vto_pipeline.cloth.stiffness import Stiffness
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.numerics.block_matrix import row_times
+from vto_pipeline.numerics.block_matrix import BlockMatrix, row_times
 from vto_pipeline.numerics.links import pull, pull_back
 from vto_pipeline.numerics.multigrid import Hierarchy
 
@@ -85,6 +85,8 @@ class Newton:
 
     Attributes:
         self_contact: What keeps the cloth from itself, if anything; may be set between runs.
+        exact: Whether steps use the exact stiffness where the system is positive definite with it; may be set.
+        definite: Whether all systems of the last step were, with the exact stiffness.
     """
 
     def __init__(self, model: ClothModel, *, sweeps: int = 1, damping: float = 0.0, max_speed: float = np.inf) -> None:
@@ -93,6 +95,7 @@ class Newton:
         self._damping = damping
         self._max_speed = max_speed
         self.self_contact: SelfContact | None = None
+        self.exact = self.definite = False
         self._checked = False
         self._held = model.inverse_mass == 0.0
         self._stiffness = Stiffness(model)
@@ -102,6 +105,11 @@ class Newton:
         self._pieces = pieces(self._stiffness.matrix, self._held)
         self._allowed = 0.0  # what a step may cost in energy by being solved in part [J]
         self._whole = np.zeros((len(model.mass), 3))  # what the residuals of a step are measured against [N]
+
+    @property
+    def knows_exactly(self) -> bool:
+        """Whether systems with the exact stiffness can be solved: of very large cloth they are not factored."""
+        return self._system.eliminates
 
     def advance(self, state: ClothState, contacts: Contacts, h: float, substeps: int) -> ClothState:
         """Return the state after `substeps` steps of h [s]. The contacts hold for their whole span.
@@ -130,6 +138,7 @@ class Newton:
     def _step(self, x: FloatArray, v: FloatArray, contacts: Contacts, t0: float, t1: float, h: float) -> None:
         model, held = self._model, self._held
         start = x.copy()
+        self.definite = self.exact
         move = (h * exp(-self._damping * h)) * v
         move[held] = 0.0
         led = held & (v != 0.0).any(axis=1)
@@ -213,7 +222,7 @@ class Newton:
             measured: Whether it is known what residuals are measured against.
         """
         model, system = self._model, self._system
-        matrix = self._stiffness.assemble(y, 1.0 / (h * h), 1.0, 1.0 / h)
+        matrix = self._assembled(y, h)
         system.uncouple()
         forces = (model.mass / (h * h))[:, None] * (target - y)
         energy = add_forces(y, model.constraints, forces)
@@ -238,7 +247,12 @@ class Newton:
                 between = system.couple(*linked_contacts(self._active, self._held))
                 add_contacts(self._active, model.mass, self._held, h, x, y, matrix, right, between)
                 keep_apart(self._active, model.inverse_mass, x, y, move)
-            system.solve(right, move, self._whole, _LEFT * h, exactly=exactly or touches)
+            if self.definite:
+                self.definite = system.eliminated(right, move)
+                if not self.definite:  # once more, with a stiffness that is
+                    return self._iterate(x, y, target, guess, h, exactly=exactly, measured=True)
+            else:
+                system.solve(right, move, self._whole, _LEFT * h, exactly=exactly or touches)
             rounds -= 1
             self._keep_momentum(move, target - y)
             if touches:
@@ -253,6 +267,12 @@ class Newton:
             rounds = max(rounds, 1)
         foreseen = -_quadratic(system.levels, right, move)
         return self._shortened(y, target, move, h, energy, pushes, foreseen)
+
+    def _assembled(self, y: FloatArray, h: float) -> BlockMatrix:
+        """Return the matrix of a step of h [s] at positions y [m], without contacts."""
+        if self.definite:
+            return self._stiffness.assemble_exact(y, 1.0 / (h * h), 1.0 / h)
+        return self._stiffness.assemble(y, 1.0 / (h * h), 1.0, 1.0 / h)
 
     def _take_on(self, x: FloatArray, end: FloatArray) -> bool:
         """Add what a move from x to end would pass through to the contacts; return whether there was any."""

@@ -1,4 +1,4 @@
-"""Extreme fabrics: each stiffness, the weight and the friction far beyond what is woven; finite and clean or not."""
+"""Extreme fabrics worn: each stiffness, the weight and the friction far beyond what is woven; finite, clean or not."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ EXTREMES: Mapping[str, tuple[float, ...]] = {
 _BASE = "cotton_poplin"
 
 
-def fabric_rows(quick: bool, watch: Watch) -> Iterator[Row]:
-    """A shirt of each fabric on a body of average size."""
+def worn_rows(quick: bool, method: str, watch: Watch) -> Iterator[Row]:
+    """A shirt of each fabric on a body of average size, with all contacts, by the method that a drape chooses."""
     case = Case("shirt", "average", _BASE, edge_mm=40.0 if quick else 25.0)
     base = read_fabric(_BASE)
     vertices = len(case.made().mesh.vertices)
@@ -33,8 +33,8 @@ def fabric_rows(quick: bool, watch: Watch) -> Iterator[Row]:
         for value in values[-1:] if quick else values:
             settings: dict[str, Value] = {"target_error_mm": 2.0, "settle_seconds": 0.5 if quick else 20.0}
             yield watch.row(
-                f"fabric: {what} {value:g}",
-                "drape",
+                f"worn, {what} {value:g}",
+                method,
                 {**settings, "edge_mm": case.edge_mm},
                 vertices,
                 partial(_measure, case, extreme(base, what, value), settings),
