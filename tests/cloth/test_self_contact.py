@@ -106,6 +106,21 @@ def test_a_safe_move_crosses_nothing(seed):
     assert len(met.key) > 0
 
 
+def test_what_is_held_up_is_not_passed_through_by_what_falls_on():
+    """By itself all but the lowest triangle falls alike, so that nothing comes nearer to anything above it."""
+    wide = np.array([[-1.0, 0.0, -1.0], [3.0, 0.0, -1.0], [-1.0, 0.0, 3.0]])
+    narrow = np.array([[-0.9, 0.0, -0.9], [-0.5, 0.0, -0.9], [-0.9, 0.0, -0.5]])
+    beside = np.array([[2.0, 0.5, -0.9], [2.4, 0.6, -0.9], [2.0, 0.7, -0.6]])  # over the wide one, not over the narrow
+    far = [wide + np.array([0.0, 5.0 + k, 0.0]) for k in range(20)]
+    x = np.vstack([narrow - [0.0, 0.01, 0.0], wide, beside, *far])
+    faces = np.arange(len(x), dtype=np.int32).reshape(-1, 3)
+    wanted = x - np.where(np.arange(len(x)) < 3, 0.0, 1.0)[:, None] * np.array([0.0, 1.0, 0.0])
+    there, _ = SelfContact(faces, np.full(len(x), 1e-3), 0.3).safe(x, wanted)
+    assert there[3:6, 1].min() > -0.01  # held up
+    assert there[6:9, 1].min() > there[3:6, 1].max()  # and what is over it stays so
+    assert_array_equal(there[9:], wanted[9:])  # too far up to come near
+
+
 def test_what_meets_nothing_goes_all_the_way():
     x, faces = triangles(10, 3)
     wanted = x + np.array([50.0, 20.0, -9.0])

@@ -70,8 +70,8 @@ LEVELS = (
 """Lowest first. Where a body has no such extreme within reach, as a belly without a waist, the row stays.
 
 The reach is about two standard deviations of the level's height among people of one stature and weight (ANSUR II). The
-middle of the patella shows in no girth; the leg is narrowest under it, at the hollow of the knee (ANSUR II: popliteal
-height 0.89 of the height of mid-patella).
+middle of the patella shows in no girth; the leg is narrowest under it, at the hollow of the knee, as far as
+on the template.
 """
 
 

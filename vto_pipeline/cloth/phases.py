@@ -25,8 +25,12 @@ from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
-_ROUGHLY = 5e-3  # m: near enough to rest to see where the cloth lies across the body, or for a finer mesh to go on,
-_NEARLY = 10.0  # at so many times the left-over force of rest
+ROUGH, QUIET, REST = (5e-3, 10.0), (1e-3, 1.0), (0.0, 1.0)
+"""How nearly cloth comes to rest: the error at least [m], and times the left-over force that are enough.
+
+Roughly, to see where it lies across the body, or for a finer mesh to go on; quietly, not yet known to be stable; and as
+is asked."""
+
 _TURNS = 5  # of coming to rest and being cleared
 _LONG = 0.5  # steps per 1/60 s on the way to rest: backward Euler takes the more motion out, the longer they are
 _CALM = 20.0  # 1/s: velocities fade this fast while the body grows, where the way does not matter
@@ -120,7 +124,7 @@ class Phases:
         stepper: Stepper,
         body: TriangleMesh,
         deadline: float,
-        roughly: Sequence[bool] = (True, False),
+        passes: Sequence[tuple[float, float]] = (ROUGH, REST),
     ) -> Settling:
         """Return the cloth at rest and clear of the body, or as near to it as allowed.
 
@@ -129,7 +133,7 @@ class Phases:
             stepper: The cloth among its colliders.
             body: Where it is now.
             deadline: `time.perf_counter` at which to stop.
-            roughly: For each coming to rest, whether nearly is enough; what was pushed off the body does so again.
+            passes: How nearly, for each coming to rest; what was pushed off the body does so again.
         """
 
         def watch(done: float, error: float) -> None:
@@ -146,10 +150,10 @@ class Phases:
         stepper.prepare(state.positions)
         if self._config.substeps is None and stepper.rests_exactly:
             stepper.substeps = min(stepper.substeps, _LONG)
-        rough = replace(limits, error=max(_ROUGHLY, limits.error), residual=_NEARLY * limits.residual)
         trace: list[TraceRow] = []
         for turn in range(_TURNS):
-            enough = rough if roughly[min(turn, len(roughly) - 1)] else limits
+            error, times = passes[min(turn, len(passes) - 1)]
+            enough = replace(limits, error=max(error, limits.error), residual=times * limits.residual)
             settling = settle(stepper, state, enough, watch)
             spent = trace[-1].seconds if trace else 0.0
             trace += [replace(row, seconds=spent + row.seconds) for row in settling.trace]
@@ -160,7 +164,7 @@ class Phases:
             if len(crossing) > 0 and self._config.clear_rounds > 0:  # nor will waiting clear it
                 settling.settled = False
                 break
-            if lies_clear and turn + 1 >= len(roughly):
+            if lies_clear and turn + 1 >= len(passes):
                 break
         return settling
 

@@ -69,7 +69,8 @@ def settle(
 ) -> Settling:
     """Run until rest; where that depends on the steps, halve them until halving changes no more than the bound.
 
-    The moves d of successive windows shrink by q, so d q / (1 - q) is still to come. A method that solves each step
+    The moves d of successive windows shrink by q, so d q / (1 - q) is still to come. Half the way of two windows is
+    taken for d: what goes to and fro, as a vertex between two flanks, gets nowhere. A method that solves each step
     only in part, as one sweep of Gauss-Seidel does, leaves an error of order h² in the state of rest, so halving h
     shows three quarters of it (Richardson) and a third of that is left.
 
@@ -88,6 +89,8 @@ def settle(
     began = time.perf_counter()
     result = Settling(state)
     moves: list[float] = []
+    drifts: list[float] = []
+    earlier = state.positions
     coarse: FloatArray | None = None
     quiet = still = 0
     stepper.prepare(state.positions)
@@ -97,8 +100,10 @@ def settle(
         before = result.state.positions
         result.state = stepper.run(result.state, max(_WINDOW, stepper.step))
         moves.append(_rms(result.state.positions - before))
+        drifts.append(0.5 * _rms(result.state.positions - earlier) if len(moves) > 1 else moves[-1])
+        earlier = before
         whole = stepper.definite and stepper.step >= _LONGEST and len(moves) > 1
-        to_come = max(moves[-2:]) if whole else _still_to_come(moves)
+        to_come = max(moves[-2:]) if whole else max(moves[-1], _still_to_come(drifts))
         result.error = max(to_come, _VAGUE) if stepper.polishes and not whole else to_come
         if not exact:
             result.error += np.inf if coarse is None else _rms(result.state.positions - coarse) / 3.0
@@ -124,7 +129,7 @@ def settle(
             continue
         if 2 * stepper.substeps > limits.finest:
             break
-        coarse, moves, quiet = result.state.positions, [], 0
+        coarse, moves, drifts, quiet = result.state.positions, [], [], 0
         stepper.substeps *= 2
     if exact:
         stepper.substeps = substeps
@@ -146,10 +151,10 @@ def _rms(moves: FloatArray) -> float:
     return float(np.sqrt((moves**2).sum(axis=1).mean()))
 
 
-def _still_to_come(moves: list[float]) -> float:
+def _still_to_come(drifts: list[float]) -> float:
     """Return the sum of the moves to come if they go on shrinking as the last four did [m]."""
-    if len(moves) < 4:
+    if len(drifts) < 4:
         return np.inf
-    last, before = max(moves[-2:]), max(moves[-4:-2])
+    last, before = max(drifts[-2:]), max(drifts[-4:-2])
     shrink = min(np.sqrt(last / before), _SLOWEST) if before > 0.0 else 0.0
     return float(last * max(shrink / (1.0 - shrink), 1.0))

@@ -185,16 +185,20 @@ class SelfContact:
         room = max(step, float(np.sqrt((carried**2).sum(axis=1).max(initial=0.0))))
         if bodies is not None:
             backs = [bodies.beside(back, True) for back in backs]
-        found = self._candidates(x, _together(x, end), room).joined(beside)
-        moving = np.zeros(found.number, np.bool_) if bodies is None else bodies.moving(found)
-        self.tally.impacts += found.number
-        for back in backs:
-            there, share, hit, stuck = safe_way(start, wanted, back, self._features, *found, self._all_reach)
-            if not (stuck & ~moving).any():
+        for ways in (_together(x, end), end):  # what is cut short falls behind what all have in common
+            found = self._candidates(x, ways, room).joined(beside)
+            moving = np.zeros(found.number, np.bool_) if bodies is None else bodies.moving(found)
+            self.tally.impacts += found.number
+            for back in backs:
+                there, share, hit, stuck = safe_way(start, wanted, back, self._features, *found, self._all_reach)
+                if not (stuck & ~moving).any():
+                    break
+            else:
+                resting = found.chosen(~moving)
+                there, share, _, _ = safe_way(start, wanted, start, self._features, *resting, self._all_reach)
+                stuck = hit
+            if (share == 1.0).all():
                 break
-        else:
-            there, share, _, _ = safe_way(start, wanted, start, self._features, *found.chosen(~moving), self._all_reach)
-            stuck = hit
         self.tally.uncut += int((stuck & moving).sum())
         self.tally.shortened += int((share[: len(x)] < 1.0).sum())
         return there[: len(x)], self._pairs(
