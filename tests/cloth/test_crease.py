@@ -100,11 +100,24 @@ def test_both_flanks_are_where_brute_force_finds_them():
         assert_allclose(there, points @ normal, rtol=0, atol=1e-9)
 
 
-def test_an_edge_that_bulges_has_one_plane():
-    body = groove(np.radians(90.0))
-    # round the outer corner of the base, where neighbours' planes differ as much
-    points = np.column_stack([np.full(5, 0.301), np.full(5, -0.102), np.linspace(-0.1, 0.1, 5)])
-    assert flanks(body, points, 9).active.sum() == 5
+def test_what_bulges_has_one_plane():
+    """What has come round a rod of eight sides, past one of them, is not held by that one, whose edge is near."""
+    turn, side = np.pi / 4.0, 0.002
+    ring = np.arange(8)
+    circle = 0.5 * side / np.sin(0.5 * turn) * np.column_stack([np.cos(turn * ring), 0 * ring, np.sin(turn * ring)])
+    corners, after = np.vstack([circle - [0, 0.1, 0], circle + [0, 0.1, 0]]), (ring + 1) % 8
+    low, high = np.column_stack([ring, ring + 8, after]), np.column_stack([ring + 8, after + 8, after])
+    rod = TriangleMesh(corners, np.vstack([low, high]).astype(np.int32))
+    middle = 0.5 * side / np.tan(0.5 * turn)
+    collider = BodyCollider(MovingBody(rod.vertices[None], rod.faces), 0.0, 0.3)
+    span = Round(0.0, 1 / 60, 5e-3, np.full(5, SKIN), 0.5)
+    for number, along in ((0, 0.0), (2, -0.45 * side)):
+        angle = (number + 0.5) * turn
+        out, round_it = np.array([np.cos(angle), 0.0, np.sin(angle)]), np.array([-np.sin(angle), 0.0, np.cos(angle)])
+        place = (middle + 0.0005) * out + along * round_it
+        points = place + np.linspace(-0.08, 0.08, 5)[:, None] * np.array([0.0, 1.0, 0.0])
+        found = collider.contacts(points, span)
+    assert found.active.sum() == 5
 
 
 def test_what_was_touched_is_remembered_when_the_nearest_flank_changes():
