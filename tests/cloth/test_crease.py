@@ -105,9 +105,9 @@ def test_what_bulges_has_one_plane():
     turn, side = np.pi / 4.0, 0.002
     ring = np.arange(8)
     circle = 0.5 * side / np.sin(0.5 * turn) * np.column_stack([np.cos(turn * ring), 0 * ring, np.sin(turn * ring)])
-    corners, after = np.vstack([circle - [0, 0.1, 0], circle + [0, 0.1, 0]]), (ring + 1) % 8
+    half, after = np.array([0.0, 0.1, 0.0]), (ring + 1) % 8
     low, high = np.column_stack([ring, ring + 8, after]), np.column_stack([ring + 8, after + 8, after])
-    rod = TriangleMesh(corners, np.vstack([low, high]).astype(np.int32))
+    rod = TriangleMesh(np.vstack([circle - half, circle + half]), np.vstack([low, high]).astype(np.int32))
     middle = 0.5 * side / np.tan(0.5 * turn)
     collider = BodyCollider(MovingBody(rod.vertices[None], rod.faces), 0.0, 0.3)
     span = Round(0.0, 1 / 60, 5e-3, np.full(5, SKIN), 0.5)
