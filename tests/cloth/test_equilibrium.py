@@ -9,6 +9,7 @@ from vto_pipeline.cloth.build import build, model_of
 from vto_pipeline.cloth.constraints.spring import springs
 from vto_pipeline.cloth.constraints.sweep import add_forces
 from vto_pipeline.cloth.equilibrium import EquilibriumConfig, equilibrium, factorise
+from vto_pipeline.cloth.materials import Materials
 from vto_pipeline.cloth.stiffness import Stiffness
 from vto_pipeline.cloth.tangent import Tangent
 from vto_pipeline.errors import DivergedError
@@ -26,9 +27,9 @@ def chain(count, length=1.0, mass=0.3, stiffness=50.0):
     return points, model_of((springs(pairs, points, 1.0 / (stiffness * count)),), masses, pinned=[0])
 
 
-def hung(columns=9, rows=9, **made):
-    mesh = sheet(columns, rows, 0.2, 0.2)
-    return mesh, build(mesh, RestShape(mesh.vertices), fabric(**made), pinned=(0, columns - 1))
+def hung(columns=9, rows=9, model="hinge", **made):
+    mesh, materials = sheet(columns, rows, 0.2, 0.2), Materials(bending=model)
+    return mesh, build(mesh, RestShape(mesh.vertices), fabric(**made), pinned=(0, columns - 1), materials=materials)
 
 
 @pytest.mark.parametrize("count", [1, 2, 7, 40])
@@ -82,8 +83,9 @@ def test_a_pushed_strip_leaves_the_saddle():
     assert_allclose(np.hypot(*found.positions[1, 1:]), np.sqrt(0.6**2 - 0.5**2), rtol=1e-6)
 
 
-def test_exact_stiffness_against_differences_of_forces():
-    mesh, model = hung(5, 4, bending=1e-3)
+@pytest.mark.parametrize("bending", ["hinge", "shape_operator"])
+def test_exact_stiffness_against_differences_of_forces(bending):
+    mesh, model = hung(5, 4, bending, bending=1e-3)
     x = mesh.vertices + np.random.default_rng(0).normal(0.0, 0.01, mesh.vertices.shape)
     tangent = Tangent(model, Stiffness(model))
     found = tangent.assemble(x)

@@ -143,7 +143,7 @@ def _differ_block(x, data, places, held, step, forces, blocks, block):
     for i in range(data.starts[block], data.starts[block + 1]):
         corners = data.vertices[i]
         for b in range(len(corners)):
-            if held[corners[b]]:
+            if held[corners[b]] or _comes_before(corners, b):
                 continue
             for m in range(3):
                 here = x[corners[b], m]
@@ -153,7 +153,16 @@ def _differ_block(x, data, places, held, step, forces, blocks, block):
                     x[corners[b], m] = here + side * step
                     force_one(i, x, data, forces)
                     for a in range(len(corners)):
-                        if not held[corners[a]]:
+                        if not held[corners[a]] and not _comes_before(corners, a):
                             for k in range(3):
                                 blocks[places[i, a, b], k, m] -= side * forces[corners[a], k] / (2.0 * step)
                 x[corners[b], m] = here
+
+
+@njit(cache=True, error_model="numpy")
+def _comes_before(corners, a):
+    """Return whether corner a is another one again, in the place of one that is missing at a rim."""
+    for b in range(a):
+        if corners[b] == corners[a]:
+            return True
+    return False
