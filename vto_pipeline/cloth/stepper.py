@@ -29,7 +29,8 @@ from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.settings import Config
 
 _HARD = 0.2  # of the distance layers keep: how much of it is not given way by contact forces
-_OUT_OF_BOUNDS = 1e9  # m, m/s
+_OUT_OF_BOUNDS = 1e9  # m
+_TOO_FAST = 1e6  # m/s: cloth that blows up may be kept from passing through itself, and so in its place
 _WHOLE = 1e-6  # steps: what rounding may add to a whole number of them
 
 
@@ -234,8 +235,9 @@ class Stepper:
 
     def _refuse_divergence(self, state: ClothState) -> None:
         with np.errstate(over="ignore", invalid="ignore"):
-            farthest = np.abs(state.positions).max(initial=0.0) + np.abs(state.velocities).max(initial=0.0)
-        if not farthest < _OUT_OF_BOUNDS:
+            farthest = np.abs(state.positions).max(initial=0.0)
+            fastest = np.abs(state.velocities).max(initial=0.0)
+        if not (farthest < _OUT_OF_BOUNDS and fastest < _TOO_FAST):
             raise DivergedError(
                 f"positions are not finite, or out of all bounds, after {self.steps} steps "
                 f"({state.time:.2f} s of cloth time)",
