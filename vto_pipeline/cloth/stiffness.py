@@ -162,7 +162,4 @@ def _differ_block(x, data, places, held, step, forces, blocks, block):
 @njit(cache=True, error_model="numpy")
 def _comes_before(corners, a):
     """Return whether corner a is another one again, in the place of one that is missing at a rim."""
-    for b in range(a):
-        if corners[b] == corners[a]:
-            return True
-    return False
+    return (corners[:a] == corners[a]).any()
