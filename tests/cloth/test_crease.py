@@ -52,9 +52,7 @@ def strip_over(width=0.06, length=0.16, cells=6):
     return TriangleMesh(points, np.array(faces, dtype=np.int32))
 
 
-STUCK = pytest.mark.xfail(
-    strict=True, reason="it stands still with 1.3 % of a vertex weight left over; bar 1 %"
-)
+STUCK = pytest.mark.xfail(strict=True, reason="it stands still with 1.3 % of a vertex weight left over; bar 1 %")
 
 
 @pytest.mark.parametrize(
