@@ -16,11 +16,12 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from vto_pipeline.numerics.elimination import BINS, Elimination
+from vto_pipeline.numerics.product_tile import COLUMNS, subtract_six, subtract_three
 
 _SIDE_BY_SIDE = 4e6  # flops; with less, starting the threads costs more than they save
-_TALL = 192  # rows that a front passes on; with more, all threads share it
-_STRIP = 16  # of those rows, that a thread takes at a time
-_ROWS = 4  # that are reduced together
+_SHARED = 1e6  # products; with more, all threads share what pivots make of the rest of a front
+_STRIP = 24  # of those rows, that a thread takes at a time
+_PIVOTS = 96  # at a time: what they make of a tile then stays in the cache
 
 
 class Factor(NamedTuple):
@@ -79,19 +80,14 @@ def _bin(b, plan, starts, blocks, weights, between, out, threaded):
         wide = 3 * (plan.first[s + 1] - plan.first[s])
         tall = 3 * (plan.row_starts[s + 1] - plan.row_starts[s])
         panel = out.panels[plan.panels[s] : plan.panels[s + 1]].reshape(wide, wide + tall)
-        rest = out.passed[plan.work_at[s] : plan.work_at[s] + tall * tall].reshape(tall, tall)
+        rest = out.passed[plan.passed_at[s] : plan.passed_at[s] + tall * tall].reshape(tall, tall)
         panel[:] = 0.0
         rest[:] = 0.0
         _gather(s, plan, starts, blocks, weights, between, panel, rest)
         for c in plan.children[plan.child_starts[s] : plan.child_starts[s + 1]]:
             _take_over(c, plan, out.passed, panel, rest)
-        out.good[s] = _eliminate(panel)
-        if threaded and tall >= _TALL:
-            _pass_on_parallel(panel, rest)
-        else:
-            _pass_on(panel, rest, 0, tall)
-        if plan.kept_at[s] < plan.work_at[s]:
-            _move(out.passed, plan.work_at[s], plan.kept_at[s], tall * tall)
+        out.good[s] = _eliminate(panel, threaded)
+        _pass_on(panel, rest, threaded)
 
 
 @njit(cache=True, error_model="numpy")
@@ -126,113 +122,108 @@ def _take_over(c, plan, passed, panel, rest):
     """Add what child c passes on."""
     begin, end = plan.row_starts[c], plan.row_starts[c + 1]
     tall, wide = 3 * (end - begin), len(panel)
-    given = passed[plan.kept_at[c] : plan.kept_at[c] + tall * tall].reshape(tall, tall)
+    given = passed[plan.passed_at[c] : plan.passed_at[c] + tall * tall].reshape(tall, tall)
     within = plan.within[begin:end]
+    run = np.full(end - begin, end - begin)  # where the rows that follow each other from here on end
+    for a in range(end - begin - 2, -1, -1):
+        run[a] = run[a + 1] if within[a + 1] == within[a] + 1 else a + 1
     for a in range(end - begin):
         for i in range(3):
-            source = given[3 * a + i]
             row = 3 * within[a] + i
-            if row < wide:
-                _scatter(source, within, a, panel[row], 0)
-            else:
-                _scatter(source, within, a, rest[row - wide], wide)
+            target, shift = (panel[row], 0) if row < wide else (rest[row - wide], wide)
+            b = a
+            while b < end - begin:
+                at = 3 * within[b] - shift
+                _add(given[3 * a + i, 3 * b : 3 * run[b]], target[at:])
+                b = run[b]
 
 
 @njit(cache=True, error_model="numpy")
-def _scatter(source, within, first, target, shift):
-    for b in range(first, len(within)):
-        at = 3 * within[b] - shift
-        target[at] += source[3 * b]
-        target[at + 1] += source[3 * b + 1]
-        target[at + 2] += source[3 * b + 2]
+def _add(source, target):
+    for k in range(len(source)):
+        target[k] += source[k]
 
 
 @njit(cache=True, error_model="numpy")
-def _eliminate(panel):
+def _eliminate(panel, threaded):
     """Factor the columns of a front, in place: row p becomes column p of the factor."""
     wide = len(panel)
-    for first in range(0, wide, _ROWS):
-        last = min(first + _ROWS, wide)
-        _subtract(panel, first, panel, first, last, 0)
-        for q in range(first, last):
-            target = panel[q, q:]
-            for p in range(first, q):
-                _subtract_one(panel[p, q:], target)
-            if not target[0] > 0.0:
-                return False
-            inverse = 1.0 / sqrt(target[0])
-            for i in range(len(target)):
-                target[i] *= inverse
+    for first in range(0, wide, _PIVOTS):
+        last = min(first + _PIVOTS, wide)
+        for begin in range(first, last, 3):
+            _subtract(panel[first:], begin - first, panel, begin, begin + 3, 0)
+            for q in range(begin, begin + 3):
+                target = panel[q, q:]
+                for p in range(begin, q):
+                    factor = panel[p, q]
+                    for i in range(len(target)):
+                        target[i] -= factor * panel[p, q + i]
+                if not target[0] > 0.0:
+                    return False
+                inverse = 1.0 / sqrt(target[0])
+                for i in range(len(target)):
+                    target[i] *= inverse
+        _subtract_all(panel[first:last], panel, last, wide, 0, threaded)
     return True
 
 
 @njit(cache=True, error_model="numpy")
-def _subtract(panel, count, rows, first, last, shift):
-    """Subtract from at most _ROWS rows of a front, from the diagonal of the first on, what some pivots make of them.
-
-    Args:
-        panel: The pivots' rows.
-        count: Of pivots.
-        rows: Where the rows lie.
-        first, last: Which of them.
-        shift: Columns of the front before those of `rows`.
-    """
-    p = 0
-    q = shift + first
-    if last - first == _ROWS:  # four by four, so that each number that is read serves four times
-        r, s, t, u = rows[first, first:], rows[first + 1, first:], rows[first + 2, first:], rows[first + 3, first:]
-        while p + 4 <= count:
-            _subtract_four(panel[p, q:], panel[p + 1, q:], panel[p + 2, q:], panel[p + 3, q:], r, s, t, u)
-            p += 4
-    for k in range(first, last):
-        for rest in range(p, count):
-            _subtract_one(panel[rest, shift + k :], rows[k, k:])
-
-
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
-def _subtract_four(one, two, three, four, r, s, t, u):
-    """Subtract from rows r to u the products of pivots one to four; contracting a product and a sum loses nothing."""
-    r1, r2, r3, r4 = one[0], two[0], three[0], four[0]
-    s1, s2, s3, s4 = one[1], two[1], three[1], four[1]
-    t1, t2, t3, t4 = one[2], two[2], three[2], four[2]
-    u1, u2, u3, u4 = one[3], two[3], three[3], four[3]
-    for i in range(len(r)):
-        a, b, c, d = one[i], two[i], three[i], four[i]
-        r[i] -= r1 * a + r2 * b + r3 * c + r4 * d
-        s[i] -= s1 * a + s2 * b + s3 * c + s4 * d
-        t[i] -= t1 * a + t2 * b + t3 * c + t4 * d
-        u[i] -= u1 * a + u2 * b + u3 * c + u4 * d
+def _pass_on(panel, rest, threaded):
+    """Subtract from what is passed on the products of the eliminated columns."""
+    wide, tall = len(panel), len(rest)
+    for first in range(0, wide, _PIVOTS):
+        _subtract_all(panel[first : first + _PIVOTS], rest, 0, tall, wide, threaded)
 
 
 @njit(cache=True, error_model="numpy")
-def _subtract_one(one, target):
-    a = one[0]
-    for i in range(len(target)):
-        target[i] -= a * one[i]
+def _subtract_all(pivots, rows, begin, end, shift, threaded):
+    """Subtract what pivots make of some rows, by all threads where that is worth it; see `_subtract`."""
+    if threaded and len(pivots) * (end - begin) * (rows.shape[1] - begin) >= _SHARED:
+        _subtract_parallel(pivots, rows, begin, end, shift)
+    else:
+        _subtract(pivots, len(pivots), rows, begin, end, shift)
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
-def _pass_on_parallel(panel, rest):
-    tall = len(rest)
-    strips = (tall + _STRIP - 1) // _STRIP
+def _subtract_parallel(pivots, rows, begin, end, shift):
+    strips = (end - begin + _STRIP - 1) // _STRIP
     for k in prange(strips):
         # long and short rows in turn, so that threads have like work
         strip = k // 2 if k % 2 == 0 else strips - 1 - k // 2
-        _pass_on(panel, rest, _STRIP * strip, min(tall, _STRIP * strip + _STRIP))
+        first = begin + _STRIP * strip
+        _subtract(pivots, len(pivots), rows, first, min(end, first + _STRIP), shift)
 
 
 @njit(cache=True, error_model="numpy")
-def _pass_on(panel, rest, begin, end):
-    """Subtract from some rows of what is passed on the products of the eliminated columns."""
-    wide = len(panel)
-    for first in range(begin, end, _ROWS):
-        _subtract(panel, wide, rest, first, min(first + _ROWS, end), wide)
+def _subtract(pivots, count, rows, begin, end, shift):
+    """Subtract what some pivots make of some rows of a front, each from its diagonal on.
 
+    Entries before the diagonal are nobody's: tiles may reach over them.
 
-@njit(cache=True, error_model="numpy")
-def _move(values, source, target, count):
-    for k in range(count):
-        values[target + k] = values[source + k]
+    Args:
+        pivots: Their rows, of the whole front.
+        count: Of them.
+        rows: Of the front, those from `shift` on.
+        begin, end: Which of these: whole blocks of three.
+        shift: Columns of the front before those of `rows`.
+    """
+    i = begin
+    while i < end:
+        tall = 6 if end - i >= 6 else 3
+        j = rows.shape[1] - COLUMNS
+        while j > i - COLUMNS and j >= 0:
+            if tall == 6:
+                subtract_six(pivots, count, shift + i, shift + j, rows, i, j)
+            else:
+                subtract_three(pivots, count, shift + i, shift + j, rows, i, j)
+            j -= COLUMNS
+        for k in range(i, i + tall):
+            for m in range(k, j + COLUMNS):
+                total = 0.0
+                for p in range(count):
+                    total += pivots[p, shift + k] * pivots[p, shift + m]
+                rows[k, m] -= total
+        i += tall
 
 
 @njit(cache=True, error_model="numpy")

@@ -29,7 +29,7 @@ class Elimination(NamedTuple):
         within: For each of `rows`, its place in the parent's front (the parent's own places, then its rows).
         child_starts, children: Children of each supernode, ascending.
         panels: Where the factor of each supernode is stored, in scalars, and their number, shape (S + 1,).
-        work_at, kept_at: Where the matrix that a supernode passes on is made, and where it is kept, shape (S,).
+        passed_at: Where the matrix is that a supernode passes on, shape (S,).
         room: Scalars needed for those.
         bin_starts, binned: Supernodes of each bin, children first; then those above all bins, shape (BINS + 2,), (S,).
         slots: For each block of the pattern, its place in its column's front; -1 for the half that is not read.
@@ -47,8 +47,7 @@ class Elimination(NamedTuple):
     child_starts: NDArray[np.int32]
     children: NDArray[np.int32]
     panels: NDArray[np.int64]
-    work_at: NDArray[np.int64]
-    kept_at: NDArray[np.int64]
+    passed_at: NDArray[np.int64]
     room: int
     bin_starts: NDArray[np.int32]
     binned: NDArray[np.int32]
@@ -80,7 +79,7 @@ def eliminate(
     wide, tall = 3.0 * np.diff(first), 3.0 * np.diff(row_starts)
     costs = wide**3 / 3.0 + wide * wide * tall + wide * tall * tall
     bin_starts, binned = _bins(parents, costs)
-    work_at, kept_at, room = _stack(9 * np.diff(row_starts) ** 2, child_starts, children, bin_starts, binned)
+    passed_at, room = _stacks(9 * np.diff(row_starts) ** 2, parents, bin_starts, binned)
     panels = np.concatenate([[0], np.cumsum((wide * (wide + tall)).astype(np.int64))])
     slots = _slots(starts, columns, order, place, first, row_starts, rows)
     owners, link_slots = _link_slots(vertices, weights, place, first, row_starts, rows)
@@ -95,8 +94,7 @@ def eliminate(
         child_starts,
         children,
         panels,
-        work_at,
-        kept_at,
+        passed_at,
         room,
         bin_starts,
         binned,
@@ -167,24 +165,35 @@ def _bins(parents, costs):
 
 
 @njit(cache=True)
-def _stack(sizes, child_starts, children, bin_starts, binned):
-    """Return where supernodes make and keep what they pass on, as on a stack for each bin, and the room for all."""
-    work_at, kept_at = np.zeros(len(sizes), np.int64), np.zeros(len(sizes), np.int64)
-    inside = np.full(len(sizes), -1, np.int32)
-    base = 0
+def _stacks(sizes, parents, bin_starts, binned):
+    """Return where supernodes keep what they pass on, and the room for all.
+
+    Each bin has two stacks, for even and for odd depths. What a front takes over is on top of the other one, so that it
+    can be made where it stays.
+    """
+    count = len(parents)
+    odd, bin_of = np.zeros(count, np.bool_), np.empty(count, np.int32)
+    for s in range(count - 1, -1, -1):  # parents come after their children
+        odd[s] = parents[s] != -1 and not odd[parents[s]]
     for b in range(len(bin_starts) - 1):
-        top = peak = base
-        for k in range(bin_starts[b], bin_starts[b + 1]):
-            s = binned[k]
-            inside[s] = b
-            kept_at[s], work_at[s] = top, top
-            for c in children[child_starts[s] : child_starts[s + 1]]:
-                if inside[c] == b:
-                    kept_at[s] = min(kept_at[s], kept_at[c])
-            peak = max(peak, top + sizes[s])
-            top = kept_at[s] + sizes[s]
-        base = max(peak, top)
-    return work_at, kept_at, base
+        bin_of[binned[bin_starts[b] : bin_starts[b + 1]]] = b
+    taken = np.zeros(count, np.int64)
+    for s in range(count):
+        if parents[s] != -1 and bin_of[parents[s]] == bin_of[s]:
+            taken[parents[s]] += sizes[s]
+    at, base = np.zeros(count, np.int64), 0
+    for b in range(len(bin_starts) - 1):
+        for parity in (False, True):
+            top = peak = base
+            for s in binned[bin_starts[b] : bin_starts[b + 1]]:
+                if odd[s] == parity:
+                    at[s] = top
+                    top += sizes[s]
+                    peak = max(peak, top)
+                else:
+                    top -= taken[s]
+            base = peak
+    return at, base
 
 
 @njit(cache=True)
