@@ -12,6 +12,7 @@ from vto_pipeline.cloth.build import build
 from vto_pipeline.cloth.collision.active_set import ActiveSet, no_contacts
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.units import GRAVITY
 
 
 def loose():  # type: ignore[no-untyped-def]
@@ -38,6 +39,18 @@ def test_an_incline_bears_all_but_what_slides(angle: float, friction: float) -> 
     assert out_of_balance(model, x, planes(x, normal, friction)) == pytest.approx(
         left, rel=1e-9, abs=1e-9
     )  # rounding of large elastic forces
+
+
+@pytest.mark.parametrize("known", [0.5, 30.0])
+def test_what_contacts_are_known_to_bear_makes_them_bear_no_more(known: float) -> None:
+    """However hard they pushed and rubbed before, inside their cones or not."""
+    model, x = loose()
+    angle, friction = 0.7, 0.3
+    contacts = planes(x, np.array([np.sin(angle), np.cos(angle), 0.0]), friction)
+    contacts.force[:] = known * GRAVITY * model.mass
+    contacts.rub[:, 1] = 2.0 * contacts.force
+    left = np.sin(angle) - friction * np.cos(angle)
+    assert out_of_balance(model, x, contacts) == pytest.approx(left, rel=1e-9)
 
 
 def test_what_is_not_touched_bears_nothing() -> None:

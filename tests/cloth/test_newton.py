@@ -276,7 +276,7 @@ def test_planes_never_pull(friction):
     for _ in range(20):
         span = Round(state.time, state.time + FRAME, 0.05, np.full(400, 2e-3), 1.0)
         state = method.advance(state, gather([ball], state.positions, span), FRAME, 1)
-        planes = method._active
+        planes = method.active
         assert (planes.force >= 0.0).all()
         assert not planes.force[~planes.pushing].any()
         holds = planes.pushing & ~planes.sliding

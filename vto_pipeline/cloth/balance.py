@@ -26,7 +26,7 @@ def out_of_balance(model: ClothModel, positions: FloatArray, contacts: ActiveSet
     Args:
         model: The cloth.
         positions: [m], shape (V, 3).
-        contacts: With what it may touch there.
+        contacts: With what it may touch there. The search begins at the forces they are known to bear.
     """
     forces = model.mass[:, None] * model.gravity
     add_forces(positions, model.constraints, forces)
@@ -50,11 +50,17 @@ def _bear(forces, positions, contacts, inverse_mass):  # type: ignore[no-untyped
     total = 0.0
     for i in range(len(forces)):
         total += norm(load(forces, i)) * inverse_mass[i]
+    for c in range(len(contacts.key)):
+        n = load(contacts.normal, c)
+        if contacts.force[c] > 0.0 and _touches(contacts, c, positions):
+            known = _in_cone(axpy(contacts.force[c], n, load(contacts.rub, c)), n, contacts.friction[c])
+            store(borne, c, known)
+            _push(forces, contacts, c, known, inverse_mass)
     for _ in range(_SWEEPS):
         changed = 0.0
         for c in range(len(contacts.key)):
             n = load(contacts.normal, c)
-            if dot(n, sum_at(contacts, c, positions)) - contacts.level[c] > _TOUCHING:
+            if not _touches(contacts, c, positions):
                 continue
             pull, give, weight = (0.0, 0.0, 0.0), 0.0, 0.0
             for s in range(4):
@@ -69,12 +75,24 @@ def _bear(forces, positions, contacts, inverse_mass):  # type: ignore[no-untyped
             store(borne, c, after)
             move = sub(after, before)
             changed += weight * norm(move)
-            for s in range(4):
-                i = contacts.vertices[c, s]
-                if inverse_mass[i] > 0.0:
-                    store(forces, i, axpy(contacts.weights[c, s], move, load(forces, i)))
+            _push(forces, contacts, c, move, inverse_mass)
         if changed <= _SETTLED * total:
             break
+
+
+@njit(cache=True, error_model="numpy")
+def _touches(contacts, c, positions):  # type: ignore[no-untyped-def]
+    """Return whether what a contact keeps apart is no farther apart than that."""
+    return dot(load(contacts.normal, c), sum_at(contacts, c, positions)) - contacts.level[c] <= _TOUCHING
+
+
+@njit(cache=True, error_model="numpy")
+def _push(forces, contacts, c, force, inverse_mass):  # type: ignore[no-untyped-def]
+    """Add the force of a contact to those of its vertices that are free."""
+    for s in range(4):
+        i = contacts.vertices[c, s]
+        if inverse_mass[i] > 0.0:
+            store(forces, i, axpy(contacts.weights[c, s], force, load(forces, i)))
 
 
 @njit(cache=True, error_model="numpy")

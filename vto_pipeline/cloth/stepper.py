@@ -169,7 +169,8 @@ class Stepper:
         x, still = state.positions, np.zeros_like(state.positions)
         pairs = no_pairs() if self.self_contact is None else self.self_contact.near(x, x, FRAME)
         mass = self._model.inverse_mass
-        touched = active_set(self._contacts, pairs, 0.0, 1.0, mass, x, still, still, no_contacts(0))
+        known = self._method.active if isinstance(self._method, Newton) else no_contacts(0)
+        touched = active_set(self._contacts, pairs, 0.0, 1.0, mass, x, still, still, known)
         return out_of_balance(self._model, x, touched)
 
     @property

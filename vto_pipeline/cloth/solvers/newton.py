@@ -87,6 +87,7 @@ class Newton:
         self_contact: What keeps the cloth from itself, if anything; may be set between runs.
         exact: Whether steps use the exact stiffness where the system is positive definite with it; may be set.
         definite: Whether all systems of the last step were, with the exact stiffness.
+        active: The contacts of the last step, and the forces they bore.
     """
 
     def __init__(self, model: ClothModel, *, sweeps: int = 1, damping: float = 0.0, max_speed: float = np.inf) -> None:
@@ -101,7 +102,7 @@ class Newton:
         self._stiffness = Stiffness(model)
         self._system = LinearSystem(self._stiffness.matrix, self._held)
         self._stiffness.write_to(self._system.blocks)
-        self._active: ActiveSet = no_contacts(0)
+        self.active: ActiveSet = no_contacts(0)
         self._pieces = pieces(self._stiffness.matrix, self._held)
         self._allowed = 0.0  # what a step may cost in energy by being solved in part [J]
         self._whole = np.zeros((len(model.mass), 3))  # what the residuals of a step are measured against [N]
@@ -133,7 +134,7 @@ class Newton:
     @property
     def bearing(self) -> int:
         """How many contacts pushed in the last step."""
-        return int(self._active.pushing.sum())
+        return int(self.active.pushing.sum())
 
     def _step(self, x: FloatArray, v: FloatArray, contacts: Contacts, t0: float, t1: float, h: float) -> None:
         model, held = self._model, self._held
@@ -147,7 +148,7 @@ class Newton:
         itself = self.self_contact
         pairs = no_pairs() if itself is None else itself.near(start, target, h, move)
         guess, mass = target - start, model.inverse_mass
-        self._active = active_set(contacts, pairs, t0, t1, mass, start, guess, move, self._active)
+        self.active = active_set(contacts, pairs, t0, t1, mass, start, guess, move, self.active)
         if led.any():  # what they pull at their neighbours by being led is no measure
             forces = model.mass[:, None] * model.gravity
             add_forces(start, model.constraints, forces)
@@ -166,7 +167,7 @@ class Newton:
         longest = self._max_speed * h
         respond(x, v, start, model.inverse_mass, contacts, t0, t1, h, longest, True, len(x) >= PARALLEL_FROM)
         if itself is not None:
-            x[:], _ = itself.safe(start, x, taken_along(self._active, start))
+            x[:], _ = itself.safe(start, x, taken_along(self.active, start))
             v[:] = (x - start) / h
             self._keep_momentum(v, (target - start) / h)  # what was cut short has pushed something else
         slip(x, model.constraints)
@@ -180,7 +181,7 @@ class Newton:
             forces: Elastic and gravity [N], shape (V, 3); changed.
         """
         model = self._model
-        add_last_forces(self._active, forces)
+        add_last_forces(self.active, forces)
         forces[self._held] = 0.0
         weight = np.linalg.norm(model.gravity) * np.where(self._held, 0.0, model.mass)
         return np.hypot(forces, _OF_WEIGHT * weight[:, None])
@@ -241,12 +242,12 @@ class Newton:
         rounds, extensions = _CONTACT_ROUNDS, _EXTENSIONS
         while True:
             right = forces.copy()
-            touches = len(self._active.key) > 0
+            touches = len(self.active.key) > 0
             if touches:
                 matrix.blocks[matrix.diagonal] = bare
-                between = system.couple(*linked_contacts(self._active, self._held))
-                add_contacts(self._active, model.mass, self._held, h, x, y, matrix, right, between)
-                keep_apart(self._active, model.inverse_mass, x, y, move)
+                between = system.couple(*linked_contacts(self.active, self._held))
+                add_contacts(self.active, model.mass, self._held, h, x, y, matrix, right, between)
+                keep_apart(self.active, model.inverse_mass, x, y, move)
             if self.definite:
                 self.definite = system.eliminated(right, move)
                 if not self.definite:  # once more, with a stiffness that is
@@ -256,8 +257,8 @@ class Newton:
             rounds -= 1
             self._keep_momentum(move, target - y)
             if touches:
-                pushes = tuple(contact_energy(self._active, x, y + share * move) for share in (0.0, 0.5, 1.0))
-                changed = revise(self._active, x, y + move, _CROSSED * model.edge_length)
+                pushes = tuple(contact_energy(self.active, x, y + share * move) for share in (0.0, 0.5, 1.0))
+                changed = revise(self.active, x, y + move, _CROSSED * model.edge_length)
                 good = min(_CHANGED, _FEW / max(self.bearing, 1))
             if changed >= good and rounds > 0:
                 continue
@@ -279,9 +280,9 @@ class Newton:
         if self.self_contact is None:
             return False
         _, met = self.self_contact.safe(x, end)
-        before = len(self._active.key)
-        self._active = taken_on(self._active, met, x, end - x)
-        return len(self._active.key) > before
+        before = len(self.active.key)
+        self.active = taken_on(self.active, met, x, end - x)
+        return len(self.active.key) > before
 
     def _keep_momentum(self, move: FloatArray, wanted: FloatArray) -> None:
         """Shift each piece that nothing holds so that its mean move is the wanted one, whatever the solution left.
@@ -289,7 +290,7 @@ class Newton:
         Pieces that push each other count as one.
         """
         if self._pieces is not None:
-            keep_momentum(self._pieces, self._active, self._model.mass, move, wanted)
+            keep_momentum(self._pieces, self.active, self._model.mass, move, wanted)
 
     def _shortened(
         self,
