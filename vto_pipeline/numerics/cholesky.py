@@ -255,12 +255,13 @@ def _forward(s, plan, factor, y, room):
     front = room[:total]
     front[:wide] = y[at : at + wide]
     front[wide:] = 0.0
-    for p in range(wide):
-        column = panel[p]
-        front[p] /= column[p]
-        f = front[p]
-        for i in range(p + 1, total):
-            front[i] -= f * column[i]
+    for p in range(0, wide, 3):
+        one, two, three = panel[p, p:], panel[p + 1, p:], panel[p + 2, p:]
+        a = front[p] / one[0]
+        b = (front[p + 1] - a * one[1]) / two[1]
+        c = (front[p + 2] - a * one[2] - b * two[2]) / three[2]
+        front[p], front[p + 1], front[p + 2] = a, b, c
+        _subtract_three_from(a, one[3:], b, two[3:], c, three[3:], front[p + 3 :])
     y[at : at + wide] = front[:wide]
     for n in range(begin, end):
         for k in range(3):
@@ -278,18 +279,28 @@ def _backward(s, plan, factor, y, room):
     for n in range(begin, end):
         for k in range(3):
             front[wide + 3 * (n - begin) + k] = y[3 * plan.rows[n] + k]
-    for p in range(wide - 1, -1, -1):
-        column = panel[p]
-        a = b = c = d = 0.0  # four sums, which need not wait for each other
-        i = p + 1
-        while i + 4 <= total:
-            a += column[i] * front[i]
-            b += column[i + 1] * front[i + 1]
-            c += column[i + 2] * front[i + 2]
-            d += column[i + 3] * front[i + 3]
-            i += 4
-        while i < total:
-            a += column[i] * front[i]
-            i += 1
-        front[p] = (front[p] - ((a + b) + (c + d))) / column[p]
+    for p in range(wide - 3, -1, -3):
+        one, two, three = panel[p, p:], panel[p + 1, p:], panel[p + 2, p:]
+        a, b, c = _products(one[3:], two[3:], three[3:], front[p + 3 :])
+        c = (front[p + 2] - c) / three[2]
+        b = (front[p + 1] - b - c * two[2]) / two[1]
+        a = (front[p] - a - b * one[1] - c * one[2]) / one[0]
+        front[p], front[p + 1], front[p + 2] = a, b, c
     y[at : at + wide] = front[:wide]
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _subtract_three_from(a, one, b, two, c, three, target):
+    for i in range(len(target)):
+        target[i] -= a * one[i] + b * two[i] + c * three[i]
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def _products(one, two, three, other):
+    """Return the inner products of three rows with another one, summed in whatever order is fast: always the same."""
+    a = b = c = 0.0
+    for i in range(len(other)):
+        a += one[i] * other[i]
+        b += two[i] * other[i]
+        c += three[i] * other[i]
+    return a, b, c
