@@ -143,6 +143,7 @@ def _polish(stepper: Stepper, substeps: float, quiet: bool) -> None:
         stepper.substeps = max(0.5 * stepper.substeps, FRAME / _LONGEST)
     elif stepper.substeps < substeps:
         stepper.substeps = min(2.0 * stepper.substeps, substeps)
+        stepper.polish(True)
     else:
         stepper.polish(quiet)
 

@@ -30,7 +30,7 @@ class Factor(NamedTuple):
     Args:
         panels: The factor, by supernodes.
         passed: What supernodes pass on to their parents.
-        good: Whether each supernode's pivots were positive, shape (S,).
+        good: Whether each supernode was factored: its pivots were positive, shape (S,).
     """
 
     panels: NDArray[np.float64]
@@ -74,9 +74,13 @@ def _bins_parallel(plan, starts, blocks, weights, between, out):
 
 @njit(cache=True, error_model="numpy")
 def _bin(b, plan, starts, blocks, weights, between, out, threaded):
-    """Factor the supernodes of a bin, children first."""
+    """Factor the supernodes of a bin, children first, up to where one has no positive pivot."""
     for n in range(plan.bin_starts[b], plan.bin_starts[b + 1]):
         s = plan.binned[n]
+        children = plan.children[plan.child_starts[s] : plan.child_starts[s + 1]]
+        for c in children:
+            if not out.good[c]:
+                return
         wide = 3 * (plan.first[s + 1] - plan.first[s])
         tall = 3 * (plan.row_starts[s + 1] - plan.row_starts[s])
         panel = out.panels[plan.panels[s] : plan.panels[s + 1]].reshape(wide, wide + tall)
@@ -84,9 +88,11 @@ def _bin(b, plan, starts, blocks, weights, between, out, threaded):
         panel[:] = 0.0
         rest[:] = 0.0
         _gather(s, plan, starts, blocks, weights, between, panel, rest)
-        for c in plan.children[plan.child_starts[s] : plan.child_starts[s + 1]]:
+        for c in children:
             _take_over(c, plan, out.passed, panel, rest)
         out.good[s] = _eliminate(panel, threaded)
+        if not out.good[s]:
+            return
         _pass_on(panel, rest, threaded)
 
 

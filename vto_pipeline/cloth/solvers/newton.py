@@ -85,7 +85,7 @@ class Newton:
 
     Attributes:
         self_contact: What keeps the cloth from itself, if anything; may be set between runs.
-        exact: Whether steps use the exact stiffness where the system is positive definite with it; may be set.
+        exact: Whether steps use the exact stiffness, until the system is not positive definite with it; may be set.
         definite: Whether all systems of the last step were, with the exact stiffness.
         active: The contacts of the last step, and the forces they bore.
     """
@@ -250,7 +250,8 @@ class Newton:
                 keep_apart(self.active, model.inverse_mass, x, y, move)
             if self.definite:
                 self.definite = system.eliminated(right, move)
-                if not self.definite:  # once more, with a stiffness that is
+                if not self.definite:  # once more, with a stiffness that is, and for now not tried again
+                    self.exact = False
                     return self._iterate(x, y, target, guess, h, exactly=exactly, measured=True)
             else:
                 system.solve(right, move, self._whole, _LEFT * h, exactly=exactly or touches)
