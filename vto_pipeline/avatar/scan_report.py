@@ -38,8 +38,8 @@ def check(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray, max_mean_
         )
 
 
-def report(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray, job: Job) -> None:
-    """Measure how far the scan lies from the body, at points that the fit has not seen."""
+def report(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray, job: Job) -> list[str]:
+    """Return what the scan hides; measure how far it lies from the body, at points that the fit has not seen."""
     faces = space.base.faces
     points, _, _ = sample_surface(scan, _POINTS, job.seed + 1)
     face, _, distance = closest_points(points, vertices, faces)
@@ -57,11 +57,14 @@ def report(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray, job: Job
             )
     job.measure(explained_share=round(float(explained.mean()), 3))
     job.measure(trunk_covered=round(_trunk_covered(scan, space, vertices), 3))
+    hidden = []
     for limb, share in _limbs_covered(scan, space, vertices).items():
         if share < _MIN_LIMB:
+            hidden.append(f"{limb} not seen")
             job.warn(
                 f"{share:.0%} of the {limb} is in the scan: its measurements are those of a likely body of this size"
             )
+    return hidden
 
 
 def ends(space: ShapeSpace) -> FloatArray:
