@@ -13,9 +13,10 @@ from vto_pipeline.avatar.clothed import undressed
 from vto_pipeline.avatar.correspondence import Pairs, Target, closest_points
 from vto_pipeline.avatar.displacement import displace
 from vto_pipeline.avatar.levels import find_levels, with_rows_at
+from vto_pipeline.avatar.measure import measure
 from vto_pipeline.avatar.pose import named_pose
 from vto_pipeline.avatar.registration import Fit, covariance, first_fit, model, refine
-from vto_pipeline.avatar.scan_report import CORE, check, ends, report
+from vto_pipeline.avatar.scan_report import CORE, check, check_build, ends, report
 from vto_pipeline.avatar.scan_start import Start, upright_starts
 from vto_pipeline.avatar.settle import part_thighs, settle
 from vto_pipeline.avatar.shape import SEX_SHARE, ShapeSpace, shape_space
@@ -69,7 +70,7 @@ def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | No
             hands, feet), and of the explained ones (nearer than 10 mm: no stand, floor or hair), and their share.
 
     Raises:
-        AvatarError: the scan is not a body, with what is missing.
+        AvatarError: the scan is not a body, with what is missing; or it is bent, and how cannot be made out.
     """
     config, job = config or ScanConfig(), job or Job()
     job.progress(0.0, "find the body's facing and size")
@@ -111,6 +112,8 @@ def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | No
     job.progress(0.9, "carry the body back to the bind pose")
     posed = part_thighs(space, fit, model(space, fit))
     body, bad = settle(space, fit, stands, posed, vertices)
+    if not stands.stands:
+        check_build(measure(body), stands.lean)
     if not config.clothed:
         sigmas = unseen_sigmas(space, _uncertainty(space, target, fit, config), target, posed, body, stands.stands)
     caveats += report(kept, space, body.vertices, job)
