@@ -20,6 +20,8 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.settings import Config
 
 _HOLD_M, _HOLD_KG = 0.0002, 0.05
+_MASS_WEIGHT = 8.0
+"""How much the expected mass counts beside all: the parameters' spread, each on its own, makes lean bodies heavy."""
 _DAMPING, _TRIES = 1e-3, 8
 _SETTLED = 1e-5
 """Relative fall of the residual below which the fit has arrived."""
@@ -108,6 +110,10 @@ def solve_shape(
     weight = np.zeros((len(names), len(names)))
     weight[: len(held), : len(held)] = np.diag([1 / (_HOLD_KG if name == "mass" else _HOLD_M) for name in held])
     weight[len(held) :, len(held) :] = config.expected_weight * np.linalg.inv(np.linalg.cholesky(spread + floor))
+    if "mass" not in held:
+        k = expected.names.index("mass")
+        heavier = (np.array(names) == "mass") * _MASS_WEIGHT / np.sqrt(expected.covariance[k, k])
+        weight = np.concatenate([weight, heavier[None]])
     read = [DEFINITIONS[name] for name in names]
     held_back = space.whitener.T @ space.whitener
 
