@@ -45,7 +45,7 @@ def test_lengths_become_metres_and_mass_stays(tmp_path: Path) -> None:
 
 
 def test_measurements_come_back_exactly(tmp_path: Path) -> None:
-    body = Measurements({"stature": 1.7, "hip_girth": 1 / 3}, {"hip_girth": 0.004}, "female")
+    body = Measurements({"stature": 1.7, "hip_girth": 1 / 3}, {"hip_girth": 0.004}, "female", ("under clothing",))
     write_measurements(tmp_path / "measurements.json", body)
     assert read_measurements(tmp_path / "measurements.json") == body
 

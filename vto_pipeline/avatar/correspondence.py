@@ -14,6 +14,8 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 _AGREE = 0.5
 _NO_WEIGHT = 1e-6
+_THROUGH_M = 0.003
+"""A body this little outside its clothes is left there: bare skin would else be pushed in wherever it is met."""
 
 
 @dataclass(frozen=True)
@@ -47,11 +49,11 @@ class Target:
         scan: In metres, +Y up.
         probes: Points of it that are matched with the model.
         seed: Of their places.
-        outside: What a point of the scan outside the model counts; less than 1 where clothes lie on the body.
+        clothed: Whether what lies outside the model is cloth, which says nothing of the body.
     """
 
-    def __init__(self, scan: TriangleMesh, probes: int, seed: int, outside: float = 1.0) -> None:
-        self._outside = outside
+    def __init__(self, scan: TriangleMesh, probes: int, seed: int, clothed: bool = False) -> None:
+        self._clothed = clothed
         self.vertices, self.faces = scan.vertices, scan.faces
         self.face_normals = face_normals(scan)
         self.probes, self.probe_normals, _ = sample_surface(scan, probes, seed)
@@ -73,7 +75,7 @@ class Target:
 
     def counted(self, ahead: FloatArray) -> FloatArray:
         """Return what points of the scan count that lie so far outside the model [m], negative inside."""
-        return np.where(ahead > 0, self._outside, 1.0)
+        return np.where(self._clothed & (ahead > -_THROUGH_M), 0.0, 1.0)
 
     def pairs(self, vertices: FloatArray, faces: IntArray, chosen: NDArray[np.int64], reach: float) -> Pairs:
         """Match probes of the scan with the model, and chosen vertices of the model with the scan."""

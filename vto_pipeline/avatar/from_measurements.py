@@ -20,6 +20,8 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.settings import Config
 
 _HOLD_M, _HOLD_KG = 0.0002, 0.05
+_MASS_WEIGHT = 8.0
+"""How much the expected mass counts beside all: the parameters' spread, each on its own, makes lean bodies heavy."""
 _DAMPING, _TRIES = 1e-3, 8
 _SETTLED = 1e-5
 """Relative fall of the residual below which the fit has arrived."""
@@ -71,7 +73,7 @@ def fit_measurements(
     _report_unlikely(prior, held, config, job)
     expected = prior.given(values, sigmas)
     space = shape_space(SEX_SHARE[sex])
-    parameters = _solve(space, held, expected, config, job, _mean_body(sex, config))
+    parameters = solve_shape(space, held, expected, config, job, mean_parameters(sex, config))
     spread = np.sqrt(np.diag(expected.covariance).clip(0.0)).tolist()
     unsure = {name: s for name, s in zip(expected.names, spread, strict=True) if name not in held}
     body = replace(space.avatar(parameters), sigmas=unsure)
@@ -81,17 +83,17 @@ def fit_measurements(
 
 
 @lru_cache(maxsize=4)
-def _mean_body(sex: str, config: MeasurementsConfig) -> FloatArray:
+def mean_parameters(sex: str, config: MeasurementsConfig) -> FloatArray:
     """Return the parameters of the population's mean, to which those of a person are drawn.
 
     The template has them all but for a few millimetres and kilograms, and these would show in what is not measured.
     """
     prior, space = population(sex), shape_space(SEX_SHARE[sex])
     held = {name: float(prior.mean[prior.names.index(name)]) for name in ("stature", "mass")}
-    return _solve(space, held, prior.given(held, {}), config, Job(), np.zeros(len(space.names)))
+    return solve_shape(space, held, prior.given(held, {}), config, Job(), np.zeros(len(space.names)))
 
 
-def _solve(
+def solve_shape(
     space: ShapeSpace,
     held: dict[str, float],
     expected: Population,
@@ -108,6 +110,10 @@ def _solve(
     weight = np.zeros((len(names), len(names)))
     weight[: len(held), : len(held)] = np.diag([1 / (_HOLD_KG if name == "mass" else _HOLD_M) for name in held])
     weight[len(held) :, len(held) :] = config.expected_weight * np.linalg.inv(np.linalg.cholesky(spread + floor))
+    if "mass" not in held:
+        k = expected.names.index("mass")
+        heavier = (np.array(names) == "mass") * _MASS_WEIGHT / np.sqrt(expected.covariance[k, k])
+        weight = np.concatenate([weight, heavier[None]])
     read = [DEFINITIONS[name] for name in names]
     held_back = space.whitener.T @ space.whitener
 
@@ -120,7 +126,7 @@ def _solve(
     parameters, damping = mean, _DAMPING
     wrong, readings = residual(parameters)
     for step in range(config.iterations):
-        slope = np.concatenate([weight @ [_by_parameters(space, reading) for reading in readings], space.whitener])
+        slope = np.concatenate([weight @ [by_parameters(space, reading) for reading in readings], space.whitener])
         normal, descent = slope.T @ slope, -slope.T @ wrong
         # a taut tape jumps from one bump to the next: a full step may overshoot
         for _ in range(_TRIES):
@@ -139,7 +145,7 @@ def _solve(
     return parameters
 
 
-def _by_parameters(space: ShapeSpace, reading: Reading) -> FloatArray:
+def by_parameters(space: ShapeSpace, reading: Reading) -> FloatArray:
     return np.einsum("nk,pnk->p", reading.gradient, space.fields[:, reading.vertices])
 
 

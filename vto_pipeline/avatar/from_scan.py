@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 from pydantic import Field
 
 from vto_pipeline.avatar.bust import toward_bust_points
-from vto_pipeline.avatar.correspondence import Target, closest_points
+from vto_pipeline.avatar.clothed import undressed
+from vto_pipeline.avatar.correspondence import Pairs, Target, closest_points
 from vto_pipeline.avatar.displacement import displace
 from vto_pipeline.avatar.levels import find_levels, with_rows_at
+from vto_pipeline.avatar.measure import measure
 from vto_pipeline.avatar.pose import named_pose
-from vto_pipeline.avatar.registration import Fit, first_fit, model, refine
-from vto_pipeline.avatar.scan_report import CORE, check, ends, report
+from vto_pipeline.avatar.registration import Fit, covariance, first_fit, model, refine
+from vto_pipeline.avatar.scan_report import CORE, check, check_build, ends, report
 from vto_pipeline.avatar.scan_start import Start, upright_starts
 from vto_pipeline.avatar.settle import part_thighs, settle
 from vto_pipeline.avatar.shape import SEX_SHARE, ShapeSpace, shape_space
 from vto_pipeline.avatar.slide import slide
-from vto_pipeline.avatar.stance import stance
+from vto_pipeline.avatar.stance import Stance, stance
+from vto_pipeline.avatar.unseen import unseen_sigmas
 from vto_pipeline.avatar.upright import in_metres
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Avatar
@@ -26,10 +30,6 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
 
-_UNDER_CLOTHES = 0.1
-"""What a point outside the body counts there: the cloth's inmost places lie on the body, the others off it."""
-_CLOTHED_STIFFNESS = 2
-"""How many of the displacement's stiffnesses are gone through there: folds are not the body's."""
 _UNLIKE = {"wrist": 1.0, "ankle": 0.9}
 """How little of the scan is followed beyond these joints: our hands are mittens and our feet have no toes."""
 _NOISE_SHARE = 0.2
@@ -70,34 +70,37 @@ def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | No
             hands, feet), and of the explained ones (nearer than 10 mm: no stand, floor or hair), and their share.
 
     Raises:
-        AvatarError: the scan is not a body, with what is missing.
+        AvatarError: the scan is not a body, with what is missing; or it is bent, and how cannot be made out.
     """
     config, job = config or ScanConfig(), job or Job()
     job.progress(0.0, "find the body's facing and size")
     kept, guesses = upright_starts(in_metres(scan, job), job)
-    outside = _UNDER_CLOTHES if config.clothed else 1.0
-    target = Target(kept, config.probes, job.seed, outside)
+    target = Target(kept, config.probes, job.seed)
     space = shape_space(SEX_SHARE[config.sex])
     tries = [_pose_and_shape(space, target, guess, config, job, steps=8) for guess in guesses[:2]]
     scores = [_score(space, target, fit) for fit in tries]
     fit = _pose_and_shape(space, target, tries[int(np.argmin(scores))], config, job, steps=config.iterations)
     job.progress(0.6, "displace the body onto the scan")
-    stiffness = config.stiffness[:_CLOTHED_STIFFNESS] if config.clothed else config.stiffness
     posed = part_thighs(space, fit, model(space, fit))
-    vertices, softest = _displaced(space, fit, target, posed, stiffness, config.rounds)
+    vertices, softest = _displaced(space, fit, target, posed, config.stiffness, config.rounds)
     check(kept, space, vertices, config.max_mean_mm)
     stands = stance(space, fit)
-    if stands.stands:
+    caveats = []
+    if config.clothed:
+        job.progress(0.75, "find the body inside the clothes")
+        shell, _ = settle(space, fit, stands, posed, vertices)
+        fit, sigmas = undressed(space, fit, target, shell, job)
+        # which posture is the body's own does not show
+        stands = replace(stance(space, fit), joints=space.joints(fit.parameters), pose=fit.pose)
+        stands = replace(stands, translation=fit.translation)
+        cloth = Target(kept, config.probes, job.seed, clothed=True)
+        vertices, _ = _displaced(space, fit, cloth, model(space, fit), config.stiffness, config.rounds)
+        job.measure(estimated_under_clothing=True)
+        job.warn("the body is an estimate under clothing: do not choose a size by it without a tape")
+        caveats.append("estimated under clothing")
+    elif stands.stands:
         job.progress(0.75, "find the body's own levels")
-        upright = (vertices - stands.translation) @ stands.yaw
-        found = find_levels(upright, space.base)
-        levelled = with_rows_at(space, fit.parameters, upright, found)
-        shift = (levelled.base.bind_vertices - space.base.bind_vertices) @ stands.yaw.T
-        if "chest" in found:
-            seen = (kept.vertices - stands.translation) @ stands.yaw
-            shift += toward_bust_points(upright + shift @ stands.yaw, seen, space.base) @ stands.yaw.T
-        risen = slide(vertices, space.base.faces, shift)
-        space = levelled
+        space, risen = _levelled(space, fit, stands, kept, vertices)
         stands = stance(space, fit)
         vertices, _ = _displaced(space, fit, target, risen, (softest,), config.rounds)
     else:
@@ -105,16 +108,33 @@ def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | No
             f"the body does not stand: a part of it leans {np.rad2deg(stands.lean):.0f} degrees; its "
             "measurements are those of the body brought upright, and less certain"
         )
+        caveats.append("brought upright")
     job.progress(0.9, "carry the body back to the bind pose")
-    body, bad = settle(space, fit, stands, part_thighs(space, fit, model(space, fit)), vertices)
-    report(kept, space, body.vertices, job)
+    posed = part_thighs(space, fit, model(space, fit))
+    body, bad = settle(space, fit, stands, posed, vertices)
+    if not stands.stands:
+        check_build(measure(body), stands.lean)
+    if not config.clothed:
+        sigmas = unseen_sigmas(space, _uncertainty(space, target, fit, config), target, posed, body, stands.stands)
+    caveats += report(kept, space, body.vertices, job)
     job.measure(tangled_faces=bad)
-    if config.clothed:
-        job.measure(estimated_under_clothing=True)
-        job.warn("the body is an estimate under clothing: do not choose a size by it without a tape")
     if bad:
         job.warn(f"{bad} faces of the registered body still pass through others, where the scan's own limbs touch")
-    return body
+    return replace(body, sigmas=sigmas, caveats=tuple(caveats))
+
+
+def _levelled(
+    space: ShapeSpace, fit: Fit, stands: Stance, scan: TriangleMesh, vertices: FloatArray
+) -> tuple[ShapeSpace, FloatArray]:
+    """Return the space with its rows at the body's own levels, and the body with its rows slid there."""
+    upright = (vertices - stands.translation) @ stands.yaw
+    found = find_levels(upright, space.base)
+    levelled = with_rows_at(space, fit.parameters, upright, found)
+    shift = (levelled.base.bind_vertices - space.base.bind_vertices) @ stands.yaw.T
+    if "chest" in found:
+        seen = (scan.vertices - stands.translation) @ stands.yaw
+        shift += toward_bust_points(upright + shift @ stands.yaw, seen, space.base) @ stands.yaw.T
+    return levelled, slide(vertices, space.base.faces, shift)
 
 
 def _displaced(
@@ -133,15 +153,24 @@ def _pose_and_shape(
         fit, reach = first_fit(space, begin, named_pose(space.base, begin.pose_name).pose), config.reach_mm
     else:
         fit, reach = begin, config.reach_mm / 2
-    # what the scan may lack must not reach out for the rest of it
-    chosen = np.flatnonzero(ends(space) < CORE)[::3]
     fall = (config.final_reach_mm / reach) ** (1 / steps)
     for step in range(steps):
-        pairs = target.pairs(model(space, fit), space.base.faces, chosen, reach * 1e-3)
+        pairs = _pairs(space, target, fit, reach)
         fit = refine(space, fit, pairs, noise=_NOISE_SHARE * reach * 1e-3)
         reach *= fall
         job.progress(0.1 + 0.5 * step / steps, f"pose and shape, step {step + 1} of {steps}")
     return fit
+
+
+def _pairs(space: ShapeSpace, target: Target, fit: Fit, reach_mm: float) -> Pairs:
+    # what the scan may lack must not reach out for the rest of it
+    chosen = np.flatnonzero(ends(space) < CORE)[::3]
+    return target.pairs(model(space, fit), space.base.faces, chosen, reach_mm * 1e-3)
+
+
+def _uncertainty(space: ShapeSpace, target: Target, fit: Fit, config: ScanConfig) -> FloatArray:
+    pairs = _pairs(space, target, fit, config.final_reach_mm)
+    return covariance(space, fit, pairs, noise=_NOISE_SHARE * config.final_reach_mm * 1e-3)
 
 
 def _score(space: ShapeSpace, target: Target, fit: Fit) -> float:

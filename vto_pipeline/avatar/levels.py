@@ -65,13 +65,14 @@ LEVELS = (
     Level("hip", "rearmost", 0.050, 0.020, 0.002),
     Level("waist", "narrowest", 0.045, 0.015, 0.004),
     Level("chest", "foremost", 0.040, 0.010, 0.002),
-    Level("neck", "narrowest", 0.025, 0.008, 0.004),
+    Level("neck", "narrowest", 0.025, 0.008, 0.004, above=-0.006),
 )
 """Lowest first. Where a body has no such extreme within reach, as a belly without a waist, the row stays.
 
 The reach is about two standard deviations of the level's height among people of one stature and weight (ANSUR II). The
 middle of the patella shows in no girth; the leg is narrowest under it, at the hollow of the knee, as far as
-on the template.
+on the template. A horizontal cut of the neck is narrowest where the chin begins to count; the tape lies below that,
+as far as on the template.
 """
 
 

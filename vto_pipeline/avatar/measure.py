@@ -34,7 +34,7 @@ def measure(body: Avatar | TriangleMesh) -> Measurements:
         left, right = (tape.read(definition, body.bind_vertices, side).value for side in ("left", "right"))
         values[name] = (left + right) / 2
         sigmas[name] = math.hypot(tape.uncertainty(definition, body.bind_vertices), body.sigmas.get(name, 0.0))
-    return Measurements(values, sigmas, sex_name(body.sex))
+    return Measurements(values, sigmas, sex_name(body.sex), body.caveats)
 
 
 def fit_levels(avatar: Avatar) -> dict[str, float]:

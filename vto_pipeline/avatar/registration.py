@@ -69,7 +69,7 @@ def model(space: ShapeSpace, fit: Fit) -> FloatArray:
     return skin(space.vertices(fit.parameters), space.base.weights, rotation, offset) + fit.translation
 
 
-def refine(space: ShapeSpace, fit: Fit, pairs: Pairs, noise: float) -> Fit:
+def refine(space: ShapeSpace, fit: Fit, pairs: Pairs, noise: float, stiff: float = 1.0) -> Fit:
     """Take one Gauss-Newton step.
 
     Args:
@@ -77,7 +77,32 @@ def refine(space: ShapeSpace, fit: Fit, pairs: Pairs, noise: float) -> Fit:
         fit: Where to step from.
         pairs: Point-to-plane correspondences.
         noise: Spread of the distances [m]: how much the pairs count against the prior.
+        stiff: How much more than it should the shape is drawn to the expected one.
     """
+    normal, right, above = _system(space, fit, pairs, noise, stiff)
+    joints, count = len(space.base.joints), len(space.names)
+    move = np.linalg.solve(normal, right)
+    turn = move[count : count + 3 * joints].reshape(-1, 3)
+    turn *= min(1.0, _MAX_TURN_RAD / max(np.abs(turn).max(), 1e-12))
+    pose = np.empty_like(fit.pose)
+    for j in range(joints):
+        local = above[j].T @ Rotation.from_rotvec(turn[j]).as_matrix() @ above[j]
+        pose[j] = (Rotation.from_matrix(local) * Rotation.from_rotvec(fit.pose[j])).as_rotvec()
+    return replace(fit, parameters=fit.parameters + move[:count], pose=pose, translation=fit.translation + move[-3:])
+
+
+def covariance(space: ShapeSpace, fit: Fit, pairs: Pairs, noise: float) -> FloatArray:
+    """Return how surely the shape's parameters are known after the fit, pose and place left open too, shape (P, P)."""
+    count = len(space.names)
+    whole = np.linalg.inv(_system(space, fit, pairs, noise, 1.0)[0])
+    found: FloatArray = whole[:count, :count].astype(np.float64)
+    return found
+
+
+def _system(
+    space: ShapeSpace, fit: Fit, pairs: Pairs, noise: float, stiff: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the normal equations of a step, and the rotation of each joint's parent, shape (J, 3, 3)."""
     pairs = pairs.counting()
     vertices = model(space, fit)
     points = np.einsum("nk,nkd->nd", pairs.shares, vertices[pairs.corners])
@@ -88,24 +113,19 @@ def refine(space: ShapeSpace, fit: Fit, pairs: Pairs, noise: float) -> Fit:
     weight = np.sqrt(pairs.weights * _INDEPENDENT / max(len(wrong), 1)) / noise
     sigma = np.array([_POSE_SIGMA_RAD.get(name.rpartition("_")[2], 10.0) for name in space.base.joint_names])
     prior = np.zeros((count + 3 * joints, count + 3 * joints + 3))
-    prior[:count, :count] = space.whitener
+    prior[:count, :count] = stiff * space.whitener
     prior[count:, count : count + 3 * joints] = np.diag(np.repeat(1 / sigma, 3))
     rotation, _ = joint_transforms(space.joints(fit.parameters), space.base.parents, fit.pose)
     above = np.stack([np.eye(3) if parent < 0 else rotation[parent] for parent in space.base.parents])
     # the joints turn in world axes: so must the pose that is drawn to zero
     bent = np.einsum("jab,jb->ja", above, fit.pose)
-    straight = np.concatenate([space.whitener @ (fit.parameters - fit.expected), (bent / sigma[:, None]).ravel()])
+    straight = np.concatenate(
+        [stiff * space.whitener @ (fit.parameters - fit.expected), (bent / sigma[:, None]).ravel()]
+    )
     slope = derivatives(space, fit, pairs) * weight[:, None]
     normal = slope.T @ slope + prior.T @ prior
     right = -slope.T @ (wrong * weight) - prior.T @ straight
-    move = np.linalg.solve(normal + 1e-9 * np.eye(len(normal)), right)
-    turn = move[count : count + 3 * joints].reshape(-1, 3)
-    turn *= min(1.0, _MAX_TURN_RAD / max(np.abs(turn).max(), 1e-12))
-    pose = np.empty_like(fit.pose)
-    for j in range(joints):
-        local = above[j].T @ Rotation.from_rotvec(turn[j]).as_matrix() @ above[j]
-        pose[j] = (Rotation.from_matrix(local) * Rotation.from_rotvec(fit.pose[j])).as_rotvec()
-    return replace(fit, parameters=fit.parameters + move[:count], pose=pose, translation=fit.translation + move[-3:])
+    return normal + 1e-9 * np.eye(len(normal)), right, above
 
 
 def derivatives(space: ShapeSpace, fit: Fit, pairs: Pairs) -> FloatArray:

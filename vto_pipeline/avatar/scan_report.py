@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from vto_pipeline.avatar.correspondence import closest_points
+from vto_pipeline.avatar.population import population
 from vto_pipeline.avatar.shape import ShapeSpace
 from vto_pipeline.errors import AvatarError
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.body import Measurements
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -19,6 +21,9 @@ CORE = 0.3
 _TRUNK = 0.8
 _MIN_TRUNK, _MIN_LIMB = 0.3, 0.5
 _POINTS = 5000
+_BUILD = ("shoulder_height", "back_shoulder_width", "outer_arm_length", "hip_height", "inside_leg", "knee_height")
+_BUILD_M, _ODD = 0.02, 4.0
+"""How well these are read off a bent body [m], and how many standard deviations no person is away."""
 
 
 def check(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray, max_mean_mm: float) -> None:
@@ -38,8 +43,33 @@ def check(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray, max_mean_
         )
 
 
-def report(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray, job: Job) -> None:
-    """Measure how far the scan lies from the body, at points that the fit has not seen."""
+def check_build(read: Measurements, lean: float) -> None:
+    """Refuse a bent body that was not made out: its lengths are nobody's.
+
+    Args:
+        read: What was measured on it.
+        lean: The largest turn of a part of trunk and legs away from upright [rad].
+
+    Raises:
+        AvatarError: a length lies farther from what people of this stature have than pose and survey explain.
+    """
+    people = population(read.sex)
+    tall = float(people.mean[people.names.index("stature")])
+    usual = people.given({"stature": tall}, {})
+    for name in _BUILD:
+        k = usual.names.index(name)
+        # relative to stature, so that children have it too
+        away = read.values[name] * tall / read.values["stature"] - usual.mean[k]
+        if abs(away) > _ODD * np.hypot(np.sqrt(usual.covariance[k, k]), _BUILD_M):
+            raise AvatarError(
+                f"the body leans {np.rad2deg(lean):.0f} degrees and cannot be made out: its {name} would be "
+                f"{100 * read.values[name]:.0f} cm at a stature of {100 * read.values['stature']:.0f} cm",
+                hint="scan it standing upright, arms held off",
+            )
+
+
+def report(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray, job: Job) -> list[str]:
+    """Return what the scan hides; measure how far it lies from the body, at points that the fit has not seen."""
     faces = space.base.faces
     points, _, _ = sample_surface(scan, _POINTS, job.seed + 1)
     face, _, distance = closest_points(points, vertices, faces)
@@ -57,11 +87,14 @@ def report(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray, job: Job
             )
     job.measure(explained_share=round(float(explained.mean()), 3))
     job.measure(trunk_covered=round(_trunk_covered(scan, space, vertices), 3))
+    hidden = []
     for limb, share in _limbs_covered(scan, space, vertices).items():
         if share < _MIN_LIMB:
+            hidden.append(f"{limb} not seen")
             job.warn(
                 f"{share:.0%} of the {limb} is in the scan: its measurements are those of a likely body of this size"
             )
+    return hidden
 
 
 def ends(space: ShapeSpace) -> FloatArray:

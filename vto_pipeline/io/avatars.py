@@ -35,6 +35,7 @@ def write_avatar(path: Path, avatar: Avatar) -> None:
             "parameter_values": np.array(list(avatar.parameters.values()), dtype=np.float64),
             "sigma_names": _strings(avatar.sigmas),
             "sigma_values": np.array(list(avatar.sigmas.values()), dtype=np.float64),
+            "caveats": _strings(avatar.caveats),
         },
     )
 
@@ -78,6 +79,7 @@ def _avatar(arrays: Arrays, path: Path) -> Avatar:
             loops=dict(zip(map(str, arrays["loop_names"]), loops[: len(arrays["loop_names"])], strict=True)),
             parameters=_named(arrays, "parameter"),
             sigmas=_named(arrays, "sigma") if "sigma_names" in arrays else {},
+            caveats=tuple(map(str, arrays.get("caveats", ()))),
         )
     except (KeyError, TypeError, ValueError) as e:
         raise FormatError(f"not an avatar: {e!r}", where=str(path)) from None

@@ -63,6 +63,7 @@ class MeasurementsFile(Config):
     size: str | None = Field(None, description="Letter of EN 13402-3: the middle of its chest or bust girth.")
     measurements: dict[str, float] = Field({}, description="ISO 8559-1 name -> value.")
     sigmas: dict[str, float] = Field({}, description="Name -> standard uncertainty, in the same unit.")
+    caveats: tuple[str, ...] = Field((), description="Why these are estimates rather than measurements.")
 
 
 class StatureFile(Config):
@@ -105,7 +106,7 @@ def read_measurements(source: Path | Mapping[str, Any]) -> Measurements:
             raise InputError(problem, where=document.where(("measurements", written)), hint=hint)
     if stored.size is not None:
         values = _of_size(stored.size, stored.sex, values, document)
-    return Measurements(values, to_si(stored.sigmas), stored.sex)
+    return Measurements(values, to_si(stored.sigmas), stored.sex, stored.caveats)
 
 
 def _snake(name: str) -> str:
@@ -132,7 +133,7 @@ def _of_size(letter: str, sex: str, values: dict[str, float], document: Document
 def write_measurements(path: Path, measurements: Measurements) -> None:
     """Write measurements in metres, in a form that `read_measurements` reads."""
     record = {"sex": measurements.sex, "unit": "m", "measurements": dict(measurements.values)}
-    write_json(path, {**record, "sigmas": dict(measurements.sigmas)})
+    write_json(path, {**record, "sigmas": dict(measurements.sigmas), "caveats": list(measurements.caveats)})
 
 
 def read_silhouettes(source: Path | Mapping[str, Any]) -> Silhouettes:

@@ -18,11 +18,13 @@ class Measurements:
         values: Name -> length [m] (mass, if present, in kg under "mass").
         sigmas: Name -> standard uncertainty in the same unit; a name may be absent.
         sex: "female", "male" or "neutral".
+        caveats: Why they are estimates rather than measurements, such as "under clothing"; empty where they are not.
     """
 
     values: Mapping[str, float]
     sigmas: Mapping[str, float] = field(default_factory=dict)
     sex: str = "neutral"
+    caveats: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.sex not in ("female", "male", "neutral"):
@@ -51,6 +53,7 @@ class Avatar:
         loops: Name -> closed loop of vertex indices.
         parameters: Name -> value of the shape parameters, for the record.
         sigmas: Measurement name -> standard uncertainty with which the body has it [m, kg]; absent where unknown.
+        caveats: Why its measurements are estimates, as those of `Measurements`.
     """
 
     bind_vertices: FloatArray
@@ -67,6 +70,7 @@ class Avatar:
     loops: Mapping[str, IntArray] = field(default_factory=dict)
     parameters: Mapping[str, float] = field(default_factory=dict)
     sigmas: Mapping[str, float] = field(default_factory=dict)
+    caveats: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         count, bones = len(self.bind_vertices), len(self.joint_names)
