@@ -39,9 +39,12 @@ class _Found(NamedTuple):
     low: FloatArray
     high: FloatArray
 
-    def serves(self, low: FloatArray, high: FloatArray) -> bool:
-        """Return whether these ways stay there."""
-        return len(self.low) == len(low) and bool((low >= self.low).all() and (high <= self.high).all())
+    def serves(self, x: FloatArray, end: FloatArray, radius: FloatArray) -> bool:
+        """Return whether these ways, with their radii, stay there."""
+        if len(self.low) != len(x):
+            return False
+        low, high = _between(x, end, radius)
+        return bool((low >= self.low).all() and (high <= self.high).all())
 
 
 class _Passed(NamedTuple):
@@ -158,22 +161,25 @@ class SelfContact:
                 return end, no_pairs()
         start, wanted, bodies = x, end, self._bodies
         beside, step = no_candidates(), 0.0
-        carried = np.zeros_like(x) if pushed is None else pushed
+        carried = pushed
         if bodies is not None:
             start, wanted = bodies.beside(x, False), bodies.beside(end, True)
             beside = self._outside(bodies, x, end, bodies.step)
             if bodies.moving(beside).any():
                 led = bodies.carried(beside)
-                carried, step = np.where(led != 0.0, led, carried), bodies.step
-        backs = [x]
-        if carried.any():
+                carried, step = led if pushed is None else np.where(led != 0.0, led, pushed), bodies.step
+        backs, room = [x], step
+        if carried is not None and carried.any():
             common = carried.sum(axis=0) / max(int(carried.any(axis=1).sum()), 1)
             backs = [x + carried, x + common]
-        room = max(step, float(np.sqrt((carried**2).sum(axis=1).max(initial=0.0))))
+            room = max(step, float(np.sqrt((carried**2).sum(axis=1).max())))
         if bodies is not None:
             backs = [bodies.beside(back, True) for back in backs]
         for ways in (_together(x, end), end):  # what is cut short falls behind what all have in common
             found = self._candidates(x, ways, room).joined(beside)
+            if found.number == 0:
+                self._pass(x, end, 0)
+                return end, no_pairs()
             moving = np.zeros(found.number, np.bool_) if bodies is None else bodies.moving(found)
             began = time.perf_counter()
             for back in backs:
@@ -187,14 +193,18 @@ class SelfContact:
             self.tally.impacts_known += found.number - looked
             self.tally.impact_s += time.perf_counter() - began
             if (share == 1.0).all():
-                if not self._force_all:
-                    self._passed = _Passed(x.copy(), end.copy(), found.number)
+                self._pass(x, end, found.number)
                 break
         self.tally.uncut += int((stuck & moving).sum())
         self.tally.shortened += int((share[: len(x)] < 1.0).sum())
         return there[: len(x)], self._pairs(
             x, end, end - x, self._beyond_planes(found.chosen(hit), len(x)), 0.0, 0.0, False
         )
+
+    def _pass(self, x: FloatArray, end: FloatArray, pairs: int) -> None:
+        """Remember that nothing meets on the way from x to end."""
+        if not self._force_all:
+            self._passed = _Passed(x.copy(), end.copy(), pairs)
 
     def _way(
         self, start: FloatArray, wanted: FloatArray, back: FloatArray, found: Candidates, new: NDArray[np.bool_]
@@ -253,9 +263,8 @@ class SelfContact:
         """Return candidates for ways that have in common what the vertices do not move."""
         self.tally.asked += 1
         radius = self._reach + room
-        low, high = _between(x, end, radius)
         if not self._force_all:
-            if self._found.serves(low, high):
+            if self._found.serves(x, end, radius):
                 self.tally.reused += 1
                 return self._still(self._found.candidates, x, end, radius)
             began = time.perf_counter()
@@ -280,7 +289,7 @@ class SelfContact:
         """Return candidates between the cloth, with room about its ways [m], and what is outside it of bodies."""
         self.tally.body_asked += 1
         start, there = bodies.beside(x, False), bodies.beside(end, True)
-        if self._force_all or not self._beside.serves(*_between(start, there, self._all_reach + room)):
+        if self._force_all or not self._beside.serves(start, there, self._all_reach + room):
             began = time.perf_counter()
             wider = self._wider(x, end) + room
             found = bodies.search(self._fitted(x, end, wider), x, end, wider)
