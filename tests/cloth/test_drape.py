@@ -115,6 +115,9 @@ def test_what_the_search_for_self_contacts_saved_is_told_and_nothing_when_all_is
     assert "self-collision search" not in dict(whole.left_out)
     assert whole.metrics["self_searches_left_out"] == 0 == whole.metrics["self_searches_saved_s"]
     assert whole.metrics["self_searches"] > plain.metrics["self_searches"] > 0
+    assert plain.metrics["body_refits_left_out"] > 0 < plain.metrics["body_refits_saved_s"]
+    assert whole.metrics["body_refits_left_out"] == 0 == whole.metrics["body_refits_saved_s"]
+    assert plain.metrics["impacts_left_out"] > 0 == whole.metrics["impacts_left_out"]
 
 
 def test_a_garment_that_starts_through_itself_is_untangled():

@@ -9,7 +9,7 @@ import numpy as np
 
 from vto_pipeline.cloth.build import ClothModel, ClothState, at_rest, without_gravity
 from vto_pipeline.cloth.clear import clear_of_body
-from vto_pipeline.cloth.collision.self_contact import Tally
+from vto_pipeline.cloth.collision.tally import Tally, tell
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.grow import growing
 from vto_pipeline.cloth.pace import PacedBody, covered_way, ride
@@ -57,6 +57,7 @@ class Phases:
         self._job = job
         self._crossed = np.zeros(len(model.mass), np.bool_)
         self._tallies: list[Tally] = []
+        self._colliders: list[PacedBody] = []
 
     def free(self, state: ClothState, body: TriangleMesh | None = None) -> ClothState:
         """Return the cloth where it crosses neither itself nor the body; where it could not be freed, it may go on."""
@@ -87,6 +88,7 @@ class Phases:
             crossed=self._crossed,
             force_all=self._job.force_all,
         )
+        self._colliders.append(collider)
         if made.self_contact is not None:
             self._tallies.append(made.self_contact.tally)
         return made
@@ -169,20 +171,5 @@ class Phases:
         return settling
 
     def account(self) -> None:
-        """Tell what the search for contacts of the cloth with itself took and saved."""
-        asked, out, reused = (
-            sum(getattr(one, name) for one in self._tallies) for name in ("asked", "out_of_reach", "reused")
-        )
-        if out + reused > 0:
-            self._job.leave_out(
-                "self-collision search",
-                f"{(out + reused) / asked:.0%} of {asked} questions needed none: the cloth was out of its own reach "
-                f"({out}), or an earlier search still held ({reused})",
-            )
-        if asked > 0:
-            self._job.measure(
-                self_searches=sum(one.searched for one in self._tallies),
-                self_searches_left_out=out + reused,
-                self_searches_took_s=sum(one.proof_s + one.search_s for one in self._tallies),
-                self_searches_saved_s=sum(one.saved_s for one in self._tallies),
-            )
+        """Tell what keeping the cloth apart took, and what was left out of it."""
+        tell(self._tallies, self._colliders, self._job)

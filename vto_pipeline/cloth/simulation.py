@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -76,7 +76,7 @@ class Trajectory:
         report: seconds (wall), prepare_s (what the method made before), method, reason, substeps, steps,
             contact_rounds, simulated_s, energy_j, residual; with "rest" settled; error_mm where it is known; where the
             cloth is kept from itself start_pairs (of triangles that met), start_left (that still did after untangling)
-            and self_contact (a `collision.self_contact.Tally`, with saved_s); warnings, where anything is left.
+            and self_contact (see `collision.tally.Tally`); warnings, where anything is left.
         trace: Error against run time, where it is known.
     """
 
@@ -180,7 +180,7 @@ def simulate(
         tally = stepper.self_contact.tally
         if tally.uncut:
             job.warn(f"{tally.uncut} pairs were met by what moves where nothing could give way")
-        report.update(self_contact={**asdict(tally), "saved_s": tally.saved_s})
+        report.update(self_contact=tally.as_report())
     report.update(warnings=tuple(job.warnings))
     return Trajectory(state.positions, state.velocities, report, trace)
 

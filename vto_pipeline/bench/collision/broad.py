@@ -146,8 +146,11 @@ def _overlapping(one: IntArray, other: IntArray, boxes: FloatArray) -> int:
 
 
 def _with_narrow_phase(step: _Step) -> Search:
-    """Return all that a step does about the cloth itself: what is near, and how far it may go."""
-    contact = SelfContact(step.features.faces, step.radius, FRICTION)
+    """Return all that a step does about the cloth itself: what is near, and how far it may go; nothing left out.
+
+    Else a second run would be answered by what the first had found.
+    """
+    contact = SelfContact(step.features.faces, step.radius, FRICTION, force_all=True)
 
     def search() -> dict[str, int]:
         before = contact.tally.impacts

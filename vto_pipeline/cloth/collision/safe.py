@@ -16,7 +16,7 @@ _SERIAL_BELOW = 500  # pairs; starting the threads costs as much as their work
 
 
 @njit(cache=True, error_model="numpy")
-def safe_way(x, end, back, features, to_face, to_edge, reach):
+def safe_way(x, end, back, features, to_face, to_edge, reach, new):
     """Return how far each vertex may go towards its end so that no pair meets, and which pairs would have met.
 
     What hits goes to the moment before; since that bends other ways, all is tested again until nothing hits. Shares
@@ -29,16 +29,20 @@ def safe_way(x, end, back, features, to_face, to_edge, reach):
         features: Of the cloth, and of bodies.
         to_face, to_edge: All pairs whose swept boxes overlap, shapes (N, 2) and (M, 2).
         reach: Distance each vertex contributes to what two features keep [m], shape (V,).
+        new: Which ways to look at, shape (V,); pairs of others are known not to meet.
 
     Returns:
         Positions [m], shape (V, 3); share of each way, shape (V,); whether each pair would have met, and whether it
-        does so still, both shape (N + M,).
+        does so still, both shape (N + M,); how many pairs have a new way.
     """
     share = np.ones(len(x))
     there = end.copy()
     total = len(to_face) + len(to_edge)
     times, hit, stuck = np.empty(total), np.zeros(total, np.bool_), np.zeros(total, np.bool_)
-    stale = np.ones(len(x), np.bool_)
+    stale = new.copy()
+    looked = 0
+    for p in range(total):
+        looked += _is_stale(p, features, to_face, to_edge, stale)
     for turn in range(total + _PATIENCE):
         if total >= _SERIAL_BELOW:
             _times_parallel(x, there, features, to_face, to_edge, reach, stale, times)
@@ -64,7 +68,7 @@ def safe_way(x, end, back, features, to_face, to_edge, reach):
                 store(there, i, axpy(share[i], sub(load(end, i), load(back, i)), load(back, i)))
         if done:
             break
-    return there, share, hit, stuck
+    return there, share, hit, stuck, looked
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
@@ -76,11 +80,11 @@ def _times_parallel(x, there, features, to_face, to_edge, reach, stale, times):
 @njit(cache=True, error_model="numpy")
 def _time(p, x, there, features, to_face, to_edge, reach, stale, times):
     """Write when pair p meets, where one of its ways is new; it does not otherwise."""
+    times[p] = np.inf
+    if not _is_stale(p, features, to_face, to_edge, stale):
+        return
     a, b = _corner(p, 0, features, to_face, to_edge), _corner(p, 1, features, to_face, to_edge)
     c, d = _corner(p, 2, features, to_face, to_edge), _corner(p, 3, features, to_face, to_edge)
-    times[p] = np.inf
-    if not (stale[a] or stale[b] or stale[c] or stale[d]):
-        return
     a0, b0, c0, d0 = load(x, a), load(x, b), load(x, c), load(x, d)
     a1, b1, c1, d1 = load(there, a), load(there, b), load(there, c), load(there, d)
     if _cannot_meet(p < len(to_face), (a0, b0, c0, d0), (a1, b1, c1, d1)):
@@ -98,6 +102,14 @@ def _time(p, x, there, features, to_face, to_edge, reach, stale, times):
         if apart <= own or keep < _KEEP:
             break
         keep = _KEEP * own / apart
+
+
+@njit(cache=True, error_model="numpy")
+def _is_stale(p, features, to_face, to_edge, stale):
+    """Return whether one of the ways of pair p is new."""
+    a, b = _corner(p, 0, features, to_face, to_edge), _corner(p, 1, features, to_face, to_edge)
+    c, d = _corner(p, 2, features, to_face, to_edge), _corner(p, 3, features, to_face, to_edge)
+    return stale[a] or stale[b] or stale[c] or stale[d]
 
 
 @njit(cache=True, error_model="numpy")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from vto_pipeline.cloth.collision.pairs import Pairs, against_bodies, near_pairs
 from vto_pipeline.cloth.collision.pieces import pieces
 from vto_pipeline.cloth.collision.reach import reach
 from vto_pipeline.cloth.collision.safe import safe_way
+from vto_pipeline.cloth.collision.tally import Tally
 from vto_pipeline.geometry.intersections import meeting_vertices, self_intersections
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
@@ -29,41 +29,7 @@ _REGAINED = 0.2  # of a gap that is lost, at most, in a step: at once, layers wo
 _ROOM = 0.1  # of an edge: the most that layers are looked for beyond their thickness, or none could be proven apart
 _LOOK = 50  # searches after which to see whether the tree is still good, and what has come free
 _WIDER = 0.3  # of the longest way: how much farther than asked for a search looks, to serve the rest of the step too
-
-
-@dataclass
-class Tally:
-    """What was done and what was not.
-
-    Args:
-        asked: How often something had to be known of a step.
-        out_of_reach: Of those, how often the cloth could be shown to stay out of its own reach.
-        reused: Of those, how often an earlier search still held.
-        searched: Of those, how often candidates were searched for.
-        proof_s, search_s: Time taken by these [s].
-        body_searched: How often candidates between cloth and bodies were searched for.
-        body_s: Time taken by that [s].
-        impacts: Times of impact looked for.
-        shortened: Vertices that could not go their whole way, over all steps.
-        uncut: Pairs of the cloth and a moving body that meet, however short the cloth's move is cut.
-    """
-
-    asked: int = 0
-    out_of_reach: int = 0
-    reused: int = 0
-    searched: int = 0
-    proof_s: float = 0.0
-    search_s: float = 0.0
-    body_searched: int = 0
-    body_s: float = 0.0
-    impacts: int = 0
-    shortened: int = 0
-    uncut: int = 0
-
-    @property
-    def saved_s(self) -> float:
-        """Time that the searches left out would have taken, by those that were done [s]; 0 where there was none."""
-        return self.search_s / max(self.searched, 1) * (self.out_of_reach + self.reused)
+_ASLEEP = 0.3  # of the reach: but at least so much, so that what hardly moves is not searched for at each step
 
 
 class _Found(NamedTuple):
@@ -73,9 +39,20 @@ class _Found(NamedTuple):
     low: FloatArray
     high: FloatArray
 
-    def serves(self, low: FloatArray, high: FloatArray) -> bool:
-        """Return whether these ways stay there."""
-        return len(self.low) == len(low) and bool((low >= self.low).all() and (high <= self.high).all())
+    def serves(self, x: FloatArray, end: FloatArray, radius: FloatArray) -> bool:
+        """Return whether these ways, with their radii, stay there."""
+        if len(self.low) != len(x):
+            return False
+        low, high = _between(x, end, radius)
+        return bool((low >= self.low).all() and (high <= self.high).all())
+
+
+class _Passed(NamedTuple):
+    """A move from x to end [m], shapes (V, 3), on which nothing meets; so many pairs were looked at to know it."""
+
+    x: FloatArray
+    end: FloatArray
+    pairs: int
 
 
 _NOTHING = _Found(no_candidates(), np.empty((0, 3)), np.empty((0, 3)))
@@ -126,9 +103,11 @@ class SelfContact:
         self._tree: bvh.Bvh | None = None
         self._length: float | None = None
         self._found = self._beside = _NOTHING
+        self._passed: _Passed | None = None
 
     def at(self, begin: float, end: float) -> None:
         """Take the bodies to a step between these times [s]; what is asked next is about it."""
+        self._passed = None
         if self._bodies is not None:
             self._bodies.at(begin, end)
 
@@ -144,7 +123,9 @@ class SelfContact:
             drift: How far by their speed alone [m], shape (V, 3); all the way when None.
         """
         apart = min(GRAVITY * seconds**2, _ROOM * self._edge(x))
+        before = self.tally.reused
         found = self._candidates(x, _together(x, end), 0.5 * apart)
+        self.tally.rested += self.tally.reused - before
         if self._bodies is not None:
             found = found.joined(self._beyond_planes(self._outside(self._bodies, x, end), len(x)))
         return self._pairs(x, end, end - x if drift is None else drift, found, self._recovery * seconds, apart, True)
@@ -159,6 +140,8 @@ class SelfContact:
     def safe(self, x: FloatArray, end: FloatArray, pushed: FloatArray | None = None) -> tuple[FloatArray, Pairs]:
         """Return positions on the way to `end` that nothing crosses another on the way to, and what would have.
 
+        Of a move from the same places that was found free before, only what has changed is looked at again.
+
         Before a moving body it is safest to be carried along: each vertex as what is beside it moves, or, where layers
         would meet by that, all alike. Where neither is safe, as between two bodies, the cloth is kept from passing
         through itself and what rests, and what meets is counted.
@@ -169,41 +152,67 @@ class SelfContact:
         """
         if self._crossed.any() and self.tally.asked % _LOOK == 0:
             self._release(x)
+        new = np.ones(len(self._all_reach), np.bool_)
+        if self._passed is not None and np.array_equal(x, self._passed.x):
+            new[:] = False
+            new[: len(x)] = (end != self._passed.end).any(axis=1)
+            if not new.any():
+                self.tally.impacts_known += self._passed.pairs
+                return end, no_pairs()
         start, wanted, bodies = x, end, self._bodies
         beside, step = no_candidates(), 0.0
-        carried = np.zeros_like(x) if pushed is None else pushed
+        carried = pushed
         if bodies is not None:
             start, wanted = bodies.beside(x, False), bodies.beside(end, True)
             beside = self._outside(bodies, x, end, bodies.step)
             if bodies.moving(beside).any():
                 led = bodies.carried(beside)
-                carried, step = np.where(led != 0.0, led, carried), bodies.step
-        backs = [x]
-        if carried.any():
+                carried, step = led if pushed is None else np.where(led != 0.0, led, pushed), bodies.step
+        backs, room = [x], step
+        if carried is not None and carried.any():
             common = carried.sum(axis=0) / max(int(carried.any(axis=1).sum()), 1)
             backs = [x + carried, x + common]
-        room = max(step, float(np.sqrt((carried**2).sum(axis=1).max(initial=0.0))))
+            room = max(step, float(np.sqrt((carried**2).sum(axis=1).max())))
         if bodies is not None:
             backs = [bodies.beside(back, True) for back in backs]
         for ways in (_together(x, end), end):  # what is cut short falls behind what all have in common
             found = self._candidates(x, ways, room).joined(beside)
+            if found.number == 0:
+                self._pass(x, end, 0)
+                return end, no_pairs()
             moving = np.zeros(found.number, np.bool_) if bodies is None else bodies.moving(found)
-            self.tally.impacts += found.number
+            began = time.perf_counter()
             for back in backs:
-                there, share, hit, stuck = safe_way(start, wanted, back, self._features, *found, self._all_reach)
+                there, share, hit, stuck, looked = self._way(start, wanted, back, found, new)
                 if not (stuck & ~moving).any():
                     break
             else:
-                resting = found.chosen(~moving)
-                there, share, _, _ = safe_way(start, wanted, start, self._features, *resting, self._all_reach)
+                there, share, *_ = self._way(start, wanted, start, found.chosen(~moving), new)
                 stuck = hit
+            self.tally.impacts += looked
+            self.tally.impacts_known += found.number - looked
+            self.tally.impact_s += time.perf_counter() - began
             if (share == 1.0).all():
+                self._pass(x, end, found.number)
                 break
         self.tally.uncut += int((stuck & moving).sum())
         self.tally.shortened += int((share[: len(x)] < 1.0).sum())
         return there[: len(x)], self._pairs(
             x, end, end - x, self._beyond_planes(found.chosen(hit), len(x)), 0.0, 0.0, False
         )
+
+    def _pass(self, x: FloatArray, end: FloatArray, pairs: int) -> None:
+        """Remember that nothing meets on the way from x to end."""
+        if not self._force_all:
+            self._passed = _Passed(x.copy(), end.copy(), pairs)
+
+    def _way(
+        self, start: FloatArray, wanted: FloatArray, back: FloatArray, found: Candidates, new: NDArray[np.bool_]
+    ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], NDArray[np.bool_], int]:
+        """See `safe.safe_way`."""
+        way: tuple[FloatArray, FloatArray, NDArray[np.bool_], NDArray[np.bool_], int]
+        way = safe_way(start, wanted, back, self._features, *found, self._all_reach, new)
+        return way
 
     def _beyond_planes(self, found: Candidates, count: int) -> Candidates:
         """Return those that are not of a vertex of the cloth and a face of a body: planes hold these."""
@@ -214,7 +223,7 @@ class SelfContact:
         """Let what no longer crosses anything take part."""
         faces = self._cloth.faces
         self._crossed &= meeting_vertices(self_intersections(TriangleMesh(x, faces)), faces, len(x))
-        self._found = _NOTHING  # what was found without them no longer holds
+        self._found, self._passed = _NOTHING, None  # what was found without them no longer holds
 
     def _pairs(
         self,
@@ -254,9 +263,8 @@ class SelfContact:
         """Return candidates for ways that have in common what the vertices do not move."""
         self.tally.asked += 1
         radius = self._reach + room
-        low, high = _between(x, end, radius)
         if not self._force_all:
-            if self._found.serves(low, high):
+            if self._found.serves(x, end, radius):
                 self.tally.reused += 1
                 return self._still(self._found.candidates, x, end, radius)
             began = time.perf_counter()
@@ -279,25 +287,26 @@ class SelfContact:
 
     def _outside(self, bodies: BodyFeatures, x: FloatArray, end: FloatArray, room: float = 0.0) -> Candidates:
         """Return candidates between the cloth, with room about its ways [m], and what is outside it of bodies."""
-        began = time.perf_counter()
+        self.tally.body_asked += 1
         start, there = bodies.beside(x, False), bodies.beside(end, True)
-        if self._force_all or not self._beside.serves(*_between(start, there, self._all_reach + room)):
+        if self._force_all or not self._beside.serves(start, there, self._all_reach + room):
+            began = time.perf_counter()
             wider = self._wider(x, end) + room
             found = bodies.search(self._fitted(x, end, wider), x, end, wider)
             padded = np.concatenate([wider, np.full(len(bodies.friction), room)])
             self._beside = _Found(found, *_between(start, there, padded))
             self.tally.body_searched += 1
+            self.tally.body_s += time.perf_counter() - began
         found = self._beside.candidates
         found = found.chosen(still_overlap(bodies.features, *found, start, there, self._all_reach + room))
-        found = bodies.outside(found, x, end, self._reach + room)
-        self.tally.body_s += time.perf_counter() - began
-        return found
+        return bodies.outside(found, x, end, self._reach + room)
 
     def _wider(self, x: FloatArray, end: FloatArray) -> FloatArray:
-        """Return radii to search within, with room for the rest of the step [m], shape (V,)."""
+        """Return radii to search within, with room for the rest of the step and for rest [m], shape (V,)."""
         if self._force_all:
             return self._reach
-        return self._reach + _WIDER * float(np.sqrt(((end - x) ** 2).sum(axis=1).max(initial=0.0)))
+        longest = float(np.sqrt(((end - x) ** 2).sum(axis=1).max(initial=0.0)))
+        return self._reach + max(_WIDER * longest, _ASLEEP * float(self._reach.max(initial=0.0)))
 
     def _fitted(self, x: FloatArray, end: FloatArray, radius: FloatArray) -> bvh.Bvh:
         """Return the tree over the cloth's faces on these ways."""
