@@ -97,7 +97,7 @@ def drape(
         **warn_if_too_small(draped, garment.rest, config.stretch_limit, job),
     }
     error_mm = 1e3 * settling.error if np.isfinite(settling.error) else None
-    reached.phases.account()
+    reached.phases.account(reached.before)
     job.measure(seconds=time.perf_counter() - began, steps=stepper.steps, error_mm=error_mm, **findings)
     if not settling.settled:
         job.warn(

@@ -40,12 +40,14 @@ class Reached(NamedTuple):
         phases: What it went through.
         stepper: The cloth among its colliders.
         settling: How it went.
+        before: What it went through on coarser meshes.
     """
 
     model: ClothModel
     phases: Phases
     stepper: Stepper
     settling: Settling
+    before: tuple[Phases, ...] = ()
 
 
 def come_to_rest(
@@ -86,11 +88,13 @@ class _Descent:
     def reach(self, body: MovingBody, deadline: float) -> Reached:
         """Return the garment at rest on its own mesh."""
         trace: list[TraceRow] = []
+        before: tuple[Phases, ...] = ()
         start = self._coarser[-1].garment if self._coarser else self._garment
         for level in range(len(self._coarser), 0, -1):
             now = time.perf_counter()
             found = self._rest_on(level, start, body, now + _FIRST * (deadline - now))
             trace += found.settling.trace
+            before += (found.phases,)
             self._job.note(
                 f"came to rest on {len(start.mesh.vertices)} vertices first: {time.perf_counter() - now:.1f} s, "
                 f"{found.stepper.steps} steps"
@@ -101,7 +105,7 @@ class _Descent:
             body = MovingBody(body.keyframes[-1:], body.faces)
         reached = self._rest_on(0, start, body, deadline)
         reached.settling.trace[:0] = trace
-        return reached
+        return reached._replace(before=before)
 
     def _rest_on(self, level: int, garment: Garment, body: MovingBody, deadline: float) -> Reached:
         """Return the garment at rest on one mesh: 0 is its own, the last the coarsest."""

@@ -170,6 +170,8 @@ class Phases:
                 break
         return settling
 
-    def account(self) -> None:
-        """Tell what keeping the cloth apart took, and what was left out of it."""
-        tell(self._tallies, self._colliders, self._job)
+    def account(self, before: Sequence[Phases] = ()) -> None:
+        """Tell what keeping the cloth apart took, and what was left out of it, here and on coarser meshes before."""
+        every = (*before, self)
+        tallies = [tally for one in every for tally in one._tallies]
+        tell(tallies, [collider for one in every for collider in one._colliders], self._job)
