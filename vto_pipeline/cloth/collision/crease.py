@@ -15,7 +15,7 @@ from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.numerics.distance import blend, closest_on_triangle
 from vto_pipeline.numerics.vector import dot, load, norm, sub
 
-_ALIKE = 0.99  # cosine of the angle between flanks (8°) under which one plane says what two would
+_ALIKE = 0.9995  # cosine of the angle between flanks (2°) under which one plane says what two would
 _LEFT = 0.25  # of the way from a point to a flank
 _OPPOSED = -0.3  # cosine from which on they are walls of a gap: cloth is pinched between them, not held in a crease
 
