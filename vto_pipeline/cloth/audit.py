@@ -60,7 +60,8 @@ def audit(
         [m], penetration_mm (deepest vertex, 0 when none), penetrating_vertices, min_clearance_mm, min_self_gap_mm (None
         above 5 mm), rms_stretch, max_stretch (of edges, relative), rms and max of the strain of warp, weft and shear
         [rad], largest and least principal strain, area_change, energy_j, residual; and with a fabric judged_energy_j
-        and judged_residual, the latter over vertices that the cloth itself cannot bear.
+        and judged_residual, the latter over vertices that the cloth itself cannot bear, each borne by the one place of
+        the body nearest to it: what lies between two flanks of a hollow counts as out of balance there.
     """
     pairs = edges(mesh)
     length, natural = _lengths(mesh.vertices, pairs), _lengths(rest.positions, pairs)
