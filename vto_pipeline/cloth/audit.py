@@ -60,8 +60,7 @@ def audit(
         [m], penetration_mm (deepest vertex, 0 when none), penetrating_vertices, min_clearance_mm, min_self_gap_mm (None
         above 5 mm), rms_stretch, max_stretch (of edges, relative), rms and max of the strain of warp, weft and shear
         [rad], largest and least principal strain, area_change, energy_j, residual; and with a fabric judged_energy_j
-        and judged_residual, the latter over vertices that the cloth itself cannot bear, each borne by the one place of
-        the body nearest to it: what lies between two flanks of a hollow counts as out of balance there.
+        and judged_residual, the latter over vertices that the cloth itself cannot bear.
     """
     pairs = edges(mesh)
     length, natural = _lengths(mesh.vertices, pairs), _lengths(rest.positions, pairs)
@@ -92,7 +91,7 @@ def audit(
         mu = fabric.friction if friction is None else friction
         found["judged_energy_j"] = weave.energy(mesh.vertices)
         found["judged_residual"] = left_over_force(
-            weave, mesh.vertices, nearest, friction=mu, touching=touching, free=free
+            weave, mesh.vertices, body, nearest, friction=mu, touching=touching, free=free
         )
     return found
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from vto_pipeline.cloth.judge.bearing import left_by_all, left_by_one
+from vto_pipeline.cloth.judge.flanks import flanks
 from vto_pipeline.cloth.judge.strain import RestTriangles, gradients, rest_triangles, thread_strains
 from vto_pipeline.cloth.materials import Materials
 from vto_pipeline.geometry.signed_distance import Nearest
@@ -20,6 +22,8 @@ from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.units import GRAVITY
 
 _STEP = 1e-6  # of an edge: central differences are then right to about 1e-10
+_MUCH = 1e-6  # of a vertex's weight: less is not shared out among flanks
+_ALIKE = 1e-3  # between directions: less is one flank
 _SLIVER = 0.01  # height over longest side of a triangle that counts as that high at least, and does not bend
 
 
@@ -85,7 +89,8 @@ class Weave:
 def left_over_force(
     weave: Weave,
     positions: FloatArray,
-    body: Nearest | None,
+    body: TriangleMesh | None,
+    nearest: Nearest | None,
     *,
     friction: float,
     touching: float,
@@ -93,29 +98,36 @@ def left_over_force(
 ) -> float:
     """Return the force that nothing bears, rms over the free vertices, as a share of a vertex's weight.
 
+    A vertex near one place of the body is borne as what slides there; in a hollow, the flanks share what they can.
+
     Args:
         weave: The cloth.
         positions: [m], shape (V, 3).
-        body: The places of what it lies on that are nearest to the vertices, with signed distances.
+        body: What it lies on.
+        nearest: The places of the body that are nearest to the vertices, with signed distances.
         friction: Coulomb coefficient.
         touching: Distance at which a vertex may be borne by the body [m].
         free: Which vertices to look at, shape (V,).
     """
     left = weave.forces(positions)
     left[:, 1] -= GRAVITY * weave.mass
-    if body is not None:
-        away = positions - body.point
-        outward = np.where(body.distance < 0.0, -1.0, 1.0)[:, None] * away
-        outward /= np.maximum(np.abs(body.distance), np.finfo(float).tiny)[:, None]
-        push = -np.sum(left * outward, axis=1)
-        along = left + push[:, None] * outward
-        length = np.linalg.norm(along, axis=1)
-        slips = np.maximum(0.0, 1.0 - friction * push / np.maximum(length, np.finfo(float).tiny))
-        borne = (body.distance < touching) & (push > 0.0)
-        left[borne] = (slips[:, None] * along)[borne]
     looked = free & (weave.mass > 0.0)
     if not looked.any():
         return 0.0
+    if body is not None and nearest is not None:
+        inside = nearest.distance < 0.0
+        held = looked & (nearest.distance < touching)
+        outward = (positions - nearest.point) * np.where(inside, -1.0, 1.0)[:, None]
+        outward /= np.maximum(np.abs(nearest.distance), np.finfo(float).tiny)[:, None]
+        forces = left.copy()
+        left[held] = left_by_one(forces[held], outward[held], friction)
+        much = np.linalg.norm(left, axis=1) > _MUCH * GRAVITY * weave.mass
+        (between,) = np.nonzero(held & much)  # two flanks, perhaps
+        owner, pushes = flanks(body, positions[between], inside[between], touching)
+        first = np.searchsorted(owner, np.arange(len(between) + 1))
+        for i, start, end in zip(between, first[:-1], first[1:], strict=True):
+            if np.ptp(pushes[start:end], axis=0).max(initial=0.0) > _ALIKE:
+                left[i] = left_by_all(forces[i], pushes[start:end], friction)
     share = np.linalg.norm(left[looked], axis=1) / (GRAVITY * weave.mass[looked])
     return float(np.sqrt(np.mean(share**2)))
 
