@@ -126,7 +126,7 @@ def left_over_force(
         owner, pushes = flanks(body, positions[between], inside[between], touching)
         first = np.searchsorted(owner, np.arange(len(between) + 1))
         for i, start, end in zip(between, first[:-1], first[1:], strict=True):
-            if np.ptp(pushes[start:end], axis=0).max(initial=0.0) > _ALIKE:
+            if end - start > 1 and np.ptp(pushes[start:end], axis=0).max() > _ALIKE:
                 left[i] = left_by_all(forces[i], pushes[start:end], friction)
     share = np.linalg.norm(left[looked], axis=1) / (GRAVITY * weave.mass[looked])
     return float(np.sqrt(np.mean(share**2)))
