@@ -42,12 +42,14 @@ def scene_rows(quick: bool, watch: Watch) -> Iterator[Row]:
         yield watch.row(scene.name, "default", scene.settings, len(scene.rest), partial(_measure, scene))
 
 
-def on_ball(count: int) -> ContactScene:
+def on_ball(count: int, **settings: Value) -> ContactScene:
     """The square metre of `bench.scenes.sphere`, N x N vertices, that other programs are measured on."""
     plain = sphere(count)
     mesh = TriangleMesh(plain.start, plain.model.faces)
     ball = Sphere((0.0, 0.0, 0.0), RADIUS, FRICTION)
-    return ContactScene(f"sphere {count}", mesh, plain.rest, isotropic(STIFFNESS), [ball], plain.seconds)
+    return ContactScene(
+        f"sphere {count}", mesh, plain.rest, isotropic(STIFFNESS), [ball], plain.seconds, settings=settings
+    )
 
 
 def folded(count: int, seconds: float = 1.5) -> ContactScene:
@@ -150,6 +152,7 @@ def _scenes(quick: bool) -> Iterator[Callable[[], ContactScene]]:
         return
     for count in (32, 64, 128):
         yield partial(on_ball, count)
+        yield partial(on_ball, count, substeps=0.6)  # 1/36 s
     yield partial(folded, 48)
     yield partial(ball_on_sheets, 24)
     yield partial(twisted, 48)

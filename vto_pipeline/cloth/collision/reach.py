@@ -55,30 +55,44 @@ def reach(cloth: Pieces, start: FloatArray, end: FloatArray, radius: FloatArray)
         return Reach(False, "the cloth folds, or is seen too much from its edge")
     if not _corners_are_open(cloth.rim, cloth.after, flat, way):
         return Reach(False, "the rim has a narrow notch")
-    if not _one_rim_around(cloth, flat):
+    if not _one_rim_around(cloth.faces, cloth.of_vertex, cloth.rim, cloth.loop, cloth.piece_of_loop, flat):
         return Reach(False, "a piece has no rim that runs around all of it")
-    if not _rim_keeps_apart(cloth, flat, way, thickness):
+    if not _rim_keeps_apart(cloth.rim, cloth.of_vertex, flat, way, thickness):
         return Reach(False, "the rim comes near itself")
-    if not _pieces_keep_apart(cloth.faces, cloth.of_vertex, swept_boxes(start, end, radius)):
+    several = cloth.of_vertex.max(initial=0) > 0
+    if several and not _pieces_keep_apart(cloth.faces, cloth.of_vertex, swept_boxes(start, end, radius)):
         return Reach(False, "two pieces are near each other")
     return Reach(True, "seen along one direction, no piece covers anything twice, and the pieces are far apart")
 
 
-def _one_rim_around(cloth: Pieces, flat: FloatArray) -> bool:
+@njit(cache=True, error_model="numpy")
+def _one_rim_around(faces, of_vertex, rim, loop, piece_of_loop, flat):
     """Return whether one loop of each piece runs counter-clockwise, and all others, about holes, clockwise."""
-    p, q = flat[cloth.rim[:, 0]], flat[cloth.rim[:, 1]]
-    area = np.bincount(cloth.loop, p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0], len(cloth.piece_of_loop))
-    around = np.bincount(cloth.piece_of_loop[area > 0.0], minlength=int(cloth.of_vertex.max(initial=-1)) + 1)
-    return bool((around[cloth.of_vertex[cloth.faces[:, 0]]] == 1).all())
+    area = np.zeros(len(piece_of_loop))
+    for r in range(len(rim)):
+        i, j = rim[r, 0], rim[r, 1]
+        area[loop[r]] += flat[i, 0] * flat[j, 1] - flat[i, 1] * flat[j, 0]
+    around = np.zeros(0 if len(of_vertex) == 0 else of_vertex.max() + 1, np.int32)
+    for k in range(len(area)):
+        around[piece_of_loop[k]] += area[k] > 0.0
+    return (around[of_vertex[faces[:, 0]]] == 1).all()
 
 
-def _rim_keeps_apart(cloth: Pieces, flat: FloatArray, way: FloatArray, thickness: float) -> bool:
+@njit(cache=True, error_model="numpy")
+def _rim_keeps_apart(rim, of_vertex, flat, way, thickness):
     """Return whether edges of a piece's rim that share no vertex stay farther apart than the thickness."""
-    ends, ways = flat[cloth.rim], way[cloth.rim]
-    around = 0.5 * (thickness + np.sqrt((ways**2).sum(axis=2)).max(axis=1, initial=0.0))
-    low, high = ends.min(axis=1) - around[:, None], ends.max(axis=1) + around[:, None]
-    order = np.argsort(low[:, 0], kind="stable")
-    return bool(_stay_apart(cloth.rim[order], cloth.of_vertex, flat, way, low[order], high[order], thickness))
+    most_sq = 0.0
+    for r in range(len(rim)):
+        for i in rim[r]:
+            most_sq = max(most_sq, way[i, 0] ** 2 + way[i, 1] ** 2)
+    around = 0.5 * (thickness + sqrt(most_sq))
+    low, high = np.empty((len(rim), 2)), np.empty((len(rim), 2))
+    for r in range(len(rim)):
+        i, j = rim[r, 0], rim[r, 1]
+        for d in range(2):
+            low[r, d], high[r, d] = min(flat[i, d], flat[j, d]) - around, max(flat[i, d], flat[j, d]) + around
+    order = np.argsort(low[:, 0], kind="mergesort")
+    return _stay_apart(rim[order], of_vertex, flat, way, low[order], high[order], thickness)
 
 
 @njit(cache=True, error_model="numpy")

@@ -326,4 +326,4 @@ def _between(x: FloatArray, end: FloatArray, radius: FloatArray) -> tuple[FloatA
 
 def _together(x: FloatArray, end: FloatArray) -> FloatArray:
     """Return the ends of the ways less what all have in common, which brings nothing nearer to anything."""
-    return end - (end - x).mean(axis=0)
+    return np.asarray(end - np.einsum("ij->j", end - x) / len(x))
