@@ -139,11 +139,18 @@ def _differ_colour(x, data, places, held, step, forces, blocks, first, last):
 
 @njit(cache=True, error_model="numpy")
 def _differ_block(x, data, places, held, step, forces, blocks, block):
-    """Add -∂f/∂x of each stencil: its vertices are moved, and back, which no other block of a colour has."""
+    """Add -∂f/∂x of each stencil: its vertices are moved, and back, which no other block of a colour has.
+
+    Moved all together they feel nothing: the last corner's column is what makes the rows' sums zero.
+    """
     for i in range(data.starts[block], data.starts[block + 1]):
         corners = data.vertices[i]
+        last = len(corners) - 1
         for b in range(len(corners)):
             if held[corners[b]] or _comes_before(corners, b):
+                last = -1
+        for b in range(len(corners)):
+            if b == last or held[corners[b]] or _comes_before(corners, b):
                 continue
             for m in range(3):
                 here = x[corners[b], m]
@@ -155,7 +162,10 @@ def _differ_block(x, data, places, held, step, forces, blocks, block):
                     for a in range(len(corners)):
                         if not held[corners[a]] and not _comes_before(corners, a):
                             for k in range(3):
-                                blocks[places[i, a, b], k, m] -= side * forces[corners[a], k] / (2.0 * step)
+                                change = side * forces[corners[a], k] / (2.0 * step)
+                                blocks[places[i, a, b], k, m] -= change
+                                if last >= 0:
+                                    blocks[places[i, a, last], k, m] += change
                 x[corners[b], m] = here
 
 
