@@ -9,17 +9,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vto_pipeline.cloth.build import ClothState
-from vto_pipeline.cloth.methods import FRAME
+from vto_pipeline.cloth.polish import LOOK, Polish
 from vto_pipeline.cloth.stepper import Stepper
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.cloth import TraceRow
 
-_WINDOW = 0.1  # s of cloth time between looks
 _QUIET = 3  # looks in a row under the bound: an oscillating cloth stands still for an instant at each turn
 _COARSE = 2.0  # times the bound: waiting longer for a coarse answer, itself in error by more, is waste
 _STILL, _LONG = 1e-4, 10  # m, looks in a row: what stays within that is at rest, whatever forces contacts argue about
 _VAGUE = 1e-3  # m: what is not known to be stable may still buckle by as much
-_LONGEST = 1.0  # s: inertia holds nothing back in a step of that length that cloth still waits for
 _SLOWEST = 0.95  # a decay slower than this cannot be told from none
 
 
@@ -75,9 +73,8 @@ def settle(
     shows three quarters of it (Richardson) and a third of that is left.
 
     Cloth that buckles slowly hardly moves for a long while, so being quiet does not prove much. A method that knows the
-    exact stiffness goes on in steps that grow as long as the system is positive definite. With inertia gone it is a
-    Newton iteration (pseudo-transient continuation; Kelley & Keyes 1998): a step goes all the way that was to come, and
-    where it goes nowhere, the cloth is at rest, and stable.
+    exact stiffness goes on in steps that grow as long as the system is positive definite (`cloth.polish`): one of these
+    goes all the way that was to come, and where it goes nowhere, the cloth is at rest, and stable.
 
     Args:
         stepper: The cloth among its colliders; its steps are changed, and as they were at the end if the rest does not
@@ -94,24 +91,29 @@ def settle(
     coarse: FloatArray | None = None
     quiet = still = 0
     stepper.prepare(state.positions)
-    exact, substeps = stepper.rests_exactly, stepper.substeps
-    share = 0.0
+    exact, polish = stepper.rests_exactly, Polish(stepper, limits.residual)
+    looks, share = 0, 0.0
     while share < 1.0 and time.perf_counter() < limits.deadline:
-        before = result.state.positions
-        result.state = stepper.run(result.state, max(_WINDOW, stepper.step))
+        before, known = result.state.positions, stepper.known
+        after = stepper.run(result.state, max(LOOK, stepper.step))
+        residual = stepper.residual(after)
+        looks += 1
+        share = looks * LOOK / limits.seconds
+        if polish.goes_astray(residual):
+            stepper.known = known
+            continue
+        result.state, result.residual = after, residual
         moves.append(_rms(result.state.positions - before))
         drifts.append(0.5 * _rms(result.state.positions - earlier) if len(moves) > 1 else moves[-1])
         earlier = before
-        whole = stepper.definite and stepper.step >= _LONGEST and len(moves) > 1
+        whole = polish.whole and len(moves) > 1
         to_come = max(moves[-2:]) if whole else max(moves[-1], _still_to_come(drifts))
         result.error = max(to_come, _VAGUE) if stepper.polishes and not whole else to_come
         if not exact:
             result.error += np.inf if coarse is None else _rms(result.state.positions - coarse) / 3.0
-        result.residual = stepper.residual(result.state)
         seconds = time.perf_counter() - began
         row = TraceRow(seconds, stepper.steps, 1e3 * result.error, result.residual, contacts=stepper.bearing)
         result.trace.append(row)
-        share = len(result.trace) * _WINDOW / limits.seconds
         watch(share, result.error)
         first = coarse is None and not exact
         bound = _COARSE * limits.error if first else (1.0 if exact else 0.5) * limits.error
@@ -119,8 +121,8 @@ def settle(
         balanced = result.residual < limits.residual or not exact or still >= _LONG
         quiet = quiet + 1 if to_come < bound and balanced and (whole or not stepper.definite) else 0
         if stepper.polishes and limits.error < _VAGUE:
-            _polish(stepper, substeps, to_come < _VAGUE and balanced)
-        if quiet < _QUIET:
+            polish.choose(moves[-1] < _VAGUE and balanced, residual)
+        if quiet < (1 if exact and residual < limits.residual else _QUIET):  # at a turn of its way forces are large
             continue
         if result.error <= limits.error:
             result.settled = True
@@ -132,20 +134,8 @@ def settle(
         coarse, moves, drifts, quiet = result.state.positions, [], [], 0
         stepper.substeps *= 2
     if exact:
-        stepper.substeps = substeps
-    stepper.polish(False)
+        polish.end()
     return result
-
-
-def _polish(stepper: Stepper, substeps: float, quiet: bool) -> None:
-    """Choose the next steps: longer with the exact stiffness while that will do, else shorter, down to the usual."""
-    if stepper.definite:
-        stepper.substeps = max(0.5 * stepper.substeps, FRAME / _LONGEST)
-    elif stepper.substeps < substeps:
-        stepper.substeps = min(2.0 * stepper.substeps, substeps)
-        stepper.polish(True)
-    else:
-        stepper.polish(quiet)
 
 
 def _rms(moves: FloatArray) -> float:

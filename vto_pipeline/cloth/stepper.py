@@ -13,7 +13,7 @@ from pydantic import Field
 
 from vto_pipeline.cloth.balance import out_of_balance
 from vto_pipeline.cloth.build import ClothModel, ClothState
-from vto_pipeline.cloth.collision.active_set import active_set, no_contacts
+from vto_pipeline.cloth.collision.active_set import ActiveSet, active_set, no_contacts
 from vto_pipeline.cloth.collision.body import BodyCollider
 from vto_pipeline.cloth.collision.contacts import Collider, Round, gather, nothing
 from vto_pipeline.cloth.collision.hold_apart import hold_apart
@@ -169,9 +169,18 @@ class Stepper:
         x, still = state.positions, np.zeros_like(state.positions)
         pairs = no_pairs() if self.self_contact is None else self.self_contact.near(x, x, FRAME)
         mass = self._model.inverse_mass
-        known = self._method.active if isinstance(self._method, Newton) else no_contacts(0)
-        touched = active_set(self._contacts, pairs, 0.0, 1.0, mass, x, still, still, known)
+        touched = active_set(self._contacts, pairs, 0.0, 1.0, mass, x, still, still, self.known)
         return out_of_balance(self._model, x, touched)
+
+    @property
+    def known(self) -> ActiveSet:
+        """What is known of the contacts from the last step, as far as the method keeps it; may be set back to it."""
+        return self._method.active if isinstance(self._method, Newton) else no_contacts(0)
+
+    @known.setter
+    def known(self, before: ActiveSet) -> None:
+        if isinstance(self._method, Newton):
+            self._method.active = before
 
     @property
     def rests_exactly(self) -> bool:

@@ -1,0 +1,110 @@
+"""Polishing: Newton's steps are taken as far as they lead to rest, and not where they lead away."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from vto_pipeline.cloth.build import ClothState, at_rest
+from vto_pipeline.cloth.methods import FRAME
+from vto_pipeline.cloth.polish import LONGEST, Polish
+from vto_pipeline.cloth.settle import SettleLimits, settle
+
+
+class Straying:
+    """One coordinate x [mm] with the force -x; the usual steps halve it, those with the exact stiffness go far away.
+
+    What it knows of contacts, it has from the last step.
+    """
+
+    rests_exactly = polishes = True
+    bearing = steps = 0
+
+    def __init__(self):
+        self.substeps = 0.5
+        self.exact = self.definite = False
+        self.known = "nothing"
+        self.tried = 0
+        self.knew = set()
+
+    @property
+    def step(self):
+        return FRAME / self.substeps
+
+    def prepare(self, positions):
+        pass
+
+    def polish(self, on):
+        self.exact = on
+
+    def run(self, state, seconds):
+        self.definite = self.exact
+        self.knew.add(self.known)
+        self.tried += self.exact
+        self.known = "too far" if self.exact else "half way"
+        after = state.positions + 1.0 if self.exact else 0.5 * state.positions
+        return ClothState(after, np.zeros((1, 3)), state.time + seconds)
+
+    def residual(self, state):
+        return 0.01 * abs(1e3 * state.positions[0, 0])
+
+
+def test_a_step_that_leads_away_is_not_taken():
+    stepper = Straying()
+    found = settle(stepper, at_rest(np.array([[1e-3, 0, 0]])), SettleLimits(1e-5, 0.01, 4.0, 160))
+    assert stepper.tried > 5
+    assert stepper.knew == {"nothing", "half way"}
+    residuals = np.array([row.residual for row in found.trace])
+    assert_allclose(residuals, 0.01 * 0.5 ** np.arange(1, len(residuals) + 1), rtol=1e-9)
+    assert_allclose(found.state.positions[0, 0], 1e-3 * 0.5 ** len(residuals), rtol=1e-9)
+    assert not found.settled  # nobody knows whether it is stable there
+    assert stepper.substeps == 0.5
+    assert not stepper.exact
+
+
+class Steps:
+    """What polishing sees of a stepper."""
+
+    def __init__(self):
+        self.substeps, self.definite, self.exact = 0.5, False, False
+
+    @property
+    def step(self):
+        return FRAME / self.substeps
+
+    def polish(self, on):
+        self.exact = on
+
+
+def test_steps_double_while_the_force_falls():
+    stepper = Steps()
+    polish = Polish(stepper, enough=0.01)
+    polish.choose(True, 5e-3)
+    assert stepper.exact
+    stepper.definite = True
+    lengths, residual = [], 5e-3
+    while not polish.whole:
+        assert not polish.goes_astray(residual)
+        polish.choose(True, residual)
+        lengths.append(stepper.step)
+        residual *= 0.5
+    assert_allclose(lengths, [1 / 15, 2 / 15, 4 / 15, 8 / 15, LONGEST])
+
+
+def test_what_leaves_more_force_is_tried_in_shorter_steps_and_then_not_for_three_looks():
+    stepper = Steps()
+    polish = Polish(stepper, enough=0.01)
+    polish.choose(True, 5e-3)
+    stepper.definite = True
+    assert not polish.goes_astray(0.04)  # what is soft comes first
+    polish.choose(True, 0.04)
+    assert polish.goes_astray(0.04)  # but it has to fall
+    assert stepper.exact
+    assert stepper.step == pytest.approx(1 / 30)
+    assert polish.goes_astray(0.04)
+    assert not stepper.exact
+    stepper.definite = False
+    for _ in range(3):
+        polish.choose(True, 5e-3)
+        assert not stepper.exact
+    polish.choose(True, 5e-3)
+    assert stepper.exact
