@@ -6,13 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from body_judges import crossing, slice_body
 from numpy.testing import assert_allclose
+from scipy.spatial import ConvexHull
 
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.measure import measure
 from vto_pipeline.avatar.population import complete, population
 from vto_pipeline.avatar.tape import DENSITY_KG_M3
+from vto_pipeline.avatar.template import beyond_armscye
 from vto_pipeline.model.body import Measurements
 from vto_pipeline.model.job import Job
 
@@ -100,6 +103,23 @@ def test_sizes_fast(sex: str, letter: str) -> None:
 
 def test_people_fast() -> None:
     assert not {k: m for k, (sex, tape) in enumerate(people(6, seed=5)) if (m := misses(sex, tape))}
+
+
+@pytest.mark.parametrize(("sex", "letter"), [("female", "XS"), ("female", "XL"), ("male", "S"), ("male", "XL")])
+def test_rows_lie_where_the_body_shows_them(sex: str, letter: str) -> None:
+    """By trimesh alone: the seat is rearmost at the hip's row, the trunk narrowest near the waist's.
+
+    ANSUR II says how high both lie; a body whose seat or waist is elsewhere has the asked girths in the wrong place.
+    """
+    tape = of_size(sex, letter)
+    body = fit_measurements(Measurements({name: tape[name] for name in ("stature", "chest_girth")}, sex=sex))
+    v, tall = body.bind_vertices, tape["stature"]
+    trunk = trimesh.Trimesh(v, body.faces[~beyond_armscye()[body.faces].any(axis=1)], process=False)
+    low = v[(v[:, 1] > 0.46 * tall) & (v[:, 1] < 0.58 * tall)]
+    assert_allclose(v[body.loops["hip"], 1].mean(), low[np.argmin(low[:, 2]), 1], rtol=0, atol=0.015)
+    heights = np.arange(0.59, 0.69, 0.003) * tall
+    girths = [ConvexHull(trunk.section([0, 1, 0], [0, y, 0]).vertices[:, [0, 2]]).area for y in heights]
+    assert_allclose(v[body.loops["waist"], 1].mean(), heights[np.argmin(girths)], rtol=0, atol=0.025)
 
 
 @pytest.mark.slow

@@ -15,9 +15,10 @@ from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.from_silhouettes import SilhouettesConfig, fit_silhouettes
 from vto_pipeline.avatar.measure import measure
 from vto_pipeline.avatar.outline import Camera, ImageOutline, model_outline
+from vto_pipeline.avatar.pose import joint_transforms
 from vto_pipeline.avatar.registration import Fit
 from vto_pipeline.avatar.shape import shape_space
-from vto_pipeline.avatar.silhouette_fit import View, _camera_rows, _moved, _posture_rows
+from vto_pipeline.avatar.silhouette_fit import View, _camera_rows, _feet_rows, _moved, _posture_rows
 from vto_pipeline.avatar.template import template
 from vto_pipeline.bench.body.silhouettes import photograph as shot
 from vto_pipeline.errors import AvatarError
@@ -106,6 +107,33 @@ def test_turns_of_pose_and_camera_follow_their_derivatives() -> None:
         slope = (values[0] - values[1]) / (2 * step)
         # where turns are small, one by one axis moves another's reading by half the angle: some hundredths of a row
         assert (np.abs(rows[:, column] - slope) < 0.04 * np.abs(rows).max(axis=1)).all()
+
+
+def test_feet_that_tip_are_held_flat() -> None:
+    """Closed form: a dipped toe counts, a turned one does not; and the rows are the derivative of what they hold."""
+    space, rng = shape_space(0.0), np.random.default_rng(4)
+    base, zero = space.base, np.zeros(len(space.names))
+    foot = base.joint_names.index("left_ankle")
+
+    def tipped(pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return _feet_rows(base, joint_transforms(space.joints(zero), base.parents, pose)[0])
+
+    pose = np.zeros((len(base.joints), 3))
+    pose[0] = [0.0, 1.5, 0.0]
+    pose[foot] = [0.1, 0.0, 0.0]
+    assert_allclose(tipped(pose)[1], [0.1 / 0.02, 0, 0, 0], rtol=0, atol=1e-9)
+    pose[foot] = [0.0, 0.4, 0.0]
+    assert_allclose(tipped(pose)[1], 0.0, rtol=0, atol=1e-9)
+    pose[1:] = rng.normal(0.0, 0.003, pose[1:].shape)
+    fit = Fit(zero, pose, np.array([0.0, -0.8, -2.5]), zero)
+    view = View(ImageOutline(np.pad(np.ones((8, 8), dtype=bool), 4)), pose, fit, Camera(900.0, 16, 16))
+    rows, step = tipped(pose)[0], 1e-5
+    for column in range(pose.size):
+        move = np.zeros(pose.size + 5)
+        move[column] = step
+        ahead, behind = (tipped(_moved(space, view, zero, sign * move).fit.pose)[1] for sign in (1.0, -1.0))
+        # of 50 a radian; to first order in the tipping, of which there is 0.01
+        assert_allclose(rows[:, column], (ahead - behind) / (2 * step), rtol=0, atol=0.5)
 
 
 def views(body: Avatar) -> tuple[np.ndarray, np.ndarray]:

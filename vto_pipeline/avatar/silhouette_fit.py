@@ -22,6 +22,7 @@ from vto_pipeline.avatar.registration import Fit, derivatives, model
 from vto_pipeline.avatar.shape import ShapeSpace
 from vto_pipeline.avatar.tape import Tape
 from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.body import Avatar
 
 _POSE_SIGMA_RAD = {
     "pelvis": (0.05, 0.10, 0.03),
@@ -46,6 +47,11 @@ _STATURE_SIGMA_M = 0.003
 _POSTURE = ("spine", "chest", "neck", "head", "hip", "knee")
 _ALIKE_RAD = 0.02
 """How differently one person stands in both pictures, arms and feet apart: one view shows what the other hides."""
+_FLAT_RAD = 0.02
+"""How far a foot may be tipped against the upright.
+
+A toe that dips makes the body taller than its stature, and its picture's scale wrong by some percent.
+"""
 _DROP_SHARE = 0.10
 """Of the picture's height: how far its middle may be from where the lens looks. Few photos are cropped evenly."""
 _SAME_TILT_RAD, _SAME_DISTANCE, _SAME_FOCAL, _SAME_DROP = 0.006, 0.01, 0.003, 0.006
@@ -244,7 +250,7 @@ def _rows(
 
 
 def _pose_prior(space: ShapeSpace, view: View, evidence: Evidence) -> tuple[FloatArray, FloatArray]:
-    """Rows that draw the pose to the nominal one and the camera to its expected distance."""
+    """Rows that draw the pose to the nominal one, the feet flat and the camera to its expected distance."""
     base = space.base
     joints = len(base.joints)
     sigmas = np.array([_POSE_SIGMA_RAD[name.rpartition("_")[2]] for name in base.joint_names])
@@ -258,7 +264,30 @@ def _pose_prior(space: ShapeSpace, view: View, evidence: Evidence) -> tuple[Floa
     rows[-2, -3] = -1 / (distance * _DISTANCE_SPREAD)
     off = np.log(distance / evidence.distance) / _DISTANCE_SPREAD
     rows[-1, -1] = 1 / (_DROP_SHARE * view.camera.height)
-    return rows, np.concatenate([(turned.as_rotvec() / sigmas).ravel(), [off, rows[-1, -1] * view.camera.drop]])
+    flat, tipped = _feet_rows(base, rotation)
+    flat = np.hstack([flat, np.zeros((len(flat), 5))])
+    offs = [(turned.as_rotvec() / sigmas).ravel(), [off, rows[-1, -1] * view.camera.drop], tipped]
+    return np.vstack([rows, flat]), np.concatenate(offs)
+
+
+def _feet_rows(base: Avatar, rotation: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Rows that keep the soles of who stands flat on the floor; the toes may point anywhere.
+
+    Args:
+        base: The joints' names and parents.
+        rotation: Of the posed joints, shape (J, 3, 3).
+    """
+    rows, off = [], []
+    for side in ("left", "right"):
+        joint = foot = base.joint_names.index(f"{side}_ankle")
+        row = np.zeros((3, len(rotation), 3))
+        while joint != 0:
+            row[:, joint] = rotation[0].T / _FLAT_RAD  # turns are in world axes, tipping in the body's
+            joint = int(base.parents[joint])
+        tipped = Rotation.from_matrix(rotation[0].T @ rotation[foot]).as_rotvec() / _FLAT_RAD
+        rows.append(row.reshape(3, -1)[[0, 2]])
+        off.append(tipped[[0, 2]])
+    return np.vstack(rows), np.concatenate(off)
 
 
 def _posture_rows(space: ShapeSpace, front: View, side: View) -> tuple[FloatArray, FloatArray]:

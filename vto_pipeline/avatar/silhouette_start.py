@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from vto_pipeline.avatar.implicit import arm_axis
 from vto_pipeline.avatar.outline import Camera, ImageOutline
-from vto_pipeline.avatar.pose import named_pose
+from vto_pipeline.avatar.pose import joint_transforms, named_pose
 from vto_pipeline.avatar.registration import Fit, first_fit
 from vto_pipeline.avatar.scan_start import Start
 from vto_pipeline.avatar.shape import ShapeSpace
@@ -48,7 +48,7 @@ def stand(
     return _race(
         space,
         [
-            (facing, _place(space, across, side, yaw, _arms_ahead(space, facing.start, *angles), evidence))
+            (facing, _place(space, across, side, yaw, _arms_ahead(space, facing, *angles), evidence))
             for yaw in (np.pi / 2, -np.pi / 2)
             for angles in _ARMS_AHEAD_RAD
         ],
@@ -76,13 +76,19 @@ def _race(space: ShapeSpace, guesses: Iterable[tuple[View, ...]], evidence: Evid
     return some([solution.views for solution in first], _RACE_STEPS, _MORE_STEPS)[0]
 
 
-def _arms_ahead(space: ShapeSpace, pose: FloatArray, swing: float, bend: float) -> FloatArray:
-    """Return the pose with both arms swung forward and their elbows bent by so much [rad]."""
-    pose = pose.copy()
+def _arms_ahead(space: ShapeSpace, facing: View, swing: float, bend: float) -> FloatArray:
+    """Return the front view's pose, its arms raised as they are seen there, swung forward and bent by so much [rad].
+
+    What the front does not show, whether an arm is held forward or back, is not taken from there.
+    """
+    joints, names, pose = space.joints(facing.fit.parameters), space.base.joint_names, facing.start.copy()
+    rotation, offset = joint_transforms(joints, space.base.parents, facing.fit.pose)
+    x, y, _ = arm_axis()
     for side, sign in (("left", 1.0), ("right", -1.0)):
-        shoulder, elbow = (space.base.joint_names.index(f"{side}_{joint}") for joint in ("shoulder", "elbow"))
-        pose[shoulder] = (Rotation.from_rotvec([-swing, 0.0, 0.0]) * Rotation.from_rotvec(pose[shoulder])).as_rotvec()
-        x, y, _ = arm_axis()
+        shoulder, elbow, wrist = (names.index(f"{side}_{joint}") for joint in ("shoulder", "elbow", "wrist"))
+        arm = np.subtract(*(rotation[j] @ joints[j] + offset[j] for j in (wrist, shoulder)))
+        raised = Rotation.from_rotvec([0.0, 0.0, sign * (np.arctan2(arm[1], sign * arm[0]) - np.arctan2(y, x))])
+        pose[shoulder] = (Rotation.from_rotvec([-swing, 0.0, 0.0]) * raised).as_rotvec()
         pose[elbow] = bend * np.array([y, -sign * x, 0.0])
     return pose
 
