@@ -104,6 +104,7 @@ class SelfContact:
         self._length: float | None = None
         self._found = self._beside = _NOTHING
         self._passed: _Passed | None = None
+        self._failed = self._wait = 0  # proofs since the last that was one; how often not to try
 
     def at(self, begin: float, end: float) -> None:
         """Take the bodies to a step between these times [s]; what is asked next is about it."""
@@ -264,15 +265,14 @@ class SelfContact:
         self.tally.asked += 1
         radius = self._reach + room
         if not self._force_all:
-            if self._found.serves(x, end, radius):
-                self.tally.reused += 1
-                return self._still(self._found.candidates, x, end, radius)
-            began = time.perf_counter()
-            proof = reach(self._pieces, x, end, radius)
-            self.tally.proof_s += time.perf_counter() - began
-            if proof.out:
+            serves = self._found.serves(x, end, radius)
+            nothing = serves and self._found.candidates.number == 0
+            if not nothing and self._out_of_reach(x, end, radius, may_wait=serves):
                 self.tally.out_of_reach += 1
                 return no_candidates()
+            if serves:
+                self.tally.reused += 1
+                return self._still(self._found.candidates, x, end, radius)
         began = time.perf_counter()
         wider = self._wider(x, end) + room
         found = Candidates(*self_candidates(self._fitted(x, end, wider), self._cloth, x, end, wider, self._crossed))
@@ -280,6 +280,18 @@ class SelfContact:
         self.tally.searched += 1
         self.tally.search_s += time.perf_counter() - began
         return self._still(found, x, end, radius)
+
+    def _out_of_reach(self, x: FloatArray, end: FloatArray, radius: FloatArray, *, may_wait: bool) -> bool:
+        """Return whether it is proven that nothing comes near on these ways; what fails often may wait to be tried."""
+        if may_wait and self._wait > 0:
+            self._wait -= 1
+            return False
+        began = time.perf_counter()
+        proof = reach(self._pieces, x, end, radius)
+        self.tally.proof_s += time.perf_counter() - began
+        self._failed = 0 if proof.out else min(self._failed + 1, _LOOK)
+        self._wait = max(self._failed - 1, 0)
+        return proof.out
 
     def _still(self, found: Candidates, x: FloatArray, end: FloatArray, radius: FloatArray) -> Candidates:
         """Return what of the candidates is one on these ways: what is left out must not change what is found."""
