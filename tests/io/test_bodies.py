@@ -148,6 +148,8 @@ def avatar() -> Avatar:
         landmarks={"crown": 5, "back_neck": 2},
         loops={"waist": np.array([0, 1, 2], np.int32), "wrist": np.array([3, 4, 5, 0], np.int32)},
         parameters={"stature": 1.7},
+        sigmas={"waist_girth": 0.004},
+        caveats=("estimated under clothing", "left arm not seen"),
     )
 
 
@@ -159,7 +161,9 @@ def test_the_avatar_comes_back_to_the_bit(tmp_path: Path, read: Callable[[Path],
     for name in ("bind_vertices", "faces", "joints", "parents", "weights", "pose", "translation", "vertices"):
         assert getattr(back, name).tobytes() == getattr(truth, name).tobytes()
     assert (back.joint_names, back.sex) == (truth.joint_names, truth.sex)
-    assert (dict(back.landmarks), dict(back.parameters)) == (dict(truth.landmarks), dict(truth.parameters))
+    for name in ("landmarks", "parameters", "sigmas"):
+        assert dict(getattr(back, name)) == dict(getattr(truth, name))
+    assert back.caveats == truth.caveats
     assert list(back.loops) == list(truth.loops)
     for name, loop in truth.loops.items():
         assert_array_equal(back.loops[name], loop)
