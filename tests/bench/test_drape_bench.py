@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from vto_pipeline.bench.bench import Row, Watch
-from vto_pipeline.bench.drape import budget, refinement, scanned
+from vto_pipeline.bench.drape import budget, left_out, refinement, scanned
 from vto_pipeline.bench.drape.case import Case, distance_mm
 from vto_pipeline.bench.samples.wearer import wearer
 from vto_pipeline.bench.timing import Timing
@@ -112,6 +112,22 @@ def rows():
     for mode, far in (("as_scanned", 13.0), ("inverse", 0.3)):
         shape = {"from_scan_mm": far, "length_error_median_share": 1e-3 * far}
         yield Row("rest shape: shirt", mode, settings, 500, 1.0, shape)
+    for share in (0.2, -0.01):
+        yield Row(f"left out: {share}", "default", settings, 500, 1.0, {"saved_share": share, "difference_mm": 0.0})
+
+
+def test_what_leaving_out_changes_is_seen(shirt, monkeypatch):
+    def drape(self, settings, fabric=None, job=None):
+        if not job.force_all:
+            job.leave_out("strain limits", "the fabric has none")
+        mesh, shift = self.made().mesh, [2e-4 * job.force_all, 0.0, 0.0]
+        return draped(TriangleMesh(mesh.vertices + shift, mesh.faces), 0.5)
+
+    monkeypatch.setattr(Case, "drape", drape)
+    timing, found = left_out._measure(shirt)
+    assert_allclose(found["difference_mm"], 0.2, rtol=1e-9)
+    assert_allclose(found["saved_share"], 1.0 - timing.seconds / found["whole_s"], rtol=1e-12)
+    assert found["left_out"] == "strain limits"
 
 
 @pytest.mark.parametrize("kinds", ["every", "one"])
@@ -143,10 +159,10 @@ def test_what_a_drape_promises_is_kept(names):
 @pytest.mark.slow
 def test_quick_rows_name_what_they_measure(monkeypatch):
     """No drape here: each measurement is replaced, and what would be measured is looked at."""
-    for module in (budget, refinement, scanned):
+    for module in (budget, refinement, scanned, left_out):
         monkeypatch.setattr(module, "_measure", lambda *given: (Timing(1.0), {}))
     monkeypatch.setattr(budget, "_exact", lambda *given: (Timing(1.0), {}))
-    parts = (budget.budget_rows, refinement.refinement_rows, scanned.scanned_rows)
+    parts = (budget.budget_rows, refinement.refinement_rows, scanned.scanned_rows, left_out.left_out_rows)
     found = [row for part in parts for row in part(True, Watch())]
     assert len({row.key for row in found}) == len(found) > 6
     assert all(200 < row.vertices < 3000 for row in found)

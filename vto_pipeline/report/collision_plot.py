@@ -10,7 +10,7 @@ import numpy as np
 
 from vto_pipeline.errors import InputError
 from vto_pipeline.report.figure import COLORS, ELSEWHERE, label_decades, look_of
-from vto_pipeline.report.panels import Rows, draw_panels
+from vto_pipeline.report.panels import Rows, draw_panels, list_scenes, paint_left_out, scenes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,14 +38,14 @@ def draw_collision(bench: Mapping[str, Any]) -> bytes:
         ("pairs", _sizes),
         ("crossings", _scenes),
         ("pairs_left", _bad_starts),
-        ("saved_share", _left_out),
+        ("saved_share", paint_left_out),
         ("error_share", _friction),
     ]
     chosen = [(_with(bench["rows"], name), paint) for name, paint in panels]
     filled = [(rows, paint) for rows, paint in chosen if rows]
     if not filled:
         raise InputError(f"bench {bench['bench']}: {len(bench['rows'])} rows, none with a figure of collision")
-    return draw_panels(filled, _names, 11.0, 2.6)
+    return draw_panels(filled, scenes, 11.0, 2.6)
 
 
 def _with(rows: Rows, figure: str) -> list[Mapping[str, Any]]:
@@ -57,26 +57,13 @@ def _finite(value: object) -> bool:
     return isinstance(value, int | float) and math.isfinite(value)
 
 
-def _names(rows: Rows) -> list[str]:
-    return list(dict.fromkeys(row["scene"] for row in rows))
-
-
 def _methods(rows: Rows) -> list[str]:
     return list(dict.fromkeys(row["method"] for row in rows))
 
 
-def _list(axes: Axes, rows: Rows) -> dict[str, int]:
-    """Name the lines of a list, the first on top, and return the place of each."""
-    names = _names(rows)
-    axes.set_yticks(range(len(names)), names, size=7)
-    axes.set_ylim(len(names) - 0.4, -0.6)
-    axes.grid(visible=True, axis="x")
-    return {name: k for k, name in enumerate(names)}
-
-
 def _queries(axes: Axes, rows: Rows) -> None:
     """Draw continuous tests a second as a list of families of queries; hollow where an answer was wrong."""
-    places, methods = _list(axes, rows), _methods(rows)
+    places, methods = list_scenes(axes, rows), _methods(rows)
     for row in rows:
         errors, look = row["errors"], look_of(methods.index(row["method"]))
         wrong = errors.get("missed", 0) > 0 or errors.get("false_share", 0.0) > 0.0
@@ -119,7 +106,7 @@ def _bad_starts(axes: Axes, rows: Rows) -> None:
 
 def _timed(axes: Axes, rows: Rows, figure: str, title: str) -> None:
     """Draw run times as a list, in the colour and with the number of what is left."""
-    places, methods = _list(axes, rows), _methods(rows)
+    places, methods = list_scenes(axes, rows), _methods(rows)
     for row in rows:
         left, place = row["errors"][figure], places[row["scene"]]
         color = _GOOD if left == 0 else _BAD
@@ -132,21 +119,9 @@ def _timed(axes: Axes, rows: Rows, figure: str, title: str) -> None:
     axes.legend(fontsize=7)
 
 
-def _left_out(axes: Axes, rows: Rows) -> None:
-    """Draw the share of time saved; beside each bar the difference that it makes."""
-    places = _list(axes, rows)
-    for row in rows:
-        saved, place = 100.0 * row["errors"]["saved_share"], places[row["scene"]]
-        axes.barh(place, saved, color=COLORS[0], height=0.6)
-        text = f" {row['errors']['difference_mm']:.2g} mm"
-        axes.text(max(saved, 0.0), place, text, va="center", size=7)
-    axes.set(title="left out: the difference it makes", xlabel="time saved [%]")
-    axes.margins(x=0.2)
-
-
 def _friction(axes: Axes, rows: Rows) -> None:
     """Draw relative errors as a list, with what is allowed as an upright stroke."""
-    places, methods = _list(axes, rows), _methods(rows)
+    places, methods = list_scenes(axes, rows), _methods(rows)
     for row in rows:
         errors, place = row["errors"], places[row["scene"]]
         look = look_of(methods.index(row["method"]))

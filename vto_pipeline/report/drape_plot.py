@@ -1,4 +1,4 @@
-"""How a drape does in one picture: error against run time, honesty, refinement, rest shapes."""
+"""How a drape does in one picture: error against run time, honesty, refinement, rest shapes, and what is left out."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from vto_pipeline.errors import InputError
 from vto_pipeline.report.figure import ELSEWHERE, label_decades, look_of
-from vto_pipeline.report.panels import Rows, draw_panels
+from vto_pipeline.report.panels import Rows, draw_panels, list_scenes, paint_left_out, scenes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +21,8 @@ def draw_drape(bench: Mapping[str, Any]) -> bytes:
 
     Args:
         bench: {"bench", "rows"}. Kinds are told by their errors: garments by "distance_mm" (with "predicted_mm" and
-            "honest"), refinement by "from_finest_mm", rest shapes by "from_scan_mm".
+            "honest"), refinement by "from_finest_mm", rest shapes by "from_scan_mm", what is
+            left out by "saved_share" (with "difference_mm").
 
     Returns:
         A PNG.
@@ -34,16 +35,13 @@ def draw_drape(bench: Mapping[str, Any]) -> bytes:
         ("distance_mm", _honesty),
         ("from_finest_mm", _refinement),
         ("from_scan_mm", _rest_shapes),
+        ("saved_share", paint_left_out),
     ]
     chosen = [([row for row in bench["rows"] if name in row["errors"]], paint) for name, paint in panels]
     filled = [(rows, paint) for rows, paint in chosen if rows]
     if not filled:
         raise InputError(f"bench {bench['bench']}: {len(bench['rows'])} rows, none with a figure of a drape")
-    return draw_panels(filled, _scenes, 12.0, 3.2)
-
-
-def _scenes(rows: Rows) -> list[str]:
-    return list(dict.fromkeys(row["scene"] for row in rows))
+    return draw_panels(filled, scenes, 12.0, 3.2)
 
 
 def _figure(row: Mapping[str, Any], name: str) -> float:
@@ -53,7 +51,7 @@ def _figure(row: Mapping[str, Any], name: str) -> float:
 
 
 def _against_time(axes: Axes, rows: Rows) -> None:
-    for k, scene in enumerate(_scenes(rows)):
+    for k, scene in enumerate(scenes(rows)):
         look, mine = look_of(k), [row for row in rows if row["scene"] == scene]
         own = sorted((max(row["seconds"], _LEAST), _figure(row, "distance_mm")) for row in mine)
         axes.loglog(*zip(*own, strict=True), look.line, color=look.color, marker=look.marker, label=scene)
@@ -63,7 +61,7 @@ def _against_time(axes: Axes, rows: Rows) -> None:
 
 def _honesty(axes: Axes, rows: Rows) -> None:
     """Draw true over predicted error; above the dashed line it was promised too well."""
-    for k, scene in enumerate(_scenes(rows)):
+    for k, scene in enumerate(scenes(rows)):
         own = [row for row in rows if row["scene"] == scene]
         predicted, true = ([_figure(row, name) for row in own] for name in ("predicted_mm", "distance_mm"))
         axes.loglog(predicted, true, linestyle="none", color=look_of(k).color, marker=look_of(k).marker)
@@ -95,7 +93,7 @@ def _refinement(axes: Axes, rows: Rows) -> None:
 
 def _rest_shapes(axes: Axes, rows: Rows) -> None:
     """Draw the distance of the simulated garment to the scan; beside it the median error of the rest lengths."""
-    places, modes = _list(axes, rows), list(dict.fromkeys(row["method"] for row in rows))
+    places, modes = list_scenes(axes, rows), list(dict.fromkeys(row["method"] for row in rows))
     for row in rows:
         look, far = look_of(modes.index(row["method"])), _figure(row, "from_scan_mm")
         axes.plot(far, places[row["scene"]], look.marker, color=look.color)
@@ -105,15 +103,6 @@ def _rest_shapes(axes: Axes, rows: Rows) -> None:
         axes.plot([], [], look_of(k).marker, color=look_of(k).color, label=mode)
     axes.set(title="rest shape: simulated to scan, error of lengths", xlabel="mean distance [mm]", xscale="log")
     axes.legend(fontsize=7)
-
-
-def _list(axes: Axes, rows: Rows) -> dict[str, int]:
-    """Name the lines of a list, the first on top, and return the place of each."""
-    names = _scenes(rows)
-    axes.set_yticks(range(len(names)), names, size=7)
-    axes.set_ylim(len(names) - 0.4, -0.6)
-    axes.grid(visible=True, axis="x")
-    return {name: k for k, name in enumerate(names)}
 
 
 def _finish(axes: Axes) -> None:

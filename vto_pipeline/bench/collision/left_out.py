@@ -27,12 +27,14 @@ def left_out_rows(quick: bool, watch: Watch) -> Iterator[Row]:
         yield watch.row(scene.name, "default", scene.settings, len(scene.rest), partial(_measure, scene))
 
 
-def hung(count: int, **settings: Value) -> ContactScene:
+def hung(count: int, name: str | None = None, **settings: Value) -> ContactScene:
     """The square of `bench.scenes.hang`, which cannot reach itself, by these settings of `simulate`."""
     plain = hang(count)
     held = tuple(int(i) for i in np.flatnonzero(plain.model.inverse_mass == 0.0))
     mesh = TriangleMesh(plain.start, plain.model.faces)
-    return ContactScene(plain.name, mesh, plain.rest, isotropic(STIFFNESS), [], plain.seconds, held, settings=settings)
+    return ContactScene(
+        name or plain.name, mesh, plain.rest, isotropic(STIFFNESS), [], plain.seconds, held, settings=settings
+    )
 
 
 def _scenes(quick: bool) -> Iterator[Callable[[], ContactScene]]:
@@ -41,7 +43,7 @@ def _scenes(quick: bool) -> Iterator[Callable[[], ContactScene]]:
         yield partial(on_ball, 12)
         return
     yield partial(hung, 64)
-    yield partial(hung, 64, substeps=0.25)
+    yield partial(hung, 64, "hang 64, long steps", substeps=0.25)
     yield partial(on_ball, 32)
     yield partial(folded, 48)
     yield partial(pile, 16)

@@ -1,4 +1,4 @@
-"""Draping: error against run time and the honesty of its prediction, refinement, rest shapes."""
+"""Draping: error against run time and the honesty of its prediction, refinement, rest shapes, and what is left out."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ from collections.abc import Iterator
 
 from vto_pipeline.bench.bench import Row, Watch
 from vto_pipeline.bench.drape.budget import budget_rows
+from vto_pipeline.bench.drape.left_out import left_out_rows
 from vto_pipeline.bench.drape.refinement import refinement_rows
 from vto_pipeline.bench.drape.scanned import scanned_rows
 
 
 def rows(quick: bool, watch: Watch) -> Iterator[Row]:
     """Measure all of them."""
-    for part in (budget_rows, refinement_rows, scanned_rows):
+    for part in (budget_rows, refinement_rows, scanned_rows, left_out_rows):
         yield from part(quick, watch)

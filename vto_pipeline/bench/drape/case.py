@@ -53,15 +53,16 @@ class Case:
         """Return the garment before it is draped."""
         return _made(self.garment, self.size, self.edge_mm)
 
-    def drape(self, settings: Mapping[str, Value], fabric: Fabric | None = None) -> Draped:
+    def drape(self, settings: Mapping[str, Value], fabric: Fabric | None = None, job: Job | None = None) -> Draped:
         """Return the garment at rest.
 
         Args:
             settings: Over `STAND`.
             fabric: In place of the preset.
+            job: For what was left out.
         """
         cloth = read_fabric(self.fabric) if fabric is None else fabric
-        return drape(self.made(), self.wearer.avatar.mesh, cloth, {**STAND, **settings}, Job())
+        return drape(self.made(), self.wearer.avatar.mesh, cloth, {**STAND, **settings}, job)
 
 
 def distance_mm(one: FloatArray, other: FloatArray) -> float:
