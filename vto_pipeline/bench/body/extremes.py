@@ -73,7 +73,7 @@ def _from_scan(scan: Callable[[Avatar], TriangleMesh]) -> Measured:
 
 def _one_armed(body: Avatar) -> TriangleMesh:
     arm = (membership("arm") > 0.5) & (body.bind_vertices[:, 0] > 0)
-    return submesh(body.mesh, ~arm[body.faces].any(axis=1))[0]
+    return submesh(body.mesh, arm[body.faces].sum(axis=1) == 0)[0]
 
 
 def _crouched(body: Avatar) -> TriangleMesh:
