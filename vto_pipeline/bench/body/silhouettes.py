@@ -27,7 +27,7 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
 GIRTHS = ("chest_girth", "waist_girth", "hip_girth")
-_HEIGHT, _WIDTH = 800, 600
+_HEIGHT, _WIDTH = 800, 800
 _LENS_M, _LENSES_M = 1.0, (0.8, 1.5)
 """Height of the lens where nothing else is said; between these for random people."""
 _BACKDROP, _BODY, _NOISE = 205.0, 95.0, 4.0
