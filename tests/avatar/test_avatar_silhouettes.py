@@ -18,7 +18,7 @@ from vto_pipeline.avatar.outline import Camera, ImageOutline, model_outline
 from vto_pipeline.avatar.pose import joint_transforms
 from vto_pipeline.avatar.registration import Fit
 from vto_pipeline.avatar.shape import shape_space
-from vto_pipeline.avatar.silhouette_fit import View, _camera_rows, _feet_rows, _moved, _posture_rows
+from vto_pipeline.avatar.silhouette_fit import View, _camera_rows, _eye_row, _feet_rows, _moved, _posture_rows
 from vto_pipeline.avatar.template import template
 from vto_pipeline.bench.body.silhouettes import photograph as shot
 from vto_pipeline.errors import AvatarError
@@ -136,6 +136,32 @@ def test_feet_that_tip_are_held_flat() -> None:
         assert_allclose(rows[:, column], (ahead - behind) / (2 * step), rtol=0, atol=0.5)
 
 
+def test_the_lens_is_as_high_as_it_is() -> None:
+    """Closed form: a level camera before who stands upright, one that looks down; and the row is its derivative."""
+    space, rng = shape_space(0.0), np.random.default_rng(5)
+    base, zero = space.base, np.zeros(len(space.names))
+
+    def seen(fit: Fit) -> tuple[np.ndarray, float]:
+        return _eye_row(base.joints[0], joint_transforms(base.joints, base.parents, fit.pose)[0][0], fit)
+
+    pose = np.zeros((len(base.joints), 3))
+    assert_allclose(seen(Fit(zero, pose, np.array([0.1, -1.3, -2.5]), zero))[1], 1.3, rtol=0, atol=1e-12)
+    # both axes turn about the pelvis: the lens rises over it by the sine of the angle at which the camera looks down
+    pose[0, 0] = 0.2
+    ahead = -base.joints[0] - [0.0, 0.0, 2.5]
+    assert_allclose(seen(Fit(zero, pose, ahead, zero))[1], base.joints[0, 1] + 2.5 * np.sin(0.2), rtol=0, atol=1e-12)
+    pose[0] = [0.1, 1.5, -0.05]
+    pose[1:] = rng.normal(0.0, 0.1, pose[1:].shape)
+    fit = Fit(zero, pose, np.array([0.1, -1.1, -2.5]), zero)
+    view = View(ImageOutline(np.pad(np.ones((8, 8), dtype=bool), 4)), pose, fit, Camera(900.0, 16, 16))
+    row, step = seen(fit)[0], 1e-5
+    for column in range(len(row)):
+        move = np.zeros(len(row))
+        move[column] = step
+        above, below = (seen(_moved(space, view, zero, sign * move).fit)[1] for sign in (1.0, -1.0))
+        assert_allclose(row[column], (above - below) / (2 * step), rtol=0, atol=1e-6)
+
+
 def views(body: Avatar) -> tuple[np.ndarray, np.ndarray]:
     return photograph(body, 0.0), photograph(body, np.pi / 2)
 
@@ -206,15 +232,24 @@ def test_intervals_hold_bodies_of_another_model(another_model: tuple[np.ndarray,
     assert np.mean(another_model[1]) >= 0.9
 
 
-@pytest.mark.xfail(strict=True, reason="arms held off broaden the chest; seats rounder than surveyed people's")
+@pytest.mark.parametrize(
+    ("k", "bar"),
+    [
+        pytest.param(0, 0.025, id="chest"),
+        pytest.param(1, 0.020, id="waist"),
+        pytest.param(
+            2,
+            0.020,
+            id="hip",
+            marks=pytest.mark.xfail(strict=True, reason="seats fuller and a centimetre lower than these bodies'"),
+        ),
+    ],
+)
 @pytest.mark.slow
 @pytest.mark.real_data
 @pytest.mark.skipif(not BODIES.exists(), reason="shared data absent")
-def test_girths_of_bodies_of_another_model(another_model: tuple[np.ndarray, list[bool]]) -> None:
-    chest, waist, hip = np.abs(another_model[0]).mean(axis=0)
-    assert chest < 0.025
-    assert waist < 0.020
-    assert hip < 0.020
+def test_girths_of_bodies_of_another_model(another_model: tuple[np.ndarray, list[bool]], k: int, bar: float) -> None:
+    assert np.abs(another_model[0][:, k]).mean() < bar
 
 
 @pytest.mark.slow

@@ -14,6 +14,7 @@ from pydantic import Field
 
 from vto_pipeline.avatar.backdrop import person
 from vto_pipeline.avatar.definitions import DEFINITIONS
+from vto_pipeline.avatar.levels import find_levels, with_rows_at
 from vto_pipeline.avatar.population import population
 from vto_pipeline.avatar.pose import pose_avatar
 from vto_pipeline.avatar.registration import Fit, model
@@ -22,6 +23,7 @@ from vto_pipeline.avatar.settle import settle
 from vto_pipeline.avatar.shape import SEX_SHARE, ShapeSpace, shape_space
 from vto_pipeline.avatar.silhouette_fit import Evidence, Solution, advance
 from vto_pipeline.avatar.silhouette_start import mean_body, stand
+from vto_pipeline.avatar.slide import slide
 from vto_pipeline.avatar.stance import stance
 from vto_pipeline.avatar.tape import Tape
 from vto_pipeline.errors import AvatarError
@@ -57,6 +59,7 @@ class SilhouettesConfig(Config):
         default="neutral", description="whose statistics complete the body"
     )
     distance_m: float = Field(default=2.5, gt=0.5, le=20, description="from the camera to the body, about [m]")
+    height_m: float = Field(default=1.2, gt=0, le=10, description="of the camera above the floor, about [m]")
     outline_sigma_mm: float = Field(
         default=4.0, gt=0, le=100, description="uncertainty of a point on the outline: picture, cloth, model [mm]"
     )
@@ -119,7 +122,9 @@ def fit_silhouettes(
 
 def _evidence(sex: str, silhouettes: Silhouettes, config: SilhouettesConfig) -> Evidence:
     people = population(sex).bridged(_OUTLINE_TO_CALIPER, _OUTLINE_TO_CALIPER_SPREAD)
-    return Evidence(people, Tape(shape_space(SEX_SHARE[sex]).base), silhouettes.stature, config.distance_m)
+    return Evidence(
+        people, Tape(shape_space(SEX_SHARE[sex]).base), silhouettes.stature, config.distance_m, config.height_m
+    )
 
 
 def _fit(sex: str, begin: Solution, silhouettes: Silhouettes, config: SilhouettesConfig) -> Solution:
@@ -151,10 +156,17 @@ def _report(space: ShapeSpace, solution: Solution, job: Job) -> Avatar:
 
 
 def _as_it_stands(space: ShapeSpace, fit: Fit) -> Avatar:
-    """Return the body in the bind pose: trunk and legs keep the posture of the front view, as those of a scan do."""
+    """Return the body in the bind pose: trunk and legs keep the posture of the front view, as those of a scan do.
+
+    An outline does not tell where a row of the template comes to lie; the rows move to where the body shows them.
+    """
     pose = fit.pose.copy()
     pose[0] = 0.0  # the camera's tilt, not the body's
     upright = replace(fit, pose=pose, translation=np.zeros(3))
-    posed = model(space, upright)
-    body, _ = settle(space, upright, stance(space, upright), posed, posed)
+    posed, stands = model(space, upright), stance(space, upright)
+    standing = (posed - stands.translation) @ stands.yaw
+    levelled = with_rows_at(space, fit.parameters, standing, find_levels(standing, space.base))
+    shift = (levelled.base.bind_vertices - space.base.bind_vertices) @ stands.yaw.T
+    moved = slide(posed, space.base.faces, shift)
+    body, _ = settle(levelled, upright, stance(levelled, upright), model(levelled, upright), moved)
     return pose_avatar(body, np.zeros_like(pose), np.zeros(3))

@@ -32,7 +32,7 @@ _POSE_SIGMA_RAD = {
     "head": (0.10, 0.10, 0.05),
     "clavicle": (0.10, 0.10, 0.10),
     "shoulder": (0.40, 0.40, 0.40),
-    "elbow": (0.40, 0.40, 0.40),
+    "elbow": (0.20, 0.20, 0.20),
     "wrist": (0.20, 0.20, 0.20),
     "hip": (0.05, 0.12, 0.12),
     "knee": (0.05, 0.05, 0.03),
@@ -41,7 +41,8 @@ _POSE_SIGMA_RAD = {
 """Of a person who stands straight: bent forwards, turned about the vertical, bent sideways, in the parent's frame.
 
 The pelvis stands for the whole body: how far the camera may be tilted, the person turned, the picture askew. Legs that
-swing back or forth unseen would make the body shorter and the picture's scale too large.
+swing back or forth unseen would make the body shorter and the picture's scale too large; an elbow that may fold as it
+likes passes for a bust.
 """
 _STATURE_SIGMA_M = 0.003
 _POSTURE = ("spine", "chest", "neck", "head", "hip", "knee")
@@ -61,6 +62,12 @@ A tilt that the outlines of one view would suffer makes the body lean, and its p
 """
 _DISTANCE_SPREAD = 0.08
 """Relative. How strongly a picture converges depends on the distance so little that any misfit would settle it."""
+_EYE_SPREAD_M = 0.25
+"""How far the lens may be from where it is expected to be held, between a hip's height and an eye's.
+
+How high it is shows in feet and crown alone, which no model has quite right; and a lens too low makes the nearer foot
+of the side view reach less far down, the body too tall in the picture, and its picture's scale too large.
+"""
 _REACH_M, _LAST_REACH_M, _FALL = 0.10, 0.02, 0.85
 _INDEPENDENT = 150.0
 """Points of an outline that err on their own: the model is wrong alike over some centimetres."""
@@ -96,12 +103,14 @@ class Evidence:
         tape: Reads them.
         stature: [m].
         distance: Of the camera, expected [m].
+        eye: Height of the lens above the floor, expected [m].
     """
 
     population: Population
     tape: Tape
     stature: float
     distance: float
+    eye: float
 
 
 @dataclass(frozen=True)
@@ -250,7 +259,7 @@ def _rows(
 
 
 def _pose_prior(space: ShapeSpace, view: View, evidence: Evidence) -> tuple[FloatArray, FloatArray]:
-    """Rows that draw the pose to the nominal one, the feet flat and the camera to its expected distance."""
+    """Rows that draw the pose to the nominal one, the feet flat and the camera to where it is expected."""
     base = space.base
     joints = len(base.joints)
     sigmas = np.array([_POSE_SIGMA_RAD[name.rpartition("_")[2]] for name in base.joint_names])
@@ -266,8 +275,29 @@ def _pose_prior(space: ShapeSpace, view: View, evidence: Evidence) -> tuple[Floa
     rows[-1, -1] = 1 / (_DROP_SHARE * view.camera.height)
     flat, tipped = _feet_rows(base, rotation)
     flat = np.hstack([flat, np.zeros((len(flat), 5))])
-    offs = [(turned.as_rotvec() / sigmas).ravel(), [off, rows[-1, -1] * view.camera.drop], tipped]
-    return np.vstack([rows, flat]), np.concatenate(offs)
+    held, height = _eye_row(space.joints(view.fit.parameters)[0], rotation[0], view.fit)
+    offs = [
+        (turned.as_rotvec() / sigmas).ravel(),
+        [off, rows[-1, -1] * view.camera.drop],
+        tipped,
+        [(height - evidence.eye) / _EYE_SPREAD_M],
+    ]
+    return np.vstack([rows, flat, held / _EYE_SPREAD_M]), np.concatenate(offs)
+
+
+def _eye_row(pelvis: FloatArray, rotation: FloatArray, fit: Fit) -> tuple[FloatArray, float]:
+    """Height of the lens above the floor the body stands on [m], and its derivative by turns, place and camera.
+
+    Args:
+        pelvis: At rest, where the floor is y = 0, shape (3,).
+        rotation: Of the posed pelvis, shape (3, 3).
+        fit: Of the view.
+    """
+    up, place = rotation[:, 1], pelvis + fit.translation
+    row = np.zeros(fit.pose.size + 5)
+    row[:3] = np.cross(place, up)
+    row[-5:-2] = -up
+    return row, float(pelvis[1] - up @ place)
 
 
 def _feet_rows(base: Avatar, rotation: FloatArray) -> tuple[FloatArray, FloatArray]:

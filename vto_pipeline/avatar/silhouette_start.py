@@ -22,7 +22,7 @@ _RACE_STEPS, _MORE_STEPS, _RACED = 3, 4, 2
 """Steps of every guess, and how many more of how many of the best."""
 _STIFF = 4.0
 _POSES = ("a_pose", "arms_down", "t_pose")
-_ARMS_AHEAD_RAD = ((-0.2, 0.0), (0.15, 0.0), (0.5, 0.0), (0.0, 0.6))
+_ARMS_AHEAD_RAD = ((-0.5, 0.0), (-0.2, 0.0), (0.15, 0.0), (0.5, 0.0), (0.0, 0.6))
 """Swing of the shoulders, bend of the elbows: how the arms may be held in the side view."""
 
 
@@ -77,11 +77,14 @@ def _race(space: ShapeSpace, guesses: Iterable[tuple[View, ...]], evidence: Evid
 
 
 def _arms_ahead(space: ShapeSpace, facing: View, swing: float, bend: float) -> FloatArray:
-    """Return the front view's pose, its arms raised as they are seen there, swung forward and bent by so much [rad].
+    """Return the front view's pose, legs and arms apart as they are seen there, arms swung forward and bent [rad].
 
     What the front does not show, whether an arm is held forward or back, is not taken from there.
     """
     joints, names, pose = space.joints(facing.fit.parameters), space.base.joint_names, facing.start.copy()
+    for k, name in enumerate(names):
+        if name.endswith(("hip", "ankle")):
+            pose[k] = facing.fit.pose[k]
     rotation, offset = joint_transforms(joints, space.base.parents, facing.fit.pose)
     x, y, _ = arm_axis()
     for side, sign in (("left", 1.0), ("right", -1.0)):
@@ -96,10 +99,12 @@ def _arms_ahead(space: ShapeSpace, facing: View, swing: float, bend: float) -> F
 def _place(
     space: ShapeSpace, outline: ImageOutline, mask: NDArray[np.bool_], yaw: float, pose: FloatArray, evidence: Evidence
 ) -> View:
-    """Place the mean body, scaled to the stature, behind an outline."""
+    """Place the mean body, scaled to the stature, behind an outline; the lens level and as high as expected."""
     rows, columns = np.nonzero(mask)
     height, width = mask.shape
-    camera = Camera((rows.max() + 1 - rows.min()) * evidence.distance / evidence.stature, width, height)
+    focal = (rows.max() + 1 - rows.min()) * evidence.distance / evidence.stature
+    level = rows.max() + 0.5 - evidence.eye * focal / evidence.distance
+    camera = Camera(focal, width, height, level - (height - 1) / 2)
     fit = mean_body(space, evidence.stature, yaw, pose)
     metres = evidence.distance / camera.focal
     middle = np.array([np.median(columns), rows.max() + 0.5]) - camera.middle

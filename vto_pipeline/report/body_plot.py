@@ -76,7 +76,7 @@ def _people(axes: Axes, rows: Rows) -> None:
         (f"{row['scene']}: {name.removesuffix('_mm').replace('_', ' ')}", value)
         for row in rows
         for name, value in row["errors"].items()
-        if name.endswith("_mm")
+        if name.endswith("_mm") and not name.endswith("_bias_mm")
     ]
     at = np.arange(len(bars))[::-1]
     axes.barh(at, [value for _, value in bars], color=COLORS[2], height=0.6)

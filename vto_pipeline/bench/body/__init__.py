@@ -1,4 +1,4 @@
-"""Bodies: from a scan, naked or dressed, from a tape, from two outlines, and the noise floor of the measure itself."""
+"""Bodies from a scan, naked or dressed, from a tape, from two outlines, extreme ones; and the measure's noise floor."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from vto_pipeline.bench.bench import Row, Watch
 from vto_pipeline.bench.body.clothed import clothed_rows
+from vto_pipeline.bench.body.extremes import extreme_rows
 from vto_pipeline.bench.body.measurements import measurement_rows
 from vto_pipeline.bench.body.repeats import repeat_rows
 from vto_pipeline.bench.body.scans import scan_rows
@@ -14,5 +15,5 @@ from vto_pipeline.bench.body.silhouettes import silhouette_rows
 
 def rows(quick: bool, watch: Watch) -> Iterator[Row]:
     """Measure all of them."""
-    for part in (scan_rows, clothed_rows, repeat_rows, measurement_rows, silhouette_rows):
+    for part in (scan_rows, clothed_rows, repeat_rows, measurement_rows, silhouette_rows, extreme_rows):
         yield from part(quick, watch)

@@ -27,8 +27,9 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
 GIRTHS = ("chest_girth", "waist_girth", "hip_girth")
-_HEIGHT, _WIDTH = 800, 600
-_LENS_HEIGHT_M = 1.0
+_HEIGHT, _WIDTH = 800, 800
+_LENS_M, _LENSES_M = 1.0, (0.8, 1.5)
+"""Height of the lens where nothing else is said; between these for random people."""
 _BACKDROP, _BODY, _NOISE = 205.0, 95.0, 4.0
 _HELD_OUT = 9000
 """First of the seeds that nothing else uses."""
@@ -54,12 +55,14 @@ class Person:
         sex: "female" or "male".
         body: Standing on y = 0 about the origin.
         distance: Of the camera [m].
+        lens: Height of the camera [m].
         true: Stature and girths [m], mass [kg].
     """
 
     sex: str
     body: TriangleMesh
     distance: float
+    lens: float
     true: dict[str, float]
 
 
@@ -85,7 +88,7 @@ def _foreign() -> Person:
     truth = measure_truth(body).values
     tall = float(np.ptp(body.vertices[:, 1]))
     girths = {"chest_girth": truth["bust_girth"], "waist_girth": truth["waist_girth"], "hip_girth": truth["hip_girth"]}
-    return Person("female", body, 2.5, girths | {"stature": tall, "mass": DENSITY_KG_M3 * _volume(body)})
+    return Person("female", body, 2.5, _LENS_M, girths | {"stature": tall, "mass": DENSITY_KG_M3 * _volume(body)})
 
 
 def _volume(body: TriangleMesh) -> float:
@@ -105,18 +108,19 @@ def _someone(sex: str, seed: int) -> Person:
     turns = named_pose(body, "a_pose").pose + rng.normal(0.0, 1.0, (len(loose), 3)) * np.array(loose)[:, None]
     mesh = pose_avatar(body, turns, np.zeros(3)).mesh
     floor = np.array([0.0, mesh.vertices[:, 1].min(), 0.0])
-    distance = 2.5 * float(rng.uniform(0.94, 1.06))
-    return Person(sex, TriangleMesh(mesh.vertices - floor, mesh.faces), distance, dict(measure(body).values))
+    distance, lens = 2.5 * float(rng.uniform(0.94, 1.06)), float(rng.uniform(*_LENSES_M))
+    return Person(sex, TriangleMesh(mesh.vertices - floor, mesh.faces), distance, lens, dict(measure(body).values))
 
 
-def photograph(body: TriangleMesh, yaw: float, distance: float, seed: int) -> ByteArray:
-    """Return a grey picture through a pinhole at a height of one metre, shape (H, W, 3).
+def photograph(body: TriangleMesh, yaw: float, distance: float, seed: int, lens: float = _LENS_M) -> ByteArray:
+    """Return a grey picture through a level pinhole, shape (H, W, 3).
 
     Args:
         body: Standing on y = 0 about the origin.
         yaw: How far it has turned from facing the camera [rad].
         distance: Of the camera from its axis [m].
         seed: Of the noise.
+        lens: Height of the pinhole [m].
     """
     import open3d as o3d
 
@@ -129,10 +133,10 @@ def photograph(body: TriangleMesh, yaw: float, distance: float, seed: int) -> By
     stature = float(np.ptp(body.vertices[:, 1]))
     focal = 0.85 * _HEIGHT * (distance - 0.2) / stature
     column, row = np.meshgrid(np.arange(_WIDTH) + 0.5, np.arange(_HEIGHT) + 0.5)
-    up = (0.5 * _HEIGHT - row) / focal + (0.5 * stature - _LENS_HEIGHT_M) / distance
+    up = (0.5 * _HEIGHT - row) / focal + (0.5 * stature - lens) / distance
     across = (column - 0.5 * _WIDTH) / focal
     ahead = np.stack([across, up, -np.ones_like(up)], axis=2)
-    eye = np.broadcast_to([0.0, _LENS_HEIGHT_M, distance], ahead.shape)
+    eye = np.broadcast_to([0.0, lens, distance], ahead.shape)
     rays = np.concatenate([eye, ahead], axis=2).astype(np.float32)
     hit = np.isfinite(scene.cast_rays(o3d.core.Tensor.from_numpy(rays))["t_hit"].numpy())
     grey = np.where(hit, _BODY, _BACKDROP)[:, :, None] + np.random.default_rng(seed).normal(
@@ -145,7 +149,7 @@ def _people(people: list[Person]) -> Measured:
     seconds, wrong, null, held = [], [], [], []
     for k, one in enumerate(people):
         job, config = Job(), SilhouettesConfig.model_validate({"sex": one.sex})
-        front, side = (photograph(one.body, yaw, one.distance, k) for yaw in (0.0, np.pi / 2))
+        front, side = (photograph(one.body, yaw, one.distance, k, one.lens) for yaw in (0.0, np.pi / 2))
         began = time.perf_counter()
         fit_silhouettes(Silhouettes(Path("front"), Path("side"), one.true["stature"]), front, side, config, job)
         seconds.append(time.perf_counter() - began)
