@@ -14,6 +14,8 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 _AGREE = 0.5
 _NO_WEIGHT = 1e-6
+_MUTUAL = 0.5
+"""Of a vertex's distance to the scan: a place that another part of the body is so much nearer to belongs to that."""
 _THROUGH_M = 0.003
 """A body this little outside its clothes is left there: bare skin would else be pushed in wherever it is met."""
 
@@ -64,12 +66,25 @@ class Target:
         self._rim_face: NDArray[np.bool_] = np.any(rim[scan.faces], axis=1)
 
     def onto_scan(
-        self, points: FloatArray, normals: FloatArray, reach: float
+        self, vertices: FloatArray, faces: IntArray, chosen: NDArray[np.int64], normals: FloatArray, reach: float
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return closest scan points, their normals, and weights: 0 beyond reach, across the surface, or at a rim."""
+        """Return closest scan points of a body's vertices, their normals, and weights.
+
+        These are 0 beyond reach, across the surface, at a rim, and where another part of the body is nearer to that
+        place: what the scan lacks, as an arm, would else be drawn to what lies beside it. (Correspondences must be
+        mutual; Pajdla & Van Gool 1995.)
+
+        Args:
+            vertices, faces: The body [m].
+            chosen: Which vertices, shape (N,).
+            normals: Theirs, shape (N, 3).
+            reach: Distance at which a point begins to count little [m].
+        """
+        points = vertices[chosen]
         face, closest, distance = closest_points(points, self.vertices, self.faces)
         agree = (normals * self.face_normals[face]).sum(axis=1) > _AGREE
-        weight = robust(distance, reach) * (agree & ~self._rim_face[face] & (distance < 3 * reach))
+        own = closest_points(closest, vertices, faces)[2] >= _MUTUAL * distance
+        weight = robust(distance, reach) * (agree & own & ~self._rim_face[face] & (distance < 3 * reach))
         weight *= self.counted(((closest - points) * normals).sum(axis=1))
         return closest, self.face_normals[face], weight
 
@@ -87,7 +102,8 @@ class Target:
         weight = robust(distance, reach) * (agree & (distance < 3 * reach))
         weight *= self.counted(((self.probes - closest) * normal[face]).sum(axis=1))
         shares = barycentric(closest, corners[face])
-        at, ahead, pull = self.onto_scan(vertices[chosen], vertex_normals(TriangleMesh(vertices, faces))[chosen], reach)
+        facing = vertex_normals(TriangleMesh(vertices, faces))[chosen]
+        at, ahead, pull = self.onto_scan(vertices, faces, chosen, facing, reach)
         return Pairs(
             np.concatenate([faces[face], np.repeat(chosen[:, None], 3, axis=1)]).astype(np.int64),
             np.concatenate([shares, np.tile([1.0, 0.0, 0.0], (len(chosen), 1))]),

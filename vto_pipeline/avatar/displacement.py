@@ -73,7 +73,7 @@ def _step(
 ) -> FloatArray:
     facing = vertex_normals(TriangleMesh(vertices, faces))
     normals = _smooth_normals(facing, laplace)
-    at, toward, pull = target.onto_scan(vertices, facing, reach)
+    at, toward, pull = target.onto_scan(vertices, faces, np.arange(len(vertices)), facing, reach)
     along = (normals * toward).sum(axis=1)
     pull = pull * trust
     back, missing = _from_probes(target, vertices, faces, normals, trust, reach)
