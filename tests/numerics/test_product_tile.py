@@ -10,22 +10,22 @@ from vto_pipeline.numerics.product_tile import COLUMNS, subtract_six, subtract_t
 
 
 @njit
-def six(factors, count, i, j, out, row, column):  # type: ignore[no-untyped-def]
-    subtract_six(factors, count, i, j, out, row, column)
+def six(above, i, beside, j, count, out, row, column):  # type: ignore[no-untyped-def]
+    subtract_six(above, i, beside, j, count, out, row, column)
 
 
 @njit
-def three(factors, count, i, j, out, row, column):  # type: ignore[no-untyped-def]
-    subtract_three(factors, count, i, j, out, row, column)
+def three(above, i, beside, j, count, out, row, column):  # type: ignore[no-untyped-def]
+    subtract_three(above, i, beside, j, count, out, row, column)
 
 
 @pytest.mark.parametrize(("subtract", "height"), [(six, 6), (three, 3)])
 @pytest.mark.parametrize("count", [0, 1, 7, 40])
 def test_a_tile_and_nothing_else_is_subtracted(subtract, height: int, count: int) -> None:  # type: ignore[no-untyped-def]
     rng = np.random.default_rng(count)
-    factors, out = rng.standard_normal((40, 31)), rng.standard_normal((9, 17))
+    above, beside, out = rng.standard_normal((40, 31)), rng.standard_normal((40, 23)), rng.standard_normal((9, 17))
     i, j, row, column = 31 - height, 5, 9 - height, 17 - COLUMNS  # both end where the arrays end
     wanted = out.copy()
-    wanted[row : row + height, column:] -= factors[:count, i:].T @ factors[:count, j : j + COLUMNS]
-    subtract(factors, count, i, j, out, row, column)
+    wanted[row : row + height, column:] -= above[:count, i:].T @ beside[:count, j : j + COLUMNS]
+    subtract(above, i, beside, j, count, out, row, column)
     np.testing.assert_allclose(out, wanted, rtol=0, atol=1e-13)  # rounding of 40 products of size 1

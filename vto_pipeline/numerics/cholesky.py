@@ -21,6 +21,7 @@ from vto_pipeline.numerics.product_tile import COLUMNS, subtract_six, subtract_t
 _SIDE_BY_SIDE = 4e6  # flops; with less, starting the threads costs more than they save
 _SHARED = 1e6  # products; with more, all threads share what pivots make of the rest of a front
 _STRIP = 24  # of those rows, that a thread takes at a time
+_BESIDE = 24  # tiles, side by side: their share of the pivots then stays in the cache
 _PIVOTS = 96  # at a time: what they make of a tile then stays in the cache
 
 
@@ -86,7 +87,8 @@ def _bin(b, plan, starts, blocks, weights, between, out, threaded):
         panel = out.panels[plan.panels[s] : plan.panels[s + 1]].reshape(wide, wide + tall)
         rest = out.passed[plan.passed_at[s] : plan.passed_at[s] + tall * tall].reshape(tall, tall)
         panel[:] = 0.0
-        rest[:] = 0.0
+        for i in range(tall):
+            rest[i, i:] = 0.0
         _gather(s, plan, starts, blocks, weights, between, panel, rest)
         for c in children:
             _take_over(c, plan, out.passed, panel, rest)
@@ -157,7 +159,7 @@ def _eliminate(panel, threaded):
     for first in range(0, wide, _PIVOTS):
         last = min(first + _PIVOTS, wide)
         for begin in range(first, last, 3):
-            _subtract(panel[first:], begin - first, panel, begin, begin + 3, 0)
+            _subtract_three(panel[first:], begin - first, panel, begin)
             for q in range(begin, begin + 3):
                 target = panel[q, q:]
                 for p in range(begin, q):
@@ -174,6 +176,21 @@ def _eliminate(panel, threaded):
 
 
 @njit(cache=True, error_model="numpy")
+def _subtract_three(pivots, count, panel, i):
+    """Subtract what pivots make of three rows of their own front, i and those after it."""
+    j = panel.shape[1] - COLUMNS
+    while j > i - COLUMNS and j >= 0:
+        subtract_three(pivots, i, pivots, j, count, panel, i, j)
+        j -= COLUMNS
+    for k in range(i, i + 3):
+        for m in range(k, j + COLUMNS):
+            total = 0.0
+            for p in range(count):
+                total += pivots[p, k] * pivots[p, m]
+            panel[k, m] -= total
+
+
+@njit(cache=True, error_model="numpy")
 def _pass_on(panel, rest, threaded):
     """Subtract from what is passed on the products of the eliminated columns."""
     wide, tall = len(panel), len(rest)
@@ -183,53 +200,76 @@ def _pass_on(panel, rest, threaded):
 
 @njit(cache=True, error_model="numpy")
 def _subtract_all(pivots, rows, begin, end, shift, threaded):
-    """Subtract what pivots make of some rows, by all threads where that is worth it; see `_subtract`."""
-    if threaded and len(pivots) * (end - begin) * (rows.shape[1] - begin) >= _SHARED:
-        _subtract_parallel(pivots, rows, begin, end, shift)
-    else:
-        _subtract(pivots, len(pivots), rows, begin, end, shift)
-
-
-@njit(cache=True, error_model="numpy", parallel=True)
-def _subtract_parallel(pivots, rows, begin, end, shift):
-    strips = (end - begin + _STRIP - 1) // _STRIP
-    for k in prange(strips):
-        # long and short rows in turn, so that threads have like work
-        strip = k // 2 if k % 2 == 0 else strips - 1 - k // 2
-        first = begin + _STRIP * strip
-        _subtract(pivots, len(pivots), rows, first, min(end, first + _STRIP), shift)
-
-
-@njit(cache=True, error_model="numpy")
-def _subtract(pivots, count, rows, begin, end, shift):
     """Subtract what some pivots make of some rows of a front, each from its diagonal on.
 
     Entries before the diagonal are nobody's: tiles may reach over them.
 
     Args:
         pivots: Their rows, of the whole front.
-        count: Of them.
         rows: Of the front, those from `shift` on.
         begin, end: Which of these: whole blocks of three.
         shift: Columns of the front before those of `rows`.
+        threaded: Whether all threads share it, where that is worth it.
     """
-    i = begin
-    while i < end:
-        tall = 6 if end - i >= 6 else 3
-        j = rows.shape[1] - COLUMNS
-        while j > i - COLUMNS and j >= 0:
-            if tall == 6:
-                subtract_six(pivots, count, shift + i, shift + j, rows, i, j)
-            else:
-                subtract_three(pivots, count, shift + i, shift + j, rows, i, j)
-            j -= COLUMNS
-        for k in range(i, i + tall):
-            for m in range(k, j + COLUMNS):
-                total = 0.0
-                for p in range(count):
-                    total += pivots[p, shift + k] * pivots[p, shift + m]
-                rows[k, m] -= total
-        i += tall
+    beside = _tiles(pivots, shift, rows.shape[1], begin)
+    if threaded and len(pivots) * (end - begin) * (rows.shape[1] - begin) >= _SHARED:
+        _subtract_parallel(pivots, beside, rows, begin, end, shift)
+    else:
+        _subtract(pivots, beside, rows, begin, end, shift)
+    odd = rows.shape[1] % COLUMNS  # columns that no tile covers
+    for i in range(begin, min(end, odd)):
+        for j in range(i, odd):
+            total = 0.0
+            for p in range(len(pivots)):
+                total += pivots[p, shift + i] * pivots[p, shift + j]
+            rows[i, j] -= total
+
+
+@njit(cache=True, error_model="numpy")
+def _tiles(pivots, shift, width, begin):
+    """Return the pivots' last columns from `begin` on by tiles, the last first, shape (T, P, COLUMNS).
+
+    So the inner loops read along memory; in a large front each pivot is on a page of its own.
+    """
+    count = min((width - begin + COLUMNS - 1) // COLUMNS, width // COLUMNS)
+    tiles = np.empty((count, len(pivots), COLUMNS))
+    for p in range(len(pivots)):
+        for n in range(count):
+            first = shift + width - COLUMNS * (n + 1)
+            for k in range(COLUMNS):
+                tiles[n, p, k] = pivots[p, first + k]
+    return tiles
+
+
+@njit(cache=True, error_model="numpy", parallel=True)
+def _subtract_parallel(pivots, beside, rows, begin, end, shift):
+    strips = (end - begin + _STRIP - 1) // _STRIP
+    for k in prange(strips):
+        # long and short rows in turn, so that threads have like work
+        strip = k // 2 if k % 2 == 0 else strips - 1 - k // 2
+        first = begin + _STRIP * strip
+        _subtract(pivots, beside, rows, first, min(end, first + _STRIP), shift)
+
+
+@njit(cache=True, error_model="numpy")
+def _subtract(pivots, beside, rows, begin, end, shift):
+    """Subtract from the columns of some rows that tiles cover; see `_subtract_all`."""
+    width, count = rows.shape[1], len(pivots)
+    above = np.empty((count, 6))
+    for first in range(0, width // COLUMNS, _BESIDE):
+        i = begin
+        while i < min(end, width - COLUMNS * first):
+            tall = 6 if end - i >= 6 else 3
+            for p in range(count):
+                for k in range(tall):
+                    above[p, k] = pivots[p, shift + i + k]
+            for n in range(first, min(first + _BESIDE, (width - i + COLUMNS - 1) // COLUMNS, width // COLUMNS)):
+                j = width - COLUMNS * (n + 1)
+                if tall == 6:
+                    subtract_six(above, 0, beside[n], 0, count, rows, i, j)
+                else:
+                    subtract_three(above, 0, beside[n], 0, count, rows, i, j)
+            i += tall
 
 
 @njit(cache=True, error_model="numpy")

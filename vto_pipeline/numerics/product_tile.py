@@ -27,23 +27,23 @@ def _subtract_tile(height: int) -> Any:
     """Return a function that subtracts tiles of so many rows."""
 
     @intrinsic  # type: ignore[misc]
-    def subtract(typingctx, factors, count, i, j, out, row, column):  # type: ignore[no-untyped-def]
-        signature = types.void(factors, types.intp, types.intp, types.intp, out, types.intp, types.intp)
+    def subtract(typingctx, above, i, beside, j, count, out, row, column):  # type: ignore[no-untyped-def]
+        signature = types.void(above, types.intp, beside, types.intp, types.intp, out, types.intp, types.intp)
 
         def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-            source, target = (context.make_array(signature.args[k])(context, builder, args[k]) for k in (0, 4))
+            left, right, target = (context.make_array(signature.args[k])(context, builder, args[k]) for k in (0, 2, 5))
             place = _places(builder)
             vectors = range(0, COLUMNS, _LANES)
             sums = {(r, v): cgutils.alloca_once_value(builder, _zero()) for r in range(height) for v in vectors}
-            with cgutils.for_range(builder, args[1]) as loop:
-                across = [builder.load(place(source, loop.index, args[3], 0, v, _VECTOR), align=8) for v in vectors]
+            with cgutils.for_range(builder, args[4]) as loop:
+                across = [builder.load(place(right, loop.index, args[3], 0, v, _VECTOR), align=8) for v in vectors]
                 for r in range(height):
-                    one = _spread(builder, builder.load(place(source, loop.index, args[2], 0, r)))
+                    one = _spread(builder, builder.load(place(left, loop.index, args[1], 0, r)))
                     for v, many in zip(vectors, across, strict=True):
                         product = builder.fmul(one, many, flags=_CONTRACT)
                         builder.store(builder.fadd(builder.load(sums[r, v]), product, flags=_CONTRACT), sums[r, v])
             for (r, v), total in sums.items():
-                at = place(target, args[5], args[6], r, v, _VECTOR)
+                at = place(target, args[6], args[7], r, v, _VECTOR)
                 builder.store(builder.fsub(builder.load(at, align=8), builder.load(total)), at, align=8)
             return context.get_dummy_value()
 
@@ -53,9 +53,9 @@ def _subtract_tile(height: int) -> Any:
 
 
 subtract_six = _subtract_tile(6)
-"""Subtract factors[:count, i : i + 6]ᵀ factors[:count, j : j + 8] from out[row : row + 6, column : column + 8].
+"""Subtract above[:count, i : i + 6]ᵀ beside[:count, j : j + 8] from out[row : row + 6, column : column + 8].
 
-Args (factors, count, i, j, out, row, column): both arrays float64, of two dimensions and in C order; all within them.
+Args (above, i, beside, j, count, out, row, column): arrays float64, of two dimensions and in C order; all within them.
 """
 
 subtract_three = _subtract_tile(3)
