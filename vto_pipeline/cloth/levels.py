@@ -16,7 +16,7 @@ from typing import NamedTuple
 from vto_pipeline.cloth.build import ClothModel, at_rest, build
 from vto_pipeline.cloth.coarser import Coarser, coarser
 from vto_pipeline.cloth.drape_config import DrapeConfig
-from vto_pipeline.cloth.phases import QUIET, REST, ROUGH, Phases
+from vto_pipeline.cloth.phases import REST, ROUGH, Phases
 from vto_pipeline.cloth.settle import Settling
 from vto_pipeline.cloth.simulation import default_skin
 from vto_pipeline.cloth.stepper import Stepper
@@ -110,9 +110,8 @@ class _Descent:
     def _rest_on(self, level: int, garment: Garment, body: MovingBody, deadline: float) -> Reached:
         """Return the garment at rest on one mesh: 0 is its own, the last the coarsest."""
         model, config, job = self._model, self._config, self._job
-        passes: tuple[tuple[float, float], ...] = (QUIET, REST) if self._coarser else (ROUGH, REST)
         if level > 0:
-            config, job, passes = self._rough, self._part(level), (ROUGH,)
+            config, job = self._rough, self._part(level)
             model = build(garment.mesh, garment.rest, self._fabric, materials=config)
         phases = Phases(model, garment.rest, self._fabric, config, job)
         first = TriangleMesh(body.keyframes[0], body.faces)
@@ -125,7 +124,7 @@ class _Descent:
         job.note(f"{stepper.choice.method}, {stepper.substeps} steps per 1/60 s: {stepper.choice.reason}")
         state = phases.ride(state, stepper, collider, body.final)
         before = time.perf_counter() - self._began
-        settling = phases.settle(state, stepper, body.final, deadline, passes)
+        settling = phases.settle(state, stepper, body.final, deadline, (ROUGH,) if level > 0 else (ROUGH, REST))
         settling.trace = [replace(row, seconds=before + row.seconds, level=level) for row in settling.trace]
         if level > 0:  # what matters in the end warns again
             self._job.notes += [f"on {len(model.mass)} vertices: {text}" for text in job.warnings]

@@ -25,11 +25,10 @@ from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
-ROUGH, QUIET, REST = (5e-3, 10.0), (1e-3, 1.0), (0.0, 1.0)
+ROUGH, REST = (5e-3, 10.0), (0.0, 1.0)
 """How nearly cloth comes to rest: the error at least [m], and times the left-over force that are enough.
 
-Roughly, to see where it lies across the body, or for a finer mesh to go on; quietly, not yet known to be stable; and as
-is asked."""
+Roughly, to see where it lies across the body, or for a finer mesh to go on; and as is asked."""
 
 _TURNS = 5  # of coming to rest and being cleared
 _LONG = 0.5  # steps per 1/60 s on the way to rest: backward Euler takes the more motion out, the longer they are

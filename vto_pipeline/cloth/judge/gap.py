@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from vto_pipeline.model.arrays import FloatArray, IntArray
 
@@ -38,19 +38,50 @@ def _near_pairs(positions: FloatArray, rest: FloatArray, faces: IntArray, within
     corners = positions[faces]
     middle = corners.mean(axis=1)
     radius = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
-    pairs = cKDTree(middle).query_pairs(within + 2.0 * float(radius.max()), output_type="ndarray")
-    apart, at_rest = _distances(middle, pairs), _distances(rest[faces].mean(axis=1), pairs)
-    pairs = pairs[(apart < within + radius[pairs].sum(axis=1)) & (apart < _CLOSER * at_rest)]
+    axis = int(np.argmax(np.ptp(middle, axis=0)))  # the longest way is the best to sweep along
+    order = np.argsort(middle[:, axis], kind="stable")
+    laid = rest[faces[order]].mean(axis=1)
+    pairs = np.sort(order[_close(middle[order], radius[order], laid, faces[order], axis, within)], axis=1)
     one, two = pairs.T
     low, high = corners.min(axis=1) - within, corners.max(axis=1)
-    boxes = ((low[one] <= high[two]) & (low[two] <= high[one])).all(axis=1)
-    shared = (faces[one][:, :, None] == faces[two][:, None, :]).any(axis=(1, 2))
-    return np.asarray(pairs[boxes & ~shared])
+    return np.asarray(pairs[((low[one] <= high[two]) & (low[two] <= high[one])).all(axis=1)])
 
 
-def _distances(points: FloatArray, pairs: NDArray[np.int64]) -> FloatArray:
-    x, y, z = (points[pairs[:, 0]] - points[pairs[:, 1]]).T
-    return np.asarray(np.sqrt(x * x + y * y + z * z))
+@njit(cache=True)
+def _close(middle, radius, rest, faces, axis, within):  # type: ignore[no-untyped-def]
+    """Return pairs of faces by their circles, without neighbours in the sheet, shape (K, 2).
+
+    Args:
+        middle: Centres, sorted along the axis [m], shape (F, 3).
+        radius: About them [m], shape (F,).
+        rest: The centres at rest [m], shape (F, 3).
+        faces: Shape (F, 3).
+        axis: Along which to sweep.
+        within: How near faces are looked for [m].
+    """
+    pairs = np.empty((len(faces) + 16, 2), np.int64)
+    count, widest = 0, radius.max()
+    for i in range(len(faces)):
+        for j in range(i + 1, len(faces)):
+            if middle[j, axis] - middle[i, axis] > within + radius[i] + widest:
+                break
+            apart = at_rest = 0.0
+            for k in range(3):
+                apart += (middle[j, k] - middle[i, k]) ** 2
+                at_rest += (rest[j, k] - rest[i, k]) ** 2
+            if apart >= (within + radius[i] + radius[j]) ** 2 or apart >= _CLOSER**2 * at_rest:
+                continue
+            shared = False
+            for a in faces[i]:
+                for b in faces[j]:
+                    shared |= a == b
+            if shared:
+                continue
+            if count == len(pairs):
+                pairs = np.concatenate((pairs, np.empty_like(pairs)))
+            pairs[count, 0], pairs[count, 1] = i, j
+            count += 1
+    return pairs[:count]
 
 
 def _to_plane_within(p: FloatArray, triangle: FloatArray) -> FloatArray:
