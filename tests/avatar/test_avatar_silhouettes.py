@@ -241,7 +241,7 @@ def test_intervals_hold_bodies_of_another_model(another_model: tuple[np.ndarray,
             2,
             0.020,
             id="hip",
-            marks=pytest.mark.xfail(strict=True, reason="seats fuller and a centimetre lower than these bodies'"),
+            marks=pytest.mark.xfail(strict=True, reason="seats as full as surveyed, 2 cm lower than these bodies'"),
         ),
     ],
 )

@@ -12,11 +12,13 @@ from scipy.spatial import cKDTree
 from vto_pipeline.avatar.correspondence import closest_points
 from vto_pipeline.avatar.definitions import DEFINITIONS
 from vto_pipeline.bench import BENCHES
+from vto_pipeline.bench.body.coverage import told
 from vto_pipeline.bench.body.iso20685 import CLASSES, LIMITS_MM
-from vto_pipeline.bench.body.people import cloud_of, person
+from vto_pipeline.bench.body.people import as_standing, cloud_of, person
 from vto_pipeline.bench.body.silhouettes import photograph
 from vto_pipeline.bench.body.slices import slice_girth
 from vto_pipeline.errors import InputError
+from vto_pipeline.model.body import Measurements
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.report.body_plot import draw_body
 
@@ -46,6 +48,31 @@ def test_a_poor_scan_is_as_poor_as_it_says() -> None:
     assert_allclose(np.sqrt((away**2).mean()), 2e-3, rtol=0.05)
     bare = cKDTree(cloud.points[:5700]).query(body.vertices)[0]
     assert 0.03 < (bare > 0.025).mean() < 0.15, "a tenth of the surface has no points, less the holes' rims"
+
+
+def test_a_person_as_they_stand_is_the_same_surface_with_the_arms_put_aside() -> None:
+    body = person("male", 5)
+    kept = as_standing(body)
+    assert_allclose(kept.vertices, body.vertices, rtol=0, atol=1e-6)
+    cos, sin = np.cos(body.pose[0, 1]), np.sin(body.pose[0, 1])
+    facing = body.vertices @ np.array([[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]])
+    trunk = body.weights[:, [body.joint_names.index(name) for name in ("pelvis", "spine")]].sum(axis=1) > 0.999
+    away = (kept.bind_vertices - facing)[trunk]
+    assert np.ptp(away, axis=0).max() < 1e-3, "a trunk only turns to the front"
+
+
+def test_intervals_of_normal_errors_hold_95_percent() -> None:
+    """Errors drawn with the spread that is told: 95 % inside; told half as large: 67.3 %."""
+    rng, pairs = np.random.default_rng(7), []
+    for _ in range(400):
+        sigmas = dict.fromkeys(DEFINITIONS, 0.004)
+        spread = {name: 0.008 if what.kind == "height" else 0.004 for name, what in DEFINITIONS.items()}
+        off = {name: float(rng.normal(0.0, size)) for name, size in spread.items()}
+        pairs.append((Measurements({name: 1.0 + away for name, away in off.items()}, sigmas), dict.fromkeys(off, 1.0)))
+    row = told(pairs)
+    assert_allclose(row["girths_inside_share"], 0.95, rtol=0, atol=0.01)
+    assert_allclose(row["heights_inside_share"], 0.673, rtol=0, atol=0.03)
+    assert_allclose([row["calf_girth_rms_mm"], row["calf_girth_interval_mm"]], [4.0, 1.96 * 4.0], rtol=0.1)
 
 
 def test_the_picture_of_a_body_is_in_perspective() -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 from pydantic import Field
 
+from vto_pipeline.avatar.blur import level_sigmas, surface_sigmas
 from vto_pipeline.avatar.bust import toward_bust_points
 from vto_pipeline.avatar.clothed import undressed
 from vto_pipeline.avatar.correspondence import Pairs, Target, closest_points
@@ -115,7 +117,12 @@ def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | No
     if not stands.stands:
         check_build(measure(body), stands.lean)
     if not config.clothed:
-        sigmas = unseen_sigmas(space, _uncertainty(space, target, fit, config), target, posed, body, stands.stands)
+        parts = (
+            unseen_sigmas(space, _uncertainty(space, target, fit, config), target, posed, body, stands.stands),
+            level_sigmas(body),
+            surface_sigmas(space, target, body),
+        )
+        sigmas = {name: math.hypot(*(part[name] for part in parts)) for name in parts[0]}
     caveats += report(kept, space, body.vertices, job)
     job.measure(tangled_faces=bad)
     if bad:

@@ -37,14 +37,7 @@ _OPEN_SHARE = {"chest_girth": 0.038, "waist_girth": 0.028, "hip_girth": 0.026}
 """Spread of a girth where its breadth and depth are known exactly, as a share of it.
 
 Regressions in ANSUR II leave 0.023, 0.019 and 0.016. The rest is our assumption: a section's shape is less alike beyond
-that survey (a hip's girth is 1.03 to 1.09 times its ellipse's, a chest's 1.04 to 1.12).
-"""
-_OUTLINE_TO_CALIPER = {"waist_breadth": 1.02, "waist_depth": 1.02, "hip_breadth": 1.05, "hip_depth": 1.05}
-_OUTLINE_TO_CALIPER_SPREAD = 0.02
-"""A caliper's arms press into soft tissue, an outline does not.
-
-By ANSUR II a hip's girth is 1.09 times that of an ellipse of its breadth and depth, a waist's 1.06; plane sections of
-bodies have 1.03 to 1.05. The factors bring one to the other; our assumption.
+that survey (a hip's girth is 1.03 to 1.07 times its ellipse's, a chest's 1.04 to 1.12).
 """
 _POOR_M, _BETTER = 0.012, 0.7
 """Outlines this far apart (both views together) raise the question whether the pictures are swapped."""
@@ -121,9 +114,8 @@ def fit_silhouettes(
 
 
 def _evidence(sex: str, silhouettes: Silhouettes, config: SilhouettesConfig) -> Evidence:
-    people = population(sex).bridged(_OUTLINE_TO_CALIPER, _OUTLINE_TO_CALIPER_SPREAD)
     return Evidence(
-        people, Tape(shape_space(SEX_SHARE[sex]).base), silhouettes.stature, config.distance_m, config.height_m
+        population(sex), Tape(shape_space(SEX_SHARE[sex]).base), silhouettes.stature, config.distance_m, config.height_m
     )
 
 

@@ -26,6 +26,8 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 _STEP_M, _BEYOND = 0.002, 2.5
 """Between the heights that are looked at, and how many widths beyond the reach: what lies there is smoothed in."""
+_KNOWN_M, _KNOWN_ROUND_M = 0.001, 0.003
+"""How well a registered surface is known: a point of it, and its girth; as the bench's scans have it."""
 _STAY = ("neck_base", "head")
 _THIGH_OF_CROTCH = 0.95
 """Height of the fold of the seat as a share of the crotch's, as `population` has it."""
@@ -56,6 +58,11 @@ class Level:
     width: float
     prominence: float
     above: float = 0.0
+
+    @property
+    def of_girth(self) -> bool:
+        """Whether the extreme is one of the hull's girth."""
+        return self.extreme in ("narrowest", "widest")
 
 
 LEVELS = (
@@ -96,14 +103,43 @@ def find_levels(upright: FloatArray, body: Avatar) -> dict[str, float]:
     return found
 
 
+def level_spread(upright: FloatArray, body: Avatar) -> dict[str, float]:
+    """Return row -> how surely its level is known where the body shows it [m]; a limb's is the mean of both sides.
+
+    Half the stretch over which the profile stays at its extreme but for what the surface is not known by: a tape does
+    not tell such levels apart. Where the body shows none, there is no row.
+    """
+    floor, spread = float(upright[:, 1].min()), {}
+    for level in LEVELS:
+        widths = []
+        for row in _sides(body, level.row):
+            at, value = _profile(level, upright, body, row, floor)
+            peak = _peak(at, value, level)
+            if peak is not None:
+                smooth = gaussian_filter1d(value, level.width / _STEP_M, mode="nearest")
+                top = int(np.argmin(np.abs(at - peak)))
+                near = np.abs(at - at.mean()) <= level.reach
+                flat = near & (smooth > smooth[top] - (_KNOWN_ROUND_M if level.of_girth else _KNOWN_M))
+                low, high = top - np.argmin(flat[: top + 1][::-1]) + 1, top + np.argmin(flat[top:]) - 1
+                widths.append(0.5 * (1 + level.above) * float(at[high] - at[low]))
+        if widths:
+            spread[level.row] = float(np.mean(widths))
+    return spread
+
+
 def _found(level: Level, upright: FloatArray, body: Avatar, row: str, floor: float) -> float | None:
+    at, value = _profile(level, upright, body, row, floor)
+    peak = _peak(at, value, level)
+    return None if peak is None else floor + (1 + level.above) * (peak - floor)
+
+
+def _profile(level: Level, upright: FloatArray, body: Avatar, row: str, floor: float) -> tuple[FloatArray, FloatArray]:
+    """Return the heights about a row and what is largest at the level there."""
     links = _links(body, row)
     middle = floor + (float(upright[body.loops[row], 1].mean()) - floor) / (1 + level.above)
     span = level.reach + _BEYOND * level.width
     at = middle + np.arange(-span, span + _STEP_M / 2, _STEP_M)
-    value = np.array([_value(_cut(upright, links, y), level.extreme) for y in at])
-    peak = _peak(at, value, level)
-    return None if peak is None else floor + (1 + level.above) * (peak - floor)
+    return at, np.array([_value(_cut(upright, links, y), level.extreme) for y in at])
 
 
 def with_rows_at(space: ShapeSpace, parameters: FloatArray, upright: FloatArray, found: dict[str, float]) -> ShapeSpace:

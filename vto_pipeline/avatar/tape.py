@@ -85,10 +85,18 @@ class Tape:
         if what.kind == "mass":
             return DENSITY_SPREAD * self.read(what, vertices).value
         if what.kind in ("girth", "breadth", "depth"):
-            ends = [self._across(what, vertices, "left", shift).value for shift in (LANDMARK_M, -LANDMARK_M)]
-            return float(np.hypot(ends[0] - ends[1], RESOLUTION_M) / 2)
+            return float(np.hypot(self.by_level(what, vertices, LANDMARK_M), RESOLUTION_M / 2))
         # from the floor one end is uncertain, between landmarks both are
         return LANDMARK_M * (1.0 if what.kind == "height" else float(np.sqrt(2.0)))
+
+    def by_level(self, what: Definition, vertices: FloatArray, reach: float) -> float:
+        """Return how much a girth, breadth or depth changes as its level does by `reach` [m], up or down (rms)."""
+        changes = [
+            self._across(what, vertices, side, shift).value - self._across(what, vertices, side).value
+            for side in ("left", "right")
+            for shift in (reach, -reach)
+        ]
+        return float(np.sqrt(np.mean(np.square(changes))))
 
     def _across(self, what: Definition, vertices: FloatArray, side: str, shift: float = 0.0) -> Reading:
         points = self._section(what.place, vertices, side, shift)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from vto_pipeline.bench.bench import Row, Watch
 from vto_pipeline.bench.body.clothed import clothed_rows
+from vto_pipeline.bench.body.coverage import coverage_rows
 from vto_pipeline.bench.body.extremes import extreme_rows
 from vto_pipeline.bench.body.measurements import measurement_rows
 from vto_pipeline.bench.body.repeats import repeat_rows
@@ -15,5 +16,5 @@ from vto_pipeline.bench.body.silhouettes import silhouette_rows
 
 def rows(quick: bool, watch: Watch) -> Iterator[Row]:
     """Measure all of them."""
-    for part in (scan_rows, clothed_rows, repeat_rows, measurement_rows, silhouette_rows, extreme_rows):
+    for part in (scan_rows, coverage_rows, clothed_rows, repeat_rows, measurement_rows, silhouette_rows, extreme_rows):
         yield from part(quick, watch)

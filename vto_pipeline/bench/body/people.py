@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.population import population
 from vto_pipeline.avatar.pose import pose_avatar
+from vto_pipeline.avatar.registration import Fit, model
+from vto_pipeline.avatar.settle import settle
+from vto_pipeline.avatar.shape import shape_space
+from vto_pipeline.avatar.stance import stance
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Avatar, Measurements
@@ -47,6 +53,16 @@ def person(sex: str, seed: int) -> Avatar:
         pose[k] = rng.normal(0.0, _SPREAD_RAD.get(name.rpartition("_")[2], 0.0), 3)
     pose[0] = [0.0, rng.uniform(-np.pi, np.pi), 0.0]
     return pose_avatar(body, pose, np.array([rng.normal(0.0, 0.3), 0.0, rng.normal(0.0, 0.3)]))
+
+
+def as_standing(body: Avatar) -> Avatar:
+    """Return a person of ours in the bind pose that a scan of them gets: the posture their own, the arms put aside."""
+    space = shape_space(body.sex)
+    parameters = np.array([body.parameters[name] for name in space.names])
+    fit = Fit(parameters, body.pose, np.zeros(3), parameters)
+    # the space's own skeleton hangs a little lower than the body's, whose soles are on the floor
+    fit = replace(fit, translation=(body.vertices - model(space, fit)).mean(axis=0))
+    return settle(space, fit, stance(space, fit), body.vertices, body.vertices)[0]
 
 
 def cloud_of(

@@ -70,7 +70,7 @@ def silhouette_rows(quick: bool, watch: Watch) -> Iterator[Row]:
     """A body of another model, and random people of either sex, before a plain backdrop.
 
     The people have all that was drawn for them, bumps that no parameter makes, and stances of their own; yet they are
-    bodies of our own kind, in whose outlines breadths are what ANSUR II's calipers read.
+    bodies of our own kind, and drawn from the statistics that the fit has.
     """
     yield _row(watch, "another model's body", 1, lambda k: _foreign())
     for sex in ("female",) if quick else ("female", "male"):
