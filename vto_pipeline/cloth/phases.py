@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -152,11 +153,12 @@ class Phases:
         if self._config.substeps is None and stepper.rests_exactly:
             stepper.substeps = min(stepper.substeps, _LONG)
         trace: list[TraceRow] = []
+        began = time.perf_counter()
         for turn in range(_TURNS):
             error, times = passes[min(turn, len(passes) - 1)]
             enough = replace(limits, error=max(error, limits.error), residual=times * limits.residual)
+            spent = time.perf_counter() - began
             settling = settle(stepper, state, enough, watch)
-            spent = trace[-1].seconds if trace else 0.0
             trace += [replace(row, seconds=spent + row.seconds) for row in settling.trace]
             self._job.progress(0.9, "clearing the body")
             state, crossing = clear_of_body(stepper, settling.state, self._model.faces, body, self._config.clear_rounds)

@@ -9,10 +9,9 @@ from vto_pipeline.cloth.stepper import Stepper
 
 LOOK = 0.1  # s of cloth time between looks
 LONGEST = 1.0  # s: inertia holds nothing back in a step of that length that cloth still waits for
-_LONGER = 2.0  # times, the next step while the system is positive definite
+_LONGER = 4.0  # times, the next step while the system is positive definite
 _ASIDE = 10.0  # times the left-over force at its begin, at first: what is soft comes first, at the expense of the stiff
 _FALLS = 0.5  # times that after each look
-_PAUSE = 3  # looks with the usual stiffness after steps that went astray
 _SLIGHT = 0.1  # of the left-over force that is enough: less is no sign of going astray
 
 
@@ -22,7 +21,8 @@ class Polish:
     With inertia gone a step with the exact stiffness is one of Newton's method (pseudo-transient continuation; Kelley &
     Keyes 1998), which may also lead away, where contacts or wrinkles are other at its end than at its begin. So what is
     left of the force has to fall from look to look, if not from the first one on (a watchdog; Chamberlain et al. 1982);
-    a step that leaves more is not taken.
+    a step that leaves more is not taken, unless it is as short as usual: that is no guess, but cloth on its way. Forces
+    grow so where it falls out of a place it was not stable in, and stays at, all but still, with the usual stiffness.
 
     Args:
         stepper: The cloth among its colliders, prepared; its steps are changed.
@@ -34,7 +34,6 @@ class Polish:
         self._usual = stepper.substeps
         self._enough = enough
         self._most = np.inf
-        self._pause = 0
 
     @property
     def whole(self) -> bool:
@@ -42,14 +41,10 @@ class Polish:
         return self._stepper.definite and self._stepper.step >= LONGEST
 
     def goes_astray(self, residual: float) -> bool:
-        """Return whether the last step led away from rest; if so the next ones are shorter, or as usual for a while."""
-        if not self._stepper.definite or residual <= self._most:
+        """Return whether the last step was a long one, and led away from rest; if so the next ones are shorter."""
+        if not self._stepper.definite or residual <= self._most or self._stepper.substeps >= self._usual:
             return False
-        if self._stepper.substeps < self._usual:
-            self._shorten()
-        else:
-            self.end()
-            self._pause = _PAUSE
+        self._shorten()
         return True
 
     def choose(self, near: bool, residual: float) -> None:
@@ -60,17 +55,16 @@ class Polish:
             residual: Left-over force now.
         """
         stepper = self._stepper
-        if stepper.definite:
+        if stepper.definite and residual > self._most:
+            self._most = _ASIDE * residual
+        elif stepper.definite:
             self._most = max(_FALLS * self._most, _SLIGHT * self._enough)
             stepper.substeps = max(stepper.substeps / _LONGER, FRAME / LONGEST)
         elif stepper.substeps < self._usual:
             self._shorten()
-        elif near and self._pause == 0:
-            self._most = _ASIDE * max(residual, _SLIGHT * self._enough)
-            stepper.polish(True)
         else:
-            self._pause = max(self._pause - 1, 0)
-            stepper.polish(False)
+            self._most = _ASIDE * max(residual, _SLIGHT * self._enough)
+            stepper.polish(near)
 
     def _shorten(self) -> None:
         self._stepper.substeps = min(_LONGER * self._stepper.substeps, self._usual)

@@ -143,33 +143,37 @@ def _differ_block(x, data, places, held, step, forces, blocks, block):
 
     Moved all together they feel nothing: the last corner's column is what makes the rows' sums zero.
     """
+    count = data.vertices.shape[1]
+    moves, columns = np.empty(count, np.bool_), np.empty((count, 3, 3))
     for i in range(data.starts[block], data.starts[block + 1]):
         corners = data.vertices[i]
-        last = len(corners) - 1
-        for b in range(len(corners)):
-            if held[corners[b]] or _comes_before(corners, b):
+        last = count - 1
+        for b in range(count):
+            moves[b] = not held[corners[b]]
+            for a in range(b):  # another one again, in the place of one that is missing at a rim
+                moves[b] &= corners[a] != corners[b]
+            if not moves[b]:
                 last = -1
-        for b in range(len(corners)):
-            if b == last or held[corners[b]] or _comes_before(corners, b):
+        for b in range(count):
+            if b == last or not moves[b]:
                 continue
             for m in range(3):
                 here = x[corners[b], m]
-                for side in (-1.0, 1.0):
+                for side in (1.0, -1.0):
                     for a in corners:
-                        forces[a] = 0.0
+                        forces[a, 0] = forces[a, 1] = forces[a, 2] = 0.0
                     x[corners[b], m] = here + side * step
                     force_one(i, x, data, forces)
-                    for a in range(len(corners)):
-                        if not held[corners[a]] and not _comes_before(corners, a):
-                            for k in range(3):
-                                change = side * forces[corners[a], k] / (2.0 * step)
-                                blocks[places[i, a, b], k, m] -= change
-                                if last >= 0:
-                                    blocks[places[i, a, last], k, m] += change
+                    for a in range(count):
+                        for k in range(3):
+                            before = 0.0 if side > 0.0 else columns[a, k, m]
+                            columns[a, k, m] = before - side * forces[corners[a], k] / (2.0 * step)
                 x[corners[b], m] = here
-
-
-@njit(cache=True, error_model="numpy")
-def _comes_before(corners, a):
-    """Return whether corner a is another one again, in the place of one that is missing at a rim."""
-    return (corners[:a] == corners[a]).any()
+            for a in range(count):
+                if not moves[a]:
+                    continue
+                for k in range(3):
+                    for m in range(3):
+                        blocks[places[i, a, b], k, m] += columns[a, k, m]
+                        if last >= 0:
+                            blocks[places[i, a, last], k, m] -= columns[a, k, m]

@@ -14,24 +14,23 @@ from numpy.typing import NDArray
 from vto_pipeline.geometry.predicates import orient2d, orient3d
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.numerics import bvh, bvh_pairs
 
 
 def intersecting_faces(one: TriangleMesh, other: TriangleMesh) -> IntArray:
     """Return the pairs (face of one, face of other) that meet, sorted, shape (K, 2)."""
+    near = bvh_pairs.cross_pairs(_tree(one), _tree(other))
     vertices = np.vstack([one.vertices, other.vertices])
     faces = np.vstack([one.faces, other.faces + np.int32(len(one.vertices))])
-    side = np.repeat(np.array([0, 1], np.int8), [len(one.faces), len(other.faces)])
-    pairs = _meeting_pairs(vertices, faces, side)
-    return pairs - np.array([0, len(one.faces)], np.int32)
+    shift = np.array([0, len(one.faces)], np.int32)
+    return _meeting(vertices, faces, near + shift) - shift
 
 
 def self_intersections(mesh: TriangleMesh) -> IntArray:
     """Return the pairs of faces of one mesh that meet otherwise than in their shared vertices, sorted, shape (K, 2)."""
-    vertices, faces = (
-        mesh.vertices.copy(),
-        mesh.faces.copy(),
-    )  # writeable, so that one compiled kernel serves both callers
-    return _meeting_pairs(vertices, faces, np.full(len(faces), 2, np.int8))
+    near = np.sort(bvh_pairs.self_pairs(_tree(mesh)), axis=1)
+    vertices, faces = mesh.vertices.copy(), mesh.faces.copy()  # writeable: one compiled kernel serves both callers
+    return _meeting(vertices, faces, near)
 
 
 def meeting_vertices(pairs: IntArray, faces: IntArray, count: int) -> NDArray[np.bool_]:
@@ -41,39 +40,14 @@ def meeting_vertices(pairs: IntArray, faces: IntArray, count: int) -> NDArray[np
     return found
 
 
-def _meeting_pairs(vertices: FloatArray, faces: IntArray, side: NDArray[np.int8]) -> IntArray:
-    corners = vertices[faces]
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    axis = int(np.argmax(high.max(axis=0) - low.min(axis=0)))  # the longest way is the best to sweep along
-    order = np.argsort(low[:, axis], kind="stable")
-    candidates = _overlapping_boxes(low[order], high[order], side[order], axis)
-    pairs = np.sort(order[candidates], axis=1)
+def _tree(mesh: TriangleMesh) -> bvh.Bvh:
+    return bvh.build(mesh.vertices.copy(), mesh.faces.copy())
+
+
+def _meeting(vertices: FloatArray, faces: IntArray, pairs: IntArray) -> IntArray:
+    """Return those of the pairs that meet, sorted."""
     pairs = pairs[_triangles_meet(vertices, faces, pairs)]
-    return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].astype(np.int32)
-
-
-@njit(cache=True)
-def _overlapping_boxes(low, high, side, axis):  # type: ignore[no-untyped-def]
-    """Return the pairs of closed boxes that overlap, shape (K, 2); boxes come sorted by low[:, axis].
-
-    Boxes of side 2 pair with each other, of side 0 and 1 only across.
-    """
-    u, v = (axis + 1) % 3, (axis + 2) % 3
-    pairs = np.empty((len(low) + 16, 2), np.int64)
-    count = 0
-    for i in range(len(low)):
-        for j in range(i + 1, len(low)):
-            if low[j, axis] > high[i, axis]:
-                break
-            if side[i] == side[j] and side[i] != 2:
-                continue
-            if low[j, u] > high[i, u] or low[i, u] > high[j, u] or low[j, v] > high[i, v] or low[i, v] > high[j, v]:
-                continue
-            if count == len(pairs):
-                pairs = np.concatenate((pairs, np.empty_like(pairs)))
-            pairs[count, 0], pairs[count, 1] = i, j
-            count += 1
-    return pairs[:count]
+    return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
 
 
 @njit(cache=True, parallel=True)
