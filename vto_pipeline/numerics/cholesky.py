@@ -20,7 +20,9 @@ from vto_pipeline.numerics.product_tile import COLUMNS, subtract_six, subtract_t
 
 _SIDE_BY_SIDE = 4e6  # flops; with less, starting the threads costs more than they save
 _SHARED = 1e6  # products; with more, all threads share what pivots make of the rest of a front
-_STRIP = 24  # of those rows, that a thread takes at a time
+_TAKEN = 1e5  # entries passed on, likewise
+_STRIP = 24  # rows that a thread takes at a time
+_ABREAST = 8  # tiles that a thread divides by pivots at a time
 _BESIDE = 24  # tiles, side by side: their share of the pivots then stays in the cache
 _PIVOTS = 96  # at a time: what they make of a tile then stays in the cache
 
@@ -91,7 +93,7 @@ def _bin(b, plan, starts, blocks, weights, between, out, threaded):
             rest[i, i:] = 0.0
         _gather(s, plan, starts, blocks, weights, between, panel, rest)
         for c in children:
-            _take_over(c, plan, out.passed, panel, rest)
+            _take_over(c, plan, out.passed, panel, rest, threaded)
         out.good[s] = _eliminate(panel, threaded)
         if not out.good[s]:
             return
@@ -126,24 +128,48 @@ def _gather(s, plan, starts, blocks, weights, between, panel, rest):
 
 
 @njit(cache=True, error_model="numpy")
-def _take_over(c, plan, passed, panel, rest):
+def _take_over(c, plan, passed, panel, rest, threaded):
     """Add what child c passes on."""
     begin, end = plan.row_starts[c], plan.row_starts[c + 1]
-    tall, wide = 3 * (end - begin), len(panel)
-    given = passed[plan.passed_at[c] : plan.passed_at[c] + tall * tall].reshape(tall, tall)
+    count = end - begin
+    given = passed[plan.passed_at[c] : plan.passed_at[c] + 9 * count * count].reshape(3 * count, 3 * count)
     within = plan.within[begin:end]
-    run = np.full(end - begin, end - begin)  # where the rows that follow each other from here on end
-    for a in range(end - begin - 2, -1, -1):
+    run = np.full(count, count)  # where the rows that follow each other from here on end
+    for a in range(count - 2, -1, -1):
         run[a] = run[a + 1] if within[a + 1] == within[a] + 1 else a + 1
-    for a in range(end - begin):
+    if threaded and given.size >= _TAKEN:
+        _take_rows_parallel(given, within, run, panel, rest)
+    else:
+        _take_rows(given, within, run, panel, rest, 0, count)
+
+
+@njit(cache=True, error_model="numpy", parallel=True)
+def _take_rows_parallel(given, within, run, panel, rest):
+    strips = (len(within) + _STRIP - 1) // _STRIP
+    for k in prange(strips):
+        first = _STRIP * _in_turn(k, strips)
+        _take_rows(given, within, run, panel, rest, first, min(len(within), first + _STRIP))
+
+
+@njit(cache=True, error_model="numpy")
+def _take_rows(given, within, run, panel, rest, first, last):
+    """Add some of the rows that a child passes on, each to a row of its own."""
+    wide = len(panel)
+    for a in range(first, last):
         for i in range(3):
             row = 3 * within[a] + i
             target, shift = (panel[row], 0) if row < wide else (rest[row - wide], wide)
             b = a
-            while b < end - begin:
+            while b < len(within):
                 at = 3 * within[b] - shift
                 _add(given[3 * a + i, 3 * b : 3 * run[b]], target[at:])
                 b = run[b]
+
+
+@njit(cache=True, error_model="numpy")
+def _in_turn(k, strips):
+    """Return the strip of a triangle that is the k-th to be taken: long and short ones in turn, for like work."""
+    return k // 2 if k % 2 == 0 else strips - 1 - k // 2
 
 
 @njit(cache=True, error_model="numpy")
@@ -155,30 +181,68 @@ def _add(source, target):
 @njit(cache=True, error_model="numpy")
 def _eliminate(panel, threaded):
     """Factor the columns of a front, in place: row p becomes column p of the factor."""
-    wide = len(panel)
+    wide, total = panel.shape
     for first in range(0, wide, _PIVOTS):
         last = min(first + _PIVOTS, wide)
+        shared = threaded and (last - first) ** 2 * (total - last) >= _SHARED
+        alone = total - (total - last) // COLUMNS * COLUMNS if shared else total  # then come whole tiles, for all
         for begin in range(first, last, 3):
-            _subtract_three(panel[first:], begin - first, panel, begin)
-            for q in range(begin, begin + 3):
-                target = panel[q, q:]
-                for p in range(begin, q):
-                    factor = panel[p, q]
-                    for i in range(len(target)):
-                        target[i] -= factor * panel[p, q + i]
-                if not target[0] > 0.0:
-                    return False
-                inverse = 1.0 / sqrt(target[0])
-                for i in range(len(target)):
-                    target[i] *= inverse
+            _subtract_three(panel[first:], begin - first, panel, begin, alone)
+            if not _pivot_three(panel, begin):
+                return False
+            _divide_three(panel, begin, begin + 3, alone)
+        if shared:
+            _divide_parallel(panel, first, last, alone)
         _subtract_all(panel[first:last], panel, last, wide, 0, threaded)
     return True
 
 
+@njit(cache=True, error_model="numpy", parallel=True)
+def _divide_parallel(panel, first, last, begin):
+    """Factor some rows of a front from a column on, whole tiles, where those before are done."""
+    beside = COLUMNS * _ABREAST
+    strips = (panel.shape[1] - begin + beside - 1) // beside
+    pivots = panel[first:]
+    for strip in prange(strips):
+        low = begin + beside * strip
+        high = min(low + beside, panel.shape[1])
+        for i in range(first, last, 3):
+            for j in range(low, high, COLUMNS):
+                subtract_three(pivots, i, pivots, j, i - first, panel, i, j)
+            _divide_three(panel, i, low, high)
+
+
 @njit(cache=True, error_model="numpy")
-def _subtract_three(pivots, count, panel, i):
-    """Subtract what pivots make of three rows of their own front, i and those after it."""
-    j = panel.shape[1] - COLUMNS
+def _pivot_three(panel, i):
+    """Factor three rows of a front on the diagonal; return whether the pivots are positive."""
+    for q in range(i, i + 3):
+        for p in range(i, q):
+            for k in range(q, i + 3):
+                panel[q, k] -= panel[p, q] * panel[p, k]
+        if not panel[q, q] > 0.0:
+            return False
+        panel[q, q] = sqrt(panel[q, q])
+        for k in range(q + 1, i + 3):
+            panel[q, k] /= panel[q, q]
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def _divide_three(panel, i, begin, end):
+    """Divide some columns of three rows of a front by the rows' pivots."""
+    one, two, three = panel[i, begin:end], panel[i + 1, begin:end], panel[i + 2, begin:end]
+    first, second, third = 1.0 / panel[i, i], 1.0 / panel[i + 1, i + 1], 1.0 / panel[i + 2, i + 2]
+    p, q, r = panel[i, i + 1], panel[i, i + 2], panel[i + 1, i + 2]
+    for k in range(end - begin):
+        a = first * one[k]
+        b = second * (two[k] - p * a)
+        one[k], two[k], three[k] = a, b, third * (three[k] - q * a - r * b)
+
+
+@njit(cache=True, error_model="numpy")
+def _subtract_three(pivots, count, panel, i, end):
+    """Subtract what pivots make of three rows of their own front, from the diagonal to a column."""
+    j = end - COLUMNS
     while j > i - COLUMNS and j >= 0:
         subtract_three(pivots, i, pivots, j, count, panel, i, j)
         j -= COLUMNS
@@ -245,9 +309,7 @@ def _tiles(pivots, shift, width, begin):
 def _subtract_parallel(pivots, beside, rows, begin, end, shift):
     strips = (end - begin + _STRIP - 1) // _STRIP
     for k in prange(strips):
-        # long and short rows in turn, so that threads have like work
-        strip = k // 2 if k % 2 == 0 else strips - 1 - k // 2
-        first = begin + _STRIP * strip
+        first = begin + _STRIP * _in_turn(k, strips)
         _subtract(pivots, beside, rows, first, min(end, first + _STRIP), shift)
 
 
@@ -270,83 +332,3 @@ def _subtract(pivots, beside, rows, begin, end, shift):
                 else:
                     subtract_three(above, 0, beside[n], 0, count, rows, i, j)
             i += tall
-
-
-@njit(cache=True, error_model="numpy")
-def solve(plan, factor, right, x):
-    """Write the solution of A x = right, both of shape (N, 3)."""
-    y = np.empty(3 * len(plan.order))
-    for j in range(len(plan.order)):
-        for k in range(3):
-            y[3 * j + k] = right[plan.order[j], k]
-    tallest = 0
-    for s in range(len(plan.first) - 1):
-        tallest = max(tallest, 3 * (plan.first[s + 1] - plan.first[s] + plan.row_starts[s + 1] - plan.row_starts[s]))
-    room = np.empty(tallest)
-    for s in range(len(plan.first) - 1):
-        _forward(s, plan, factor, y, room)
-    for s in range(len(plan.first) - 2, -1, -1):
-        _backward(s, plan, factor, y, room)
-    for j in range(len(plan.order)):
-        for k in range(3):
-            x[plan.order[j], k] = y[3 * j + k]
-
-
-@njit(cache=True, error_model="numpy")
-def _forward(s, plan, factor, y, room):
-    at, wide = 3 * plan.first[s], 3 * (plan.first[s + 1] - plan.first[s])
-    begin, end = plan.row_starts[s], plan.row_starts[s + 1]
-    total = wide + 3 * (end - begin)
-    panel = factor.panels[plan.panels[s] : plan.panels[s + 1]].reshape(wide, total)
-    front = room[:total]
-    front[:wide] = y[at : at + wide]
-    front[wide:] = 0.0
-    for p in range(0, wide, 3):
-        one, two, three = panel[p, p:], panel[p + 1, p:], panel[p + 2, p:]
-        a = front[p] / one[0]
-        b = (front[p + 1] - a * one[1]) / two[1]
-        c = (front[p + 2] - a * one[2] - b * two[2]) / three[2]
-        front[p], front[p + 1], front[p + 2] = a, b, c
-        _subtract_three_from(a, one[3:], b, two[3:], c, three[3:], front[p + 3 :])
-    y[at : at + wide] = front[:wide]
-    for n in range(begin, end):
-        for k in range(3):
-            y[3 * plan.rows[n] + k] += front[wide + 3 * (n - begin) + k]
-
-
-@njit(cache=True, error_model="numpy")
-def _backward(s, plan, factor, y, room):
-    at, wide = 3 * plan.first[s], 3 * (plan.first[s + 1] - plan.first[s])
-    begin, end = plan.row_starts[s], plan.row_starts[s + 1]
-    total = wide + 3 * (end - begin)
-    panel = factor.panels[plan.panels[s] : plan.panels[s + 1]].reshape(wide, total)
-    front = room[:total]
-    front[:wide] = y[at : at + wide]
-    for n in range(begin, end):
-        for k in range(3):
-            front[wide + 3 * (n - begin) + k] = y[3 * plan.rows[n] + k]
-    for p in range(wide - 3, -1, -3):
-        one, two, three = panel[p, p:], panel[p + 1, p:], panel[p + 2, p:]
-        a, b, c = _products(one[3:], two[3:], three[3:], front[p + 3 :])
-        c = (front[p + 2] - c) / three[2]
-        b = (front[p + 1] - b - c * two[2]) / two[1]
-        a = (front[p] - a - b * one[1] - c * one[2]) / one[0]
-        front[p], front[p + 1], front[p + 2] = a, b, c
-    y[at : at + wide] = front[:wide]
-
-
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
-def _subtract_three_from(a, one, b, two, c, three, target):
-    for i in range(len(target)):
-        target[i] -= a * one[i] + b * two[i] + c * three[i]
-
-
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
-def _products(one, two, three, other):
-    """Return the inner products of three rows with another one, summed in whatever order is fast: always the same."""
-    a = b = c = 0.0
-    for i in range(len(other)):
-        a += one[i] * other[i]
-        b += two[i] * other[i]
-        c += three[i] * other[i]
-    return a, b, c

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.numerics.block_matrix import BlockMatrix
-from vto_pipeline.numerics.cholesky import Factor, factor_room, factorise, solve
+from vto_pipeline.numerics.cholesky import Factor, factor_room, factorise
 from vto_pipeline.numerics.elimination import Elimination, eliminate
 from vto_pipeline.numerics.elimination_tree import dissection, with_links
 from vto_pipeline.numerics.linear import pcg
 from vto_pipeline.numerics.links import link
 from vto_pipeline.numerics.multigrid import Hierarchy, hierarchy, update
+from vto_pipeline.numerics.substitution import solve
 
 _ROUGH = 30  # cycles, at most
 _MANY = 200  # where the solution has to be good and elimination is out of the question
