@@ -107,6 +107,8 @@ def test_what_leaves_more_force_is_tried_in_shorter_steps_until_they_are_as_usua
     assert stepper.step == pytest.approx(1 / 30)  # it is on its way: no longer steps yet
     assert not polish.goes_astray(0.2)
     polish.choose(True, 0.2)
+    assert stepper.step == pytest.approx(1 / 30)  # nor before forces are all but in balance
+    polish.choose(True, 5e-3)
     assert stepper.step == pytest.approx(4 / 30)
 
 

@@ -48,7 +48,7 @@ class Polish:
         return True
 
     def choose(self, near: bool, residual: float) -> None:
-        """Choose the next steps: longer with the exact stiffness while that will do, else shorter, down to the usual.
+        """Choose the next steps: with the exact stiffness, longer while that will do, else shorter, down to the usual.
 
         Args:
             near: Whether it is worth trying.
@@ -59,7 +59,8 @@ class Polish:
             self._most = _ASIDE * residual
         elif stepper.definite:
             self._most = max(_FALLS * self._most, _SLIGHT * self._enough)
-            stepper.substeps = max(stepper.substeps / _LONGER, FRAME / LONGEST)
+            if residual < self._enough:
+                stepper.substeps = max(stepper.substeps / _LONGER, FRAME / LONGEST)
         elif stepper.substeps < self._usual:
             self._shorten()
         else:
