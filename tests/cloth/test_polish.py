@@ -98,6 +98,9 @@ def test_what_leaves_more_force_is_tried_in_shorter_steps_until_they_are_as_usua
     stepper.definite = True
     assert not polish.goes_astray(0.04)  # what is soft comes first
     polish.choose(True, 0.04)
+    assert stepper.step == pytest.approx(1 / 30)  # no longer steps before forces are all but in balance
+    polish.choose(True, 5e-3)
+    assert stepper.step == pytest.approx(4 / 30)
     assert polish.goes_astray(0.04)  # but it has to fall
     assert stepper.exact
     assert stepper.step == pytest.approx(1 / 30)
@@ -105,9 +108,7 @@ def test_what_leaves_more_force_is_tried_in_shorter_steps_until_they_are_as_usua
     polish.choose(True, 0.4)
     assert stepper.exact
     assert stepper.step == pytest.approx(1 / 30)  # it is on its way: no longer steps yet
-    assert not polish.goes_astray(0.2)
-    polish.choose(True, 0.2)
-    assert stepper.step == pytest.approx(1 / 30)  # nor before forces are all but in balance
+    assert not polish.goes_astray(5e-3)
     polish.choose(True, 5e-3)
     assert stepper.step == pytest.approx(4 / 30)
 
