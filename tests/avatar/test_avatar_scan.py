@@ -313,3 +313,16 @@ def test_normals_of_a_drawn_person_point_out() -> None:
     normals = oriented_normals(PointCloud(points), 20, Job())
     against = (normals * face_normals(body.mesh)[face]).sum(axis=1) < 0
     assert against[near].mean() < 0.02
+
+
+@pytest.mark.slow
+def test_a_leg_that_is_inside_out_is_told() -> None:
+    """Nothing of the body is drawn to a surface that faces the other way: its knee came out 7 cm too large."""
+    body = true_body()
+    names = [f"left_{joint}" for joint in ("hip", "knee", "ankle")]
+    own = np.isin(body.weights.argmax(axis=1), [body.joint_names.index(name) for name in names])
+    faces = body.faces.copy()
+    over = own[faces].all(axis=1)
+    faces[over] = faces[over][:, ::-1]
+    with pytest.raises(AvatarError, match="left leg is inside out"):
+        fit_scan(TriangleMesh(body.vertices, faces), QUICK)

@@ -278,7 +278,8 @@ def test_exact_outlines_do_not_determine_these_hips() -> None:
     wrong = []
     for name in OTHERS:
         mesh = other(name)
-        (across, along), girth = np.ptp(seat(mesh)[0], axis=0), seat(mesh)[1]
+        points, girth = seat(mesh)
+        across, along = np.ptp(points, axis=0)
         known = {"stature": float(np.ptp(mesh.vertices[:, 1])), "hip_breadth": float(across), "hip_depth": float(along)}
         people = population(name.split("_")[1]).given(known, {})
         wrong.append(people.mean[people.names.index("hip_girth")] - girth)
