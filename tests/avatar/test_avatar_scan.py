@@ -9,6 +9,7 @@ from body_judges import crossing, distances, independent_girth
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
+from vto_pipeline.avatar.correspondence import closest_points
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.from_scan import ScanConfig, fit_scan
 from vto_pipeline.avatar.levels import find_levels, with_rows_at
@@ -24,9 +25,11 @@ from vto_pipeline.avatar.upright import in_metres, turns_upright, without_floor
 from vto_pipeline.bench.body.people import cloud_of, person
 from vto_pipeline.errors import AvatarError
 from vto_pipeline.geometry.decimate import decimate
+from vto_pipeline.geometry.topology import face_normals
 from vto_pipeline.model.body import Avatar, Measurements
 from vto_pipeline.model.job import Job
-from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.mesh import PointCloud, TriangleMesh
+from vto_pipeline.scan.normals import oriented_normals
 from vto_pipeline.scan.surface import SurfaceConfig, reconstruct_cloud
 
 BODIES = Path(__file__).parents[3] / "shared" / "data" / "bodies"
@@ -299,3 +302,27 @@ def test_a_quarter_of_the_faces_will_do() -> None:
     coarse = measure(fit_scan(decimate(whole, len(whole.faces) // 4, aggressiveness=5.0))).values
     for row in (*TRUNK, "neck", "upper_arm", "forearm", "wrist", "thigh"):
         assert_allclose(coarse[f"{row}_girth"], plain[f"{row}_girth"], rtol=0, atol=1e-3, err_msg=row)
+
+
+def test_normals_of_a_drawn_person_point_out() -> None:
+    """Of one whose cloud is a fifth inside out when signs are spread along a tree."""
+    body = person("female", 168)
+    points = cloud_of(body, 168).points
+    face, _, away = closest_points(points, body.vertices, body.faces)
+    near = away < 0.006  # three times the noise; the rest are outliers
+    normals = oriented_normals(PointCloud(points), 20, Job())
+    against = (normals * face_normals(body.mesh)[face]).sum(axis=1) < 0
+    assert against[near].mean() < 0.02
+
+
+@pytest.mark.slow
+def test_a_leg_that_is_inside_out_is_told() -> None:
+    """Nothing of the body is drawn to a surface that faces the other way: its knee came out 7 cm too large."""
+    body = true_body()
+    names = [f"left_{joint}" for joint in ("hip", "knee", "ankle")]
+    own = np.isin(body.weights.argmax(axis=1), [body.joint_names.index(name) for name in names])
+    faces = body.faces.copy()
+    over = own[faces].all(axis=1)
+    faces[over] = faces[over][:, ::-1]
+    with pytest.raises(AvatarError, match="left leg is inside out"):
+        fit_scan(TriangleMesh(body.vertices, faces), QUICK)

@@ -15,6 +15,7 @@ from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.from_silhouettes import SilhouettesConfig, fit_silhouettes
 from vto_pipeline.avatar.measure import measure
 from vto_pipeline.avatar.outline import Camera, ImageOutline, model_outline
+from vto_pipeline.avatar.population import population
 from vto_pipeline.avatar.pose import joint_transforms
 from vto_pipeline.avatar.registration import Fit
 from vto_pipeline.avatar.shape import shape_space
@@ -191,18 +192,34 @@ def section(mesh: trimesh.Trimesh, height: float) -> tuple[np.ndarray, float]:
     return points, float(ConvexHull(points).area)
 
 
+def among(mesh: trimesh.Trimesh, low: float, high: float) -> list[tuple[np.ndarray, float]]:
+    """Sections between two heights, which are shares of the stature."""
+    tall = float(np.ptp(mesh.vertices[:, 1]))
+    return [section(mesh, y) for y in np.arange(low * tall, high * tall, 0.004)]
+
+
+def seat(mesh: trimesh.Trimesh) -> tuple[np.ndarray, float]:
+    """The section at the most rearward seat."""
+    return min(among(mesh, 0.51, 0.56), key=lambda cut: cut[0][:, 1].min())
+
+
 def sliced(mesh: trimesh.Trimesh) -> dict[str, float]:
     """Girths by trimesh at the foremost bust, the narrowest waist, the rearmost seat [m]."""
-    tall = float(np.ptp(mesh.vertices[:, 1]))
-
-    def among(low: float, high: float) -> list[tuple[np.ndarray, float]]:
-        return [section(mesh, y) for y in np.arange(low * tall, high * tall, 0.004)]
-
     return {
-        "chest_girth": max(among(0.68, 0.77), key=lambda cut: cut[0][:, 1].max())[1],
-        "waist_girth": min(girth for _, girth in among(0.58, 0.68)),
-        "hip_girth": min(among(0.51, 0.56), key=lambda cut: cut[0][:, 1].min())[1],
+        "chest_girth": max(among(mesh, 0.68, 0.77), key=lambda cut: cut[0][:, 1].max())[1],
+        "waist_girth": min(girth for _, girth in among(mesh, 0.58, 0.68)),
+        "hip_girth": seat(mesh)[1],
     }
+
+
+OTHERS = ("mh_female_averageweight", "mh_female_maxweight", "mh_male_averageweight")
+
+
+def other(name: str) -> trimesh.Trimesh:
+    """A body of another model, standing on y = 0 about the origin."""
+    mesh = trimesh.load(BODIES / f"{name}.ply", process=False)
+    mesh.vertices -= [0.0, mesh.vertices[:, 1].min(), np.median(mesh.vertices[:, 2])]
+    return mesh
 
 
 @pytest.fixture(scope="module")
@@ -212,9 +229,8 @@ def another_model() -> tuple[np.ndarray, list[bool]]:
     Rendered through a lens that is not aimed at the picture's middle.
     """
     wrong, held = [], []
-    for name in ("mh_female_averageweight", "mh_female_maxweight", "mh_male_averageweight"):
-        mesh = trimesh.load(BODIES / f"{name}.ply", process=False)
-        mesh.vertices -= [0.0, mesh.vertices[:, 1].min(), np.median(mesh.vertices[:, 2])]
+    for name in OTHERS:
+        mesh = other(name)
         body = TriangleMesh(mesh.vertices, mesh.faces)
         job, names = Job(), Silhouettes(Path("front.png"), Path("side.png"), float(np.ptp(mesh.vertices[:, 1])))
         front, side = (shot(body, yaw, 2.5, 1) for yaw in (0.0, np.pi / 2))
@@ -241,7 +257,7 @@ def test_intervals_hold_bodies_of_another_model(another_model: tuple[np.ndarray,
             2,
             0.020,
             id="hip",
-            marks=pytest.mark.xfail(strict=True, reason="seats as full as surveyed, 2 cm lower than these bodies'"),
+            marks=pytest.mark.xfail(strict=True, reason="exact outlines leave as much open: the test below"),
         ),
     ],
 )
@@ -250,6 +266,25 @@ def test_intervals_hold_bodies_of_another_model(another_model: tuple[np.ndarray,
 @pytest.mark.skipif(not BODIES.exists(), reason="shared data absent")
 def test_girths_of_bodies_of_another_model(another_model: tuple[np.ndarray, list[bool]], k: int, bar: float) -> None:
     assert np.abs(another_model[0][:, k]).mean() < bar
+
+
+@pytest.mark.real_data
+@pytest.mark.skipif(not BODIES.exists(), reason="shared data absent")
+def test_exact_outlines_do_not_determine_these_hips() -> None:
+    """Why that bar is missed: breadth and depth exact, at the exact level, and the girth the survey expects of them.
+
+    Of girths that are 1.065 and 1.048 (women and men, spread 0.02) times their ellipses', these are 1.03 to 1.05.
+    """
+    wrong = []
+    for name in OTHERS:
+        mesh = other(name)
+        points, girth = seat(mesh)
+        across, along = np.ptp(points, axis=0)
+        known = {"stature": float(np.ptp(mesh.vertices[:, 1])), "hip_breadth": float(across), "hip_depth": float(along)}
+        people = population(name.split("_")[1]).given(known, {})
+        wrong.append(people.mean[people.names.index("hip_girth")] - girth)
+    assert 0.020 < np.abs(wrong).mean() < 0.026
+    assert wrong[0] > 0.03, "of the slimmer woman more than of all"
 
 
 @pytest.mark.slow

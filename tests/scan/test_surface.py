@@ -8,6 +8,7 @@ from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.topology import boundary_loops, face_normals
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
+from vto_pipeline.scan.normals import oriented_normals
 from vto_pipeline.scan.surface import SurfaceConfig, reconstruct_cloud
 
 
@@ -92,3 +93,15 @@ def test_plane_is_refused():
     flat = np.column_stack([random.uniform(0, 0.3, (5000, 2)), np.zeros(5000)])
     with pytest.raises(InputError, match="one plane"):
         reconstruct_cloud(PointCloud(flat), SurfaceConfig(), Job())
+
+
+@pytest.mark.parametrize("gap", [1e-3, 4e-3])
+def test_normals_do_not_turn_over_where_two_surfaces_nearly_touch(gap: float) -> None:
+    """Two balls side by side: neighbours across the gap have opposite normals, and both point out."""
+    random = np.random.default_rng(5)
+    true = random.normal(size=(6000, 3))
+    true /= np.linalg.norm(true, axis=1, keepdims=True)
+    side = np.where(np.arange(6000) < 3000, -1.0, 1.0)[:, None] * [0.1 + gap / 2, 0.0, 0.0]
+    found = oriented_normals(PointCloud(0.1 * true + side), 20, Job())
+    told = np.abs(side[:, 0] + 0.1 * true[:, 0]) > 0.01  # two spacings from the gap, which is less than one wide
+    assert ((found * true).sum(axis=1) > 0)[told].all()

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vto_pipeline.avatar.correspondence import closest_points
 from vto_pipeline.avatar.population import population
 from vto_pipeline.avatar.shape import ShapeSpace
 from vto_pipeline.errors import AvatarError
 from vto_pipeline.geometry.sampling import sample_surface
+from vto_pipeline.geometry.topology import face_area_vectors
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Measurements
 from vto_pipeline.model.job import Job
@@ -20,6 +22,8 @@ CORE = 0.3
 """A vertex belongs to trunk and limbs when it belongs less than this to head, hands and feet."""
 _TRUNK = 0.8
 _MIN_TRUNK, _MIN_LIMB = 0.3, 0.5
+_STRAY = 0.25
+"""Of a limb's surface: so much that lies elsewhere and faces inwards is that limb, inside out; some of it lies near."""
 _POINTS = 5000
 _BUILD = ("shoulder_height", "back_shoulder_width", "outer_arm_length", "hip_height", "inside_leg", "knee_height")
 _BUILD_M, _ODD = 0.02, 4.0
@@ -30,17 +34,30 @@ def check(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray, max_mean_
     """Refuse what is no body.
 
     Raises:
-        AvatarError: the scan lies too far from any body, or shows too little of the trunk.
+        AvatarError: the scan lies too far from any body, or shows too little of the trunk; or a limb is inside out.
     """
-    points, _, _ = sample_surface(scan, _POINTS, 0)
-    mean = float(closest_points(points, vertices, space.base.faces)[2].mean()) * 1e3
+    points, normals, _ = sample_surface(scan, _POINTS, 0)
+    face, _, distance = closest_points(points, vertices, space.base.faces)
+    mean = 1e3 * float(distance.mean())
     share = _trunk_covered(scan, space, vertices)
     if mean > max_mean_mm or share < _MIN_TRUNK:
         raise AvatarError(
             f"this is not a body, or too little of one: mean distance {mean:.1f} mm (at most {max_mean_mm}), "
             f"{share:.0%} of the trunk found (at least {_MIN_TRUNK:.0%})",
-            hint="the scan must show the trunk from all sides, in metres, +Y up",
+            hint="the scan must show the trunk from all sides, in metres, +Y up, its normals outwards",
         )
+    body = TriangleMesh(vertices, space.base.faces)
+    each = _POINTS / np.linalg.norm(face_area_vectors(scan), axis=1).sum()  # points for an area
+    for limb, own in _limbs(space).items():
+        whole: NDArray[np.bool_] = np.all(own[body.faces], axis=1)
+        stray = whole[face] & (distance > EXPLAINED_M)
+        expected = each * np.linalg.norm(face_area_vectors(body)[whole], axis=1).sum()
+        # what encloses a volume faces away from its middle
+        outward = ((points[stray] - points[stray].mean(axis=0)) * normals[stray]).sum() if stray.any() else 0.0
+        if stray.sum() > _STRAY * expected and outward < 0:
+            raise AvatarError(
+                f"the surface of the {limb} is inside out", hint="turn its faces over, so that normals point outwards"
+            )
 
 
 def check_build(read: Measurements, lean: float) -> None:
@@ -108,14 +125,21 @@ def ends(space: ShapeSpace) -> FloatArray:
 
 def _limbs_covered(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray) -> dict[str, float]:
     """Return arm or leg -> the share of it that the scan shows, without hands and feet."""
+    return {
+        limb: float((closest_points(vertices[own], scan.vertices, scan.faces)[2] < EXPLAINED_M).mean())
+        for limb, own in _limbs(space).items()
+    }
+
+
+def _limbs(space: ShapeSpace) -> dict[str, NDArray[np.bool_]]:
+    """Return arm or leg -> which vertices are its own, without hand or foot, shape (V,)."""
     names = space.base.joint_names
-    covered = {}
-    for side in ("left", "right"):
-        for limb, joints in {"arm": ("shoulder", "elbow"), "leg": ("hip", "knee")}.items():
-            own = space.base.weights[:, [names.index(f"{side}_{joint}") for joint in joints]].sum(axis=1) > _TRUNK
-            seen = closest_points(vertices[own], scan.vertices, scan.faces)[2]
-            covered[f"{side} {limb}"] = float((seen < EXPLAINED_M).mean())
-    return covered
+    return {
+        f"{side} {limb}": space.base.weights[:, [names.index(f"{side}_{joint}") for joint in joints]].sum(axis=1)
+        > _TRUNK
+        for side in ("left", "right")
+        for limb, joints in {"arm": ("shoulder", "elbow"), "leg": ("hip", "knee")}.items()
+    }
 
 
 def _trunk_covered(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray) -> float:
