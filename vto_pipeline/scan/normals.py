@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags
 from scipy.sparse.linalg import cg
 from scipy.spatial import cKDTree
@@ -11,6 +12,9 @@ from vto_pipeline.errors import ScanError
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
+
+_VOTERS, _ASKED = 50_000, 8
+"""Points of a larger cloud that vote, and how many of those near it each of the others follows."""
 
 _CLOSE, _STEPS = 1e-4, 20_000
 """Relative residual of the votes' solution, of which only signs are used, and the most steps it may take."""
@@ -41,7 +45,17 @@ def oriented_normals(cloud: PointCloud, neighbours: int, job: Job) -> FloatArray
     outwards = cloud.points - np.median(cloud.points, axis=0)
     outwards[:, 1] = 0.0
     agree = (normals * outwards).sum(1)
-    normals *= np.where(_voted(cloud.points, normals, agree, neighbours) < 0.0, -1.0, 1.0)[:, None]
+    voters = np.arange(len(normals))
+    if len(voters) > _VOTERS:
+        voters = np.sort(np.random.default_rng(job.seed).choice(voters, _VOTERS, replace=False))
+    votes = _voted(cloud.points[voters], normals[voters], agree[voters], neighbours)
+    normals[voters] *= np.where(votes < 0.0, -1.0, 1.0)[:, None]
+    if len(voters) < len(normals):
+        column = cKDTree(cloud.points[voters]).query(cloud.points, k=_ASKED)[1]
+        row = np.repeat(np.arange(len(normals)), _ASKED)
+        told = _alike(cloud.points, normals, row, voters[column.ravel()]).reshape(-1, _ASKED).sum(axis=1)
+        told[voters] = 1.0
+        normals *= np.where(told < 0.0, -1.0, 1.0)[:, None]
     agree = (normals * outwards).sum(1)
     share = float(agree[agree > 0].sum() / max(np.abs(agree).sum(), 1e-12))
     job.measure(normals_outward_share=round(share, 3))
@@ -54,8 +68,7 @@ def _voted(points: FloatArray, normals: FloatArray, agree: FloatArray, neighbour
     """Return a number whose sign says how to turn each normal, shape (N,).
 
     It minimises the sum of |w| (x - sgn(w) y)^2 over pairs of neighbours: the smallest eigenvectors of a signed graph's
-    Laplacian (Kunegis et al. 2010), of which the right side picks those that point outwards. A pair counts as far as
-    its normals are alike or opposite and both points lie in each other's plane: what lies across a gap does not.
+    Laplacian (Kunegis et al. 2010), of which the right side picks those that point outwards.
 
     Args:
         points: [m], shape (N, 3).
@@ -67,12 +80,7 @@ def _voted(points: FloatArray, normals: FloatArray, agree: FloatArray, neighbour
     neighbours = min(neighbours, count - 1)
     near = cKDTree(points).query(points, k=neighbours + 1)[1]
     row, column = np.repeat(near[:, 0], neighbours), near[:, 1:].ravel()
-    step = points[column] - points[row]
-    step /= np.linalg.norm(step, axis=1, keepdims=True)
-    weight = (normals[row] * normals[column]).sum(1)
-    for end in (row, column):
-        weight *= 1.0 - np.abs((normals[end] * step).sum(1))
-    pairs = csr_matrix((weight, (row, column)), (count, count))
+    pairs = csr_matrix((_alike(points, normals, row, column), (row, column)), (count, count))
     pairs = pairs + pairs.T
     root = np.sqrt(np.asarray(abs(pairs).sum(axis=1)).ravel())
     scale = diags(1.0 / np.maximum(root, 1e-9))
@@ -84,3 +92,16 @@ def _voted(points: FloatArray, normals: FloatArray, agree: FloatArray, neighbour
         raise ScanError("inside and outside of the cloud cannot be told", hint="give the points normals")
     signs: FloatArray = solved
     return signs
+
+
+def _alike(points: FloatArray, normals: FloatArray, row: NDArray[np.int64], column: NDArray[np.int64]) -> FloatArray:
+    """Return how far the normals of pairs of points are alike (1) or opposite (-1), shape (P,).
+
+    Less, as far as the points do not lie in each other's plane: what lies across a gap does not count.
+    """
+    step = points[column] - points[row]
+    step /= np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-12)  # one point may be there twice
+    weight: FloatArray = (normals[row] * normals[column]).sum(1)
+    for end in (row, column):
+        weight *= 1.0 - np.abs((normals[end] * step).sum(1))
+    return weight
