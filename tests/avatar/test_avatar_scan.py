@@ -1,5 +1,6 @@
 """Registration: forms and bodies whose truth is known, and things that are no body."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,9 @@ from vto_pipeline.avatar.stance import ARM, stance
 from vto_pipeline.avatar.template import beyond_armscye, membership
 from vto_pipeline.avatar.upright import in_metres, turns_upright, without_floor
 from vto_pipeline.bench.body.people import cloud_of, person
+from vto_pipeline.bench.samples.body import body_distance
+from vto_pipeline.bench.samples.customer import CELL, SHAPE
+from vto_pipeline.bench.samples.surface_nets import zero_surface
 from vto_pipeline.errors import AvatarError
 from vto_pipeline.geometry.decimate import decimate
 from vto_pipeline.geometry.topology import face_normals
@@ -253,6 +257,23 @@ def test_own_bodies_are_found_again(sex: str, seed: int) -> None:
         for row in TRUNK
     }
     assert max(map(abs, wrong.values())) < 3e-3, wrong
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("stature", "wide"), [(1.64, 1.0), (1.60, 1.12), (1.76, 0.95)])
+def test_joined_thighs(stature: float, wide: float) -> None:
+    """Implicit solids whose thighs are one down to 38 % of the stature, where ours part at 48 %."""
+    shape = replace(SHAPE, stature=stature, widths=tuple(wide * np.array(SHAPE.widths)))
+    low, high = np.array([-0.85, -0.04, -0.27]), np.array([0.85, stature + 0.04, 0.27])
+    solid, job = zero_surface(lambda points: body_distance(shape, points), low, high, CELL), Job()
+    fitted = fit_scan(TriangleMesh(solid.vertices, solid.faces), None, job)
+    x, y, _ = np.abs(solid.vertices.T)
+    core = (y > 0.10 * stature) & (y < 0.80 * stature) & (x < 0.27)  # feet, head and hands are not ours
+    away = distances(solid.vertices[core], fitted.vertices, fitted.faces)
+    assert away.mean() < 1.5e-3
+    assert np.quantile(away, 0.95) < 4e-3
+    assert job.metrics["tangled_faces"] == 0
+    assert not crossing(fitted.vertices, fitted.faces)
 
 
 @pytest.mark.slow

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 
 from vto_pipeline.avatar.measure import measure
 from vto_pipeline.avatar.regions import trunk
+from vto_pipeline.avatar.shape import shape_space
 from vto_pipeline.avatar.template import template
 from vto_pipeline.errors import InputError
 
@@ -42,6 +43,17 @@ def test_is_close_to_the_mean_of_ansur(sex: float) -> None:
     got = measure(template(sex)).values
     names = ("stature", "mass", "chest_girth", "navel_girth", "hip_girth", "inside_leg")
     assert_allclose([got[n] for n in names], ANSUR[sex], rtol=0.08, atol=0)  # hand-set sections: within 8 %
+
+
+@pytest.mark.parametrize("sex", [0.0, 1.0])
+@pytest.mark.parametrize("raised", [-0.12, -0.09, 0.06])
+def test_a_low_crotch_folds_no_thighs(sex: float, raised: float) -> None:
+    """Where a scan joins the thighs, the crotch comes to lie a hand's breadth lower than on others [m]."""
+    space = shape_space(sex)
+    parameters = np.where(np.array(space.names) == "crotch", raised, 0.0)
+    vertices, at = space.vertices(parameters), space.base.landmarks["crotch_point"]
+    assert_allclose(vertices[at, 1] - space.base.bind_vertices[at, 1], raised, rtol=0.1, atol=0)
+    assert not crossing(vertices, space.base.faces)
 
 
 def test_weights_and_skeleton() -> None:

@@ -227,8 +227,10 @@ def _add_legs(  # type: ignore[no-untyped-def]
         # the gap between the thighs stays: they grow outwards
         outwards = radius * ring if name in ("midthigh", "thigh") else 0.0
         add(f"{name}_girth", 0.09, dx=((x - center) * ring + outwards) * apart, dz=(z - depth) * ring)
+    # what lies below makes room down to the knee: within a hand's breadth the thighs would fold over
     low = level["crotch"] - 0.02
-    add("crotch", 0.020, dy=_bell(x, 0.0, 0.05) * _bell(y, low, 0.06))
+    close = _ramp(y, level["knee"], low) * (1 - _ramp(y, low, low + 0.12))
+    add("crotch", 0.020, dy=_bell(x, 0.0, 0.05) * close)
     add("stance", 0.02, dx=(1 - _ramp(y, level["ankle"], level["hip"])) * leg)
     foot = _ramp(-y, -level["ankle"], -0.4 * level["ankle"])
     add("foot_length", 0.05, dz=(z + 0.03) * foot)
