@@ -215,7 +215,7 @@ def _add_trunk(  # type: ignore[no-untyped-def]
         add(f"{name}_girth", 0.08, dx=carried(x * ring, 0.0), dz=carried((z + 0.01) * ring, 0.0))
     ahead, back = _ramp(z, -0.02, 0.06), _ramp(-z, -0.02, 0.06)
     # the fuller, the wider and lower
-    bust = _bell(x, 0.085, 0.090) * _bell(y, level["chest"] - 0.030, 0.100) * ahead
+    bust = _bell(x, 0.082, 0.070) * _bell(y, level["chest"] - 0.015, 0.075) * ahead
     add("bust", 0.012, dx=carried(0.15 * bust, 0.0), dz=carried(bust, 0.0))
     add("belly", 0.020, dz=carried(_bell(x, 0.0, 0.11) * _bell(y, level["navel"] - 0.03, 0.09) * ahead, 0.0))
     add("seat", 0.012, dz=carried(-_bell(x, 0.085, 0.075) * _bell(y, level["hip"], 0.07) * back, 0.0))
