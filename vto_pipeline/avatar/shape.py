@@ -15,7 +15,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from vto_pipeline.avatar.body_plan import FEMALE, MALE
-from vto_pipeline.avatar.implicit import arm_axis
+from vto_pipeline.avatar.implicit import arm_axis, smooth_min
 from vto_pipeline.avatar.pose import pose_avatar
 from vto_pipeline.avatar.template import membership, template
 from vto_pipeline.model.arrays import FloatArray
@@ -31,6 +31,8 @@ _KINK_M = 0.02
 _TRUNK_KNOTS = ("hip", "high_hip", "navel", "waist", "underbust", "chest", "shoulder")
 _LEG_KNOTS = ("ankle", "calf", "knee", "midthigh", "thigh")
 _TRUNK_CHANGES = ("breadth", "depth", "shift", "fullness")
+_RIBS_M, _BREAST_ROOT_M = 0.010, 0.02
+"""How far before the trunk's own front its ribs may lie, and how softly what is further is taken for breast."""
 _ALIKE_M = 0.25
 """How far along the body its thickness varies together."""
 _ARM_KNOTS = ("armpit", "upper_arm", "elbow", "forearm", "wrist", "hand")
@@ -164,7 +166,9 @@ def _fields(sex: float, points: FloatArray, arm: FloatArray, leg: FloatArray) ->
         at_shoulder = float(_stretched(shoulder[1:2], low, high)[0])
         add(f"{name}_height", sigma, dy=carried(_stretched(y, low, high), at_shoulder))
 
-    _add_trunk(add, carried, level, _trunk_heights(sex), shoulder, neck_base, x, y, z)
+    plain = _blend(sex, FEMALE.trunk, MALE.trunk)
+    front = np.interp(y, plain[:, 0], plain[:, 3])
+    _add_trunk(add, carried, level, _trunk_heights(sex), shoulder, neck_base, front, x, y, z)
     _add_legs(add, sex, level, leg, x, y, z)
     _add_arms(add, sex, arm, np.stack([x, y, z], axis=1) - shoulder)
     tall = level["neck"] + 0.01
@@ -183,6 +187,7 @@ def _add_trunk(  # type: ignore[no-untyped-def]
     heights: FloatArray,
     shoulder: FloatArray,
     neck_base: float,
+    front: FloatArray,
     x: FloatArray,
     y: FloatArray,
     z: FloatArray,
@@ -191,26 +196,33 @@ def _add_trunk(  # type: ignore[no-untyped-def]
     knots = np.array([level["thigh"] - 0.04, *heights, level["neck"]])
     up = _ramp(y, level["chest"], shoulder[1])
     outward = _ramp(x, 0.05, shoulder[0])
+    # breasts are carried by the ribs, not scaled with them: they would become cones
+    bare = _ramp(y, level["waist"], level["underbust"]) * (1 - _ramp(y, shoulder[1], neck_base))
+    ribs = z + bare * (smooth_min(z, front + _RIBS_M, _BREAST_ROOT_M) - z)
     rings, at_shoulder = _cardinal(knots, y), _cardinal(knots, shoulder[1:2])[0]
     for k, name in enumerate(_TRUNK_KNOTS, start=1):
         ring, there = rings[:, k], float(at_shoulder[k])
         # broad chests have broad shoulders: the arms make room
         along = 0.6 * shoulder[0] if name == "chest" else 0.0
         add(f"{name}_breadth", 0.10, dx=carried(x * ring + along * outward * up, shoulder[0] * there + along))
-        add(f"{name}_depth", 0.12, dz=carried((z - middle) * ring, 0.0))
+        add(f"{name}_depth", 0.12, dz=carried((ribs - middle) * ring, 0.0))
         add(f"{name}_shift", 0.010, dz=carried(ring, there))
         corner = ring * (2 * x * (z - middle) / (x**2 + (z - middle) ** 2 + 1e-6)) ** 2
         add(f"{name}_fullness", 0.04, dx=carried(x * corner, 0.0), dz=carried((z - middle) * corner, 0.0))
     neck = _cardinal(np.array([shoulder[1] - 0.01, neck_base, level["neck"], level["neck"] + 0.08]), y)
+    neck *= 1 - outward[:, None]
     for name, ring in (("neck_base", neck[:, 1]), ("neck", neck[:, 2])):
         add(f"{name}_girth", 0.08, dx=carried(x * ring, 0.0), dz=carried((z + 0.01) * ring, 0.0))
-    front, back = _ramp(z, -0.02, 0.06), _ramp(-z, -0.02, 0.06)
-    bust = _bell(x, 0.080, 0.055) * _bell(y, level["chest"], 0.055) * front
+    ahead, back = _ramp(z, -0.02, 0.06), _ramp(-z, -0.02, 0.06)
+    # the fuller, the wider and lower
+    bust = _bell(x, 0.082, 0.070) * _bell(y, level["chest"] - 0.015, 0.075) * ahead
     add("bust", 0.012, dx=carried(0.15 * bust, 0.0), dz=carried(bust, 0.0))
-    add("belly", 0.020, dz=carried(_bell(x, 0.0, 0.11) * _bell(y, level["navel"] - 0.03, 0.09) * front, 0.0))
+    add("belly", 0.020, dz=carried(_bell(x, 0.0, 0.11) * _bell(y, level["navel"] - 0.03, 0.09) * ahead, 0.0))
     add("seat", 0.012, dz=carried(-_bell(x, 0.085, 0.075) * _bell(y, level["hip"], 0.07) * back, 0.0))
     add("shoulder_width", 0.012, dx=carried(outward * up, 1.0))
-    add("shoulder_slope", 0.012, dy=carried(-outward * up, -1.0))
+    # a straight line from the neck to beyond the shoulder's end tilts as a whole
+    tilt = _ramp(x, 0.03, shoulder[0] + 0.04)
+    add("shoulder_slope", 0.012, dy=carried(-tilt * up, -1.0))
 
 
 def _add_legs(  # type: ignore[no-untyped-def]
