@@ -1,8 +1,8 @@
 """The last pass of a drape: no triangle of the cloth may cross the body.
 
 Contacts are held at the vertices; between them a triangle can still cut a sharp bump. Where one does, the skin of the
-vertices around it thickens, by as much as the triangle lies in the body, and the cloth relaxes, until none is left. The
-skin stays as it is: it is part of the equilibrium.
+vertices around it thickens and the cloth relaxes, until none is left. The skin stays as it is: it is part of the
+equilibrium.
 """
 
 from __future__ import annotations
@@ -12,13 +12,11 @@ import numpy as np
 from vto_pipeline.cloth.build import ClothState
 from vto_pipeline.cloth.stepper import Stepper
 from vto_pipeline.geometry.intersections import intersecting_faces
-from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.arrays import IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 
-_THICKEN = 1e-3  # m a round, at least
-_SHARPEST = 0.25  # of a triangle's longest edge: a bump no sharper than the triangle is long reaches in no deeper
-_ALONG = 4  # parts of a triangle's edges between the points that are asked how deep they are
+_THICKEN = 1e-3  # m a round at least,
+_FASTER = 0.15  # and this share of the skin: cloth stretched to triangles of several times their size needs much
 _RELAX = 0.1  # s of cloth time a round
 _PATIENCE = 5  # rounds without fewer crossings: what passes through a limb does so however thick the skin
 
@@ -43,25 +41,9 @@ def clear_of_body(
     for _ in range(rounds):
         if len(pairs) == 0 or since == _PATIENCE:
             break
-        crossing = faces[np.unique(pairs[:, 0])]
-        more = np.zeros(len(stepper.skin))
-        np.maximum.at(more, crossing, np.maximum(_lacking(state.positions[crossing], body), _THICKEN)[:, None])
-        stepper.skin += more
+        about = np.unique(faces[pairs[:, 0]])
+        stepper.skin[about] += np.maximum(_THICKEN, _FASTER * stepper.skin[about])
         state = stepper.run(state, _RELAX)
         pairs = intersecting_faces(TriangleMesh(state.positions, faces), body)
         fewest, since = min(fewest, len(pairs)), 0 if len(pairs) < fewest else since + 1
     return state, pairs
-
-
-def _lacking(corners: FloatArray, body: TriangleMesh) -> FloatArray:
-    """Return how deep triangles reach into the body, as far as that may be cleared at once [m], shape (N,).
-
-    Args:
-        corners: [m], shape (N, 3, 3).
-        body: Where it is now.
-    """
-    weights = np.array([(i, j, _ALONG - i - j) for i in range(_ALONG + 1) for j in range(_ALONG + 1 - i)]) / _ALONG
-    points = np.einsum("pk,nkd->npd", weights, corners)
-    deepest = -SurfaceDistance(body).signed(points.reshape(-1, 3)).distance.reshape(len(corners), -1).min(axis=1)
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    return np.minimum(deepest, _SHARPEST * longest)
