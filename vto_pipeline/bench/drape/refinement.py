@@ -21,7 +21,7 @@ from vto_pipeline.geometry.topology import boundary_loops, face_area_vectors
 from vto_pipeline.model.cloth import Draped
 from vto_pipeline.model.mesh import TriangleMesh
 
-VERTICES = (3_000, 6_000, 12_000, 25_000, 50_000, 100_000)
+VERTICES = (3_000, 6_000, 12_000, 25_000, 50_000)
 """How fine, about."""
 
 _GARMENT = ("dress", "average", "cotton_poplin")
