@@ -10,21 +10,15 @@ from vto_pipeline.cloth.polish import LONGEST, Polish
 from vto_pipeline.cloth.settle import SettleLimits, settle
 
 
-class Straying:
-    """One coordinate x [mm] with the force -x; steps as long as usual halve it, longer ones go far away.
-
-    What it knows of contacts, it has from the last step.
-    """
+class Steps:
+    """What polishing sees of a stepper."""
 
     rests_exactly = polishes = True
     bearing = steps = 0
+    known = None
 
     def __init__(self):
-        self.substeps = 0.5
-        self.exact = self.definite = False
-        self.known = "nothing"
-        self.tried = 0
-        self.knew = set()
+        self.substeps, self.definite, self.exact = 0.5, False, False
 
     @property
     def step(self):
@@ -35,6 +29,19 @@ class Straying:
 
     def polish(self, on):
         self.exact = on
+
+
+class Straying(Steps):
+    """One coordinate x [mm] with the force -x; steps as long as usual halve it, longer ones go far away.
+
+    What it knows of contacts, it has from the last step.
+    """
+
+    def __init__(self):
+        super().__init__()
+        self.known = "nothing"
+        self.tried = 0
+        self.knew = set()
 
     def run(self, state, seconds):
         self.definite = self.exact
@@ -60,20 +67,6 @@ def test_a_long_step_that_leads_away_is_not_taken():
     assert not found.settled  # nobody knows whether it is stable there
     assert stepper.substeps == 0.5
     assert not stepper.exact
-
-
-class Steps:
-    """What polishing sees of a stepper."""
-
-    def __init__(self):
-        self.substeps, self.definite, self.exact = 0.5, False, False
-
-    @property
-    def step(self):
-        return FRAME / self.substeps
-
-    def polish(self, on):
-        self.exact = on
 
 
 def test_steps_grow_while_the_force_falls():
@@ -113,30 +106,14 @@ def test_what_leaves_more_force_is_tried_in_shorter_steps_until_they_are_as_usua
     assert stepper.step == pytest.approx(4 / 30)
 
 
-class Buckling:
+class Buckling(Steps):
     """One coordinate x [mm] in the potential of a buckled strip, c/4 (1 - x²)²: stable at 1 and -1, not at 0.
 
     Each step is one of Newton's method from rest, as cloth takes them where inertia damps: with the exact stiffness
     while the system is positive definite, else with one that holds back ten times as much.
     """
 
-    rests_exactly = polishes = True
-    bearing = steps = 0
-    known = None
     c = 0.95 * 30.0**2  # 1/s²: at 0, with the exact stiffness, a step of 1/30 s brings it twenty times as far
-
-    def __init__(self):
-        self.substeps, self.definite, self.exact = 0.5, False, False
-
-    @property
-    def step(self):
-        return FRAME / self.substeps
-
-    def prepare(self, positions):
-        pass
-
-    def polish(self, on):
-        self.exact = on
 
     def run(self, state, seconds):
         x, h = 1e3 * state.positions[0, 0], self.step

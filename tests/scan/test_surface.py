@@ -8,6 +8,7 @@ from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.topology import boundary_loops, face_normals
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
+from vto_pipeline.scan import normals
 from vto_pipeline.scan.normals import oriented_normals
 from vto_pipeline.scan.surface import SurfaceConfig, reconstruct_cloud
 
@@ -95,13 +96,33 @@ def test_plane_is_refused():
         reconstruct_cloud(PointCloud(flat), SurfaceConfig(), Job())
 
 
-@pytest.mark.parametrize("gap", [1e-3, 4e-3])
-def test_normals_do_not_turn_over_where_two_surfaces_nearly_touch(gap: float) -> None:
-    """Two balls side by side: neighbours across the gap have opposite normals, and both point out."""
+def two_balls(gap):
+    """Points on two balls side by side, this far apart [m], normals that point out, and which lie away from the gap."""
     random = np.random.default_rng(5)
     true = random.normal(size=(6000, 3))
     true /= np.linalg.norm(true, axis=1, keepdims=True)
     side = np.where(np.arange(6000) < 3000, -1.0, 1.0)[:, None] * [0.1 + gap / 2, 0.0, 0.0]
-    found = oriented_normals(PointCloud(0.1 * true + side), 20, Job())
     told = np.abs(side[:, 0] + 0.1 * true[:, 0]) > 0.01  # two spacings from the gap, which is less than one wide
+    return 0.1 * true + side, true, told
+
+
+@pytest.mark.parametrize("gap", [1e-3, 4e-3])
+def test_normals_do_not_turn_over_where_two_surfaces_nearly_touch(gap: float) -> None:
+    """Neighbours across the gap have opposite normals, and both point out."""
+    points, true, told = two_balls(gap)
+    found = oriented_normals(PointCloud(points), 20, Job())
     assert ((found * true).sum(axis=1) > 0)[told].all()
+
+
+def test_points_that_have_no_vote_follow_those_near_them(monkeypatch) -> None:
+    monkeypatch.setattr(normals, "_VOTERS", 3000)
+    points, true, told = two_balls(0.02)  # wide enough for half of the points to show it
+    found = oriented_normals(PointCloud(points), 20, Job())
+    assert ((found * true).sum(axis=1) > 0)[told].all()
+
+
+def test_points_may_be_there_twice() -> None:
+    points, true, told = two_balls(4e-3)
+    again = np.concatenate([np.arange(6000), np.arange(1000)])
+    found = oriented_normals(PointCloud(points[again]), 20, Job())
+    assert ((found * true[again]).sum(axis=1) > 0)[told[again]].all()

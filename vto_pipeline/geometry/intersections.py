@@ -19,18 +19,18 @@ from vto_pipeline.numerics import bvh, bvh_pairs
 
 def intersecting_faces(one: TriangleMesh, other: TriangleMesh) -> IntArray:
     """Return the pairs (face of one, face of other) that meet, sorted, shape (K, 2)."""
-    near = bvh_pairs.cross_pairs(_tree(one), _tree(other))
     vertices = np.vstack([one.vertices, other.vertices])
     faces = np.vstack([one.faces, other.faces + np.int32(len(one.vertices))])
-    shift = np.array([0, len(one.faces)], np.int32)
+    count = len(one.faces)
+    near = bvh_pairs.cross_pairs(bvh.build(vertices, faces[:count]), bvh.build(vertices, faces[count:]))
+    shift = np.array([0, count], np.int32)
     return _meeting(vertices, faces, near + shift) - shift
 
 
 def self_intersections(mesh: TriangleMesh) -> IntArray:
     """Return the pairs of faces of one mesh that meet otherwise than in their shared vertices, sorted, shape (K, 2)."""
-    near = np.sort(bvh_pairs.self_pairs(_tree(mesh)), axis=1)
     vertices, faces = mesh.vertices.copy(), mesh.faces.copy()  # writeable: one compiled kernel serves both callers
-    return _meeting(vertices, faces, near)
+    return _meeting(vertices, faces, np.sort(bvh_pairs.self_pairs(bvh.build(vertices, faces)), axis=1))
 
 
 def meeting_vertices(pairs: IntArray, faces: IntArray, count: int) -> NDArray[np.bool_]:
@@ -38,10 +38,6 @@ def meeting_vertices(pairs: IntArray, faces: IntArray, count: int) -> NDArray[np
     found = np.zeros(count, np.bool_)
     found[faces[pairs.reshape(-1)]] = True
     return found
-
-
-def _tree(mesh: TriangleMesh) -> bvh.Bvh:
-    return bvh.build(mesh.vertices.copy(), mesh.faces.copy())
 
 
 def _meeting(vertices: FloatArray, faces: IntArray, pairs: IntArray) -> IntArray:

@@ -55,9 +55,8 @@ def _forward_bin(b, plan, factor, y, passed):
     """Divide by the factor, children first; a front passes on what its rows beyond its own places are to be less."""
     for n in range(plan.bin_starts[b], plan.bin_starts[b + 1]):
         s = plan.binned[n]
-        at, wide, begin, end = _front(s, plan)
-        total = wide + 3 * (end - begin)
-        panel = factor.panels[plan.panels[s] : plan.panels[s + 1]].reshape(wide, total)
+        at, begin, end, panel = _front(s, plan, factor)
+        wide, total = panel.shape
         front = np.zeros(total)
         front[:wide] = y[at : at + wide]
         for c in plan.children[plan.child_starts[s] : plan.child_starts[s + 1]]:
@@ -80,9 +79,8 @@ def _backward_bin(b, plan, factor, y):
     """Divide by the factor's transpose, parents first."""
     for n in range(plan.bin_starts[b + 1] - 1, plan.bin_starts[b] - 1, -1):
         s = plan.binned[n]
-        at, wide, begin, end = _front(s, plan)
-        total = wide + 3 * (end - begin)
-        panel = factor.panels[plan.panels[s] : plan.panels[s + 1]].reshape(wide, total)
+        at, begin, end, panel = _front(s, plan, factor)
+        wide, total = panel.shape
         front = np.empty(total)
         front[:wide] = y[at : at + wide]
         for m in range(begin, end):
@@ -99,10 +97,11 @@ def _backward_bin(b, plan, factor, y):
 
 
 @njit(cache=True, error_model="numpy")
-def _front(s, plan):
-    """Return the first of a front's own scalars, how many it has, and where its other places begin and end."""
-    wide = 3 * (plan.first[s + 1] - plan.first[s])
-    return 3 * plan.first[s], wide, plan.row_starts[s], plan.row_starts[s + 1]
+def _front(s, plan, factor):
+    """Return the first of a front's own scalars, where its places beyond those begin and end, and its panel."""
+    wide, begin, end = 3 * (plan.first[s + 1] - plan.first[s]), plan.row_starts[s], plan.row_starts[s + 1]
+    panel = factor.panels[plan.panels[s] : plan.panels[s + 1]].reshape(wide, wide + 3 * (end - begin))
+    return 3 * plan.first[s], begin, end, panel
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})

@@ -79,7 +79,7 @@ def _voted(points: FloatArray, normals: FloatArray, agree: FloatArray, neighbour
     count = len(points)
     neighbours = min(neighbours, count - 1)
     near = cKDTree(points).query(points, k=neighbours + 1)[1]
-    row, column = np.repeat(near[:, 0], neighbours), near[:, 1:].ravel()
+    row, column = np.repeat(np.arange(count), neighbours), near[:, 1:].ravel()
     pairs = csr_matrix((_alike(points, normals, row, column), (row, column)), (count, count))
     pairs = pairs + pairs.T
     root = np.sqrt(np.asarray(abs(pairs).sum(axis=1)).ravel())
