@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 from body_judges import crossing, distances, independent_girth
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
 from vto_pipeline.avatar.correspondence import closest_points
@@ -22,7 +22,7 @@ from vto_pipeline.avatar.settle import settle
 from vto_pipeline.avatar.shape import shape_space
 from vto_pipeline.avatar.stance import ARM, stance
 from vto_pipeline.avatar.template import beyond_armscye, membership
-from vto_pipeline.avatar.upright import in_metres, turns_upright, without_floor
+from vto_pipeline.avatar.upright import in_metres, inside_out, turns_upright, without_floor
 from vto_pipeline.bench.body.people import cloud_of, person
 from vto_pipeline.bench.samples.body import body_distance
 from vto_pipeline.bench.samples.customer import CELL, SHAPE
@@ -149,6 +149,47 @@ def test_units_axes_and_floors_are_found_out() -> None:
         assert len(found.faces) == len(body.faces), "the floor is gone, the body is whole"
         stands, _ = upright_starts(found, job)
         assert_allclose(stands.vertices, body.vertices, rtol=0, atol=1e-9, err_msg=name)
+
+
+@pytest.mark.parametrize("part", ["whole", "front", "trunk", "on a floor"])
+def test_what_is_inside_out_is_seen(part: str) -> None:
+    """Whatever is open, and though a one-sided floor's own flux is many times the body's."""
+    body = true_body().mesh
+    vertices, faces, middle = body.vertices, body.faces, body.vertices[body.faces].mean(axis=1)
+    if part == "front":
+        faces = faces[face_normals(body)[:, 2] > 0]
+    elif part == "trunk":
+        faces = faces[(middle[:, 1] > 0.8) & (middle[:, 1] < 1.4)]
+    elif part == "on a floor":
+        corners = np.array([[-3, -0.002, -3], [-3, 0, 3], [3, 0, 3], [3, 0.002, -3]])  # nearly level
+        floor = len(vertices) + np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
+        vertices, faces = np.concatenate([vertices, corners]), np.concatenate([faces, floor])
+    assert not inside_out(TriangleMesh(vertices, faces))
+    assert inside_out(TriangleMesh(vertices, faces[:, ::-1]))
+
+
+def test_what_is_inside_out_is_turned_over() -> None:
+    """It is again the mesh that faced outwards, bit for bit, and told; what faced outwards stays."""
+    body = true_body().mesh
+    told, untold = Job(), Job()
+    turned, _ = upright_starts(TriangleMesh(body.vertices, body.faces[:, ::-1]), told)
+    kept, _ = upright_starts(body, untold)
+    for found in (turned, kept):
+        assert_array_equal(found.vertices, body.vertices)
+        assert_array_equal(found.faces, body.faces)
+    assert any("inside out" in note for note in told.notes)
+    assert not any("inside out" in note for note in untold.notes)
+
+
+@pytest.mark.slow
+def test_the_fit_of_what_is_inside_out_is_that_of_the_body() -> None:
+    body = true_body().mesh
+    job = Job()
+    fitted = fit_scan(body, QUICK, Job())
+    other = fit_scan(TriangleMesh(body.vertices, body.faces[:, ::-1]), QUICK, job)
+    assert_array_equal(other.vertices, fitted.vertices)
+    assert measure(other) == measure(fitted)
+    assert any("inside out" in note for note in job.notes)
 
 
 def test_a_floor_grown_together_with_the_feet_is_cut() -> None:

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from vto_pipeline.avatar.pose import named_pose
 from vto_pipeline.avatar.template import template
-from vto_pipeline.avatar.upright import turns_upright, without_floor
+from vto_pipeline.avatar.upright import inside_out, turns_upright, without_floor
 from vto_pipeline.errors import AvatarError
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.model.arrays import FloatArray
@@ -49,7 +49,7 @@ class Start:
 
 
 def upright_starts(scan: TriangleMesh, job: Job) -> tuple[TriangleMesh, list[Start]]:
-    """Return the scan with +Y up and without floor, and the guesses for it, best first.
+    """Return the scan with +Y up, facing outwards and without floor, and the guesses for it, best first.
 
     The file's own +Y is kept unless another axis explains the scan clearly better.
 
@@ -57,22 +57,26 @@ def upright_starts(scan: TriangleMesh, job: Job) -> tuple[TriangleMesh, list[Sta
         scan: In metres.
         job: Told of a turn.
     """
-    best: tuple[float, str, TriangleMesh, list[Start]] | None = None
+    best: tuple[float, str, bool, TriangleMesh, list[Start]] | None = None
     for name, turn in turns_upright(scan).items():
         stands = without_floor(TriangleMesh(scan.vertices @ turn.T, scan.faces))
+        if over := inside_out(stands):
+            stands = TriangleMesh(stands.vertices, stands.faces[:, ::-1])
         guesses = starts(stands)
         score = guesses[0].score * (1.0 if name == "+Y" else _OTHER_AXIS)
         if best is None or score < best[0]:
-            best = (score, name, stands, guesses)
+            best = (score, name, over, stands, guesses)
         if name == "+Y" and score < _SURE_M:
             break
     if best is None:
         raise AvatarError("the scan is in no direction as tall as a body or a form", hint="check the unit")
-    _, name, stands, guesses = best
+    _, name, over, stands, guesses = best
     if len(stands.faces) < len(scan.faces):
         job.note("a floor that had grown together with the feet is cut off")
     if name != "+Y":
         job.note(f"{name} of the scan is up: the avatar stands in axes turned so that it is +Y")
+    if over:
+        job.note("the scan was inside out: its faces are turned over")
     return stands, guesses
 
 

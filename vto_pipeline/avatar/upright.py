@@ -1,4 +1,4 @@
-"""A scan of any unit and axes: metres, +Y up, without floor and crumbs."""
+"""A scan of any unit, axes and orientation: metres, +Y up, facing outwards, without floor and crumbs."""
 
 from __future__ import annotations
 
@@ -92,3 +92,16 @@ def without_floor(scan: TriangleMesh) -> TriangleMesh:
     count, piece = face_components(kept)
     part = np.bincount(piece, np.linalg.norm(face_area_vectors(kept), axis=1), count)
     return submesh(kept, (part > _SMALL_PIECE * part.max())[piece])[0]
+
+
+def inside_out(scan: TriangleMesh) -> bool:
+    """Whether the surface of what stands along +Y faces its own axis.
+
+    By the flux of the horizontal position through it, twice the volume inside: a floor or an end left open has none of
+    it, and holes have little.
+    """
+    area = face_area_vectors(scan)
+    size = np.linalg.norm(area, axis=1)
+    middle = scan.vertices[scan.faces].mean(axis=1)
+    away = middle - size @ middle / size.sum()
+    return bool((away * area)[:, [0, 2]].sum() < 0)
