@@ -20,7 +20,7 @@ from vto_pipeline.avatar.scan_report import CORE, ends
 from vto_pipeline.avatar.shape import ShapeSpace
 from vto_pipeline.avatar.tape import Tape
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.model.body import Avatar
+from vto_pipeline.model.body import Avatar, Measurements
 from vto_pipeline.model.job import Job
 
 _STEPS, _REACH_M, _LAST_REACH_M = 12, 0.05, 0.008
@@ -28,6 +28,8 @@ _LOOSE_M = 0.02
 """How far cloth lies off what it is taken for, when the pose is found: a trunk must not lean to fill a shirt."""
 _SHAPE_STAYS = 100.0
 """How much more than it should the shape is held while the pose is found."""
+_LEVEL_M = 0.01
+"""How surely a row lies at its level on what was fitted to clothes, which hide what would show it; our assumption."""
 
 
 def undressed(space: ShapeSpace, fit: Fit, scan: Target, shell: Avatar, job: Job) -> tuple[Fit, dict[str, float]]:
@@ -41,7 +43,7 @@ def undressed(space: ShapeSpace, fit: Fit, scan: Target, shell: Avatar, job: Job
         job: For its seed.
     """
     sex, config = sex_name(space.base.sex), MeasurementsConfig()
-    expected = wearers(population(sex), measure(shell).values, job.seed)
+    expected = wearers(population(sex), _clothes(shell), job.seed)
     parameters = solve_shape(space, {}, expected, config, Job(), mean_parameters(sex, config))
     found = replace(fit, parameters=parameters, expected=parameters)
     chosen = np.flatnonzero(ends(space) < CORE)[::3]
@@ -49,6 +51,14 @@ def undressed(space: ShapeSpace, fit: Fit, scan: Target, shell: Avatar, job: Job
         pairs = scan.pairs(model(space, found), space.base.faces, chosen, float(reach))
         found = refine(space, found, pairs, _LOOSE_M, _SHAPE_STAYS)
     return replace(found, parameters=parameters), _sigmas(space, parameters, expected)
+
+
+def _clothes(shell: Avatar) -> Measurements:
+    """Return what is read on the clothes; a girth near a hem or a cuff changes with its level, and is less sure."""
+    read, tape = measure(shell), Tape(shell)
+    girths = {name: what for name, what in DEFINITIONS.items() if what.kind == "girth"}
+    unsure = {name: tape.by_level(what, shell.bind_vertices, _LEVEL_M) for name, what in girths.items()}
+    return replace(read, sigmas=unsure)
 
 
 def _sigmas(space: ShapeSpace, parameters: FloatArray, expected: Population) -> dict[str, float]:

@@ -6,13 +6,13 @@ people: those of the survey who fit inside, each as likely as its clothes would 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from vto_pipeline.avatar.population import Population
 from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.body import Measurements
 
 _SEEN_M = {
     "stature": 0.010,
@@ -57,7 +57,7 @@ ZONES = (
 )
 
 
-def wearers(people: Population, clothes: Mapping[str, float], seed: int, zones: tuple[Zone, ...] = ZONES) -> Population:
+def wearers(people: Population, clothes: Measurements, seed: int, zones: tuple[Zone, ...] = ZONES) -> Population:
     """Return whom to expect inside clothes, by mean and covariance.
 
     Sequential Monte Carlo from the population to those whom the clothes fit (Del Moral et al. 2006), moved by
@@ -65,12 +65,12 @@ def wearers(people: Population, clothes: Mapping[str, float], seed: int, zones: 
 
     Args:
         people: The population.
-        clothes: Measurements of the clothed body [m]: girths are those of the cloth.
+        clothes: Measurements of the clothed body [m]: girths are those of the cloth, as sure as their sigmas say.
         seed: Of the draws.
         zones: What hangs how.
     """
     rng = np.random.default_rng(seed)
-    seen = people.given({name: clothes[name] for name in _SEEN_M}, _SEEN_M)
+    seen = people.given({name: clothes.values[name] for name in _SEEN_M}, _SEEN_M)
     root = np.linalg.cholesky(seen.covariance + 1e-12 * np.eye(len(seen.names)))
     unit = rng.standard_normal((_PEOPLE, len(seen.names)))
     fits = _likelihood(seen, clothes, zones, unit @ root.T)
@@ -89,16 +89,16 @@ def wearers(people: Population, clothes: Mapping[str, float], seed: int, zones: 
     return Population(seen.names, seen.mean + found.mean(axis=0), np.cov(found.T))
 
 
-def _likelihood(
-    seen: Population, clothes: Mapping[str, float], zones: tuple[Zone, ...], away: FloatArray
-) -> FloatArray:
+def _likelihood(seen: Population, clothes: Measurements, zones: tuple[Zone, ...], away: FloatArray) -> FloatArray:
     """Logarithm of how likely the clothes are on each person, who is so far from the mean [m], shape (N,)."""
     total = np.zeros(len(away))
     for zone in zones:
-        at = [seen.names.index(f"{row}_girth") for row in zone.rows]
-        girths = np.array([clothes[f"{row}_girth"] for row in zone.rows])
-        ease = (girths - seen.mean[at] - away[:, at]).min(axis=1)
-        tight = -0.5 * (ease / _TIGHT_M) ** 2 - np.log(np.sqrt(2 * np.pi) * _TIGHT_M)
+        names = [f"{row}_girth" for row in zone.rows]
+        at = [seen.names.index(name) for name in names]
+        eases = np.array([clothes.values[name] for name in names]) - seen.mean[at] - away[:, at]
+        least, ease = eases.argmin(axis=1), eases.min(axis=1)
+        unsure = np.hypot(_TIGHT_M, [clothes.sigmas.get(name, 0.0) for name in names])[least]
+        tight = -0.5 * (ease / unsure) ** 2 - np.log(np.sqrt(2 * np.pi) * unsure)
         room = np.maximum(ease, 1e-9)
         loose = np.log(room / _EASE_M**2) - room / _EASE_M
         # who does not fit inside is as unlikely as a tape is wrong
