@@ -8,12 +8,16 @@ from body_judges import distances, inside
 
 from vto_pipeline.avatar.from_scan import ScanConfig, fit_scan
 from vto_pipeline.avatar.measure import measure
+from vto_pipeline.avatar.pose import joint_transforms
+from vto_pipeline.avatar.template import JOINTS
 from vto_pipeline.bench.body.clothed import dressed, someone
 from vto_pipeline.io.bodies import write_measurements
+from vto_pipeline.model.body import Avatar
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
 GIRTHS = ("chest", "underbust", "waist", "navel", "hip", "thigh", "neck", "upper_arm", "forearm", "wrist", "ankle")
+KNEES = [JOINTS.index(f"{side}_knee") for side in ("left", "right")]
 EASE = 0.020  # at the least, in radius: 13 cm of girth
 
 
@@ -30,6 +34,8 @@ def test_the_body_inside_loose_clothes(sex: str, seed: int, tmp_path) -> None:
     away = {row: abs(wrong[row]) / read.sigmas[f"{row}_girth"] for row in GIRTHS}
     assert max(away.values()) < 3.0, (wrong, away)
     assert np.mean([one < 1.96 for one in away.values()]) > 0.8, (wrong, away)
+    # limbs are amid sleeves and trouser legs, which are 25 mm wider all round at the knee
+    assert np.abs((joints(found) - joints(body))[KNEES]).max() < 0.025
     # skin shows, and is no estimate
     assert max(abs(wrong[row]) for row in ("forearm", "wrist")) < 0.008, wrong
     assert job.metrics["tangled_faces"] == 0
@@ -40,6 +46,12 @@ def test_the_body_inside_loose_clothes(sex: str, seed: int, tmp_path) -> None:
     # what of it is outside the clothes is so by little
     trunk = found.vertices[np.unique(found.loops["chest"])]
     assert distances(trunk, scan.vertices, scan.faces)[~inside_clothes(trunk, scan)].max(initial=0.0) < 0.005
+
+
+def joints(body: Avatar) -> np.ndarray:
+    """Where they are as the body stands, shape (J, 3)."""
+    turn, offset = joint_transforms(body.joints, body.parents, body.pose)
+    return np.einsum("jab,jb->ja", turn, body.joints) + offset + body.translation
 
 
 def inside_clothes(points: np.ndarray, scan: TriangleMesh) -> np.ndarray:

@@ -23,9 +23,10 @@ from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Avatar, Measurements
 from vto_pipeline.model.job import Job
 
-_STEPS, _REACH_M, _LAST_REACH_M = 12, 0.05, 0.008
-_LOOSE_M = 0.02
-"""How far cloth lies off what it is taken for, when the pose is found: a trunk must not lean to fill a shirt."""
+_STEPS, _REACH_M = 12, 0.05
+"""The reach stays: within a shorter one a limb is drawn to that side of its sleeve or trouser leg which is nearer."""
+_WITHIN_M, _LOOSE_M = 0.003, 0.02
+"""How sharply cloth and skin end the body, when the pose is found, and how far cloth hangs off, all round alike."""
 _SHAPE_STAYS = 100.0
 """How much more than it should the shape is held while the pose is found."""
 _LEVEL_M = 0.01
@@ -47,9 +48,10 @@ def undressed(space: ShapeSpace, fit: Fit, scan: Target, shell: Avatar, job: Job
     parameters = solve_shape(space, {}, expected, config, Job(), mean_parameters(sex, config))
     found = replace(fit, parameters=parameters, expected=parameters)
     chosen = np.flatnonzero(ends(space) < CORE)[::3]
-    for reach in np.geomspace(_REACH_M, _LAST_REACH_M, _STEPS):
-        pairs = scan.pairs(model(space, found), space.base.faces, chosen, float(reach))
-        found = refine(space, found, pairs, _LOOSE_M, _SHAPE_STAYS)
+    clothes = scan.as_clothes((_WITHIN_M / _LOOSE_M) ** 2)
+    for _ in range(_STEPS):
+        pairs = clothes.pairs(model(space, found), space.base.faces, chosen, _REACH_M)
+        found = refine(space, found, pairs, _WITHIN_M, _SHAPE_STAYS)
     return replace(found, parameters=parameters), _sigmas(space, parameters, expected)
 
 

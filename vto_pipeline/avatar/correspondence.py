@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,7 @@ _NO_WEIGHT = 1e-6
 _MUTUAL = 0.5
 """Of a vertex's distance to the scan: a place that another part of the body is so much nearer to belongs to that."""
 _THROUGH_M = 0.003
-"""A body this little outside its clothes is left there: bare skin would else be pushed in wherever it is met."""
+"""What lies this little inside the model counts as outside: skin would else push it wherever noise takes it."""
 
 
 @dataclass(frozen=True)
@@ -51,11 +52,10 @@ class Target:
         scan: In metres, +Y up.
         probes: Points of it that are matched with the model.
         seed: Of their places.
-        clothed: Whether what lies outside the model is cloth, which says nothing of the body.
     """
 
-    def __init__(self, scan: TriangleMesh, probes: int, seed: int, clothed: bool = False) -> None:
-        self._clothed = clothed
+    def __init__(self, scan: TriangleMesh, probes: int, seed: int) -> None:
+        self._outside = 1.0
         self.vertices, self.faces = scan.vertices, scan.faces
         self.face_normals = face_normals(scan)
         self.probes, self.probe_normals, _ = sample_surface(scan, probes, seed)
@@ -64,6 +64,12 @@ class Target:
         rim = np.zeros(len(scan.vertices), dtype=bool)
         rim[edges[times == 1].ravel()] = True
         self._rim_face: NDArray[np.bool_] = np.any(rim[scan.faces], axis=1)
+
+    def as_clothes(self, outside: float) -> Target:
+        """Return the same as clothes: what lies outside the model counts only so much, 0 to 1, what inside all."""
+        clothes = copy(self)
+        clothes._outside = outside
+        return clothes
 
     def onto_scan(
         self, vertices: FloatArray, faces: IntArray, chosen: NDArray[np.int64], normals: FloatArray, reach: float
@@ -90,7 +96,7 @@ class Target:
 
     def counted(self, ahead: FloatArray) -> FloatArray:
         """Return what points of the scan count that lie so far outside the model [m], negative inside."""
-        return np.where(self._clothed & (ahead > -_THROUGH_M), 0.0, 1.0)
+        return np.where(ahead > -_THROUGH_M, self._outside, 1.0)
 
     def pairs(self, vertices: FloatArray, faces: IntArray, chosen: NDArray[np.int64], reach: float) -> Pairs:
         """Match probes of the scan with the model, and chosen vertices of the model with the scan."""

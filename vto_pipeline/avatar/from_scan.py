@@ -95,8 +95,7 @@ def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | No
         # which posture is the body's own does not show
         stands = replace(stance(space, fit), joints=space.joints(fit.parameters), pose=fit.pose)
         stands = replace(stands, translation=fit.translation)
-        cloth = Target(kept, config.probes, job.seed, clothed=True)
-        vertices, _ = _displaced(space, fit, cloth, model(space, fit), config.stiffness, config.rounds)
+        vertices = part_thighs(space, fit, model(space, fit))
         job.measure(estimated_under_clothing=True)
         job.warn("the body is an estimate under clothing: do not choose a size by it without a tape")
         caveats.append("estimated under clothing")
