@@ -27,7 +27,6 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
 _SHOWN = 5  # places named in a message
-_JUST = 1e-3  # m beyond the skin: the judge takes cloth no farther from the body than this to lie on it
 
 
 def drape(
@@ -92,7 +91,7 @@ def drape(
             residual=stepper.residual(state),
             fabric=fabric if knows(config) else None,
             friction=config.friction,
-            touching=float(stepper.skin.max()) + _JUST,
+            skin=stepper.skin,
         ),
         **warn_if_too_small(draped, garment.rest, config.stretch_limit, job),
     }
