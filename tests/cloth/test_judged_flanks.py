@@ -27,7 +27,7 @@ def folded(angle, half=0.1, length=0.4, cells=7):
 
 
 def directions(body, point, within):
-    owner, outward = flanks(body, np.array([point]), np.array([False]), within)
+    owner, outward = flanks(body, np.array([point]), np.array([False]), np.array([within]))
     assert (owner == 0).all()
     return np.unique(outward.round(9), axis=0)
 
@@ -52,9 +52,16 @@ def test_the_far_side_of_what_is_thin_does_not_push():
     faces = np.array([[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7]], dtype=np.int32)
     wedge = TriangleMesh(np.vstack([corners, below]), faces)
     assert_allclose(directions(wedge, [0.1e-3, 1e-3, 0.0], 4e-3), [[0.0, 1.0, 0.0]], rtol=0, atol=1e-9)
-    _, outward = flanks(wedge, np.array([[0.1e-3, -0.2e-3, 0.0]]), np.array([True]), 4e-3)
+    _, outward = flanks(wedge, np.array([[0.1e-3, -0.2e-3, 0.0]]), np.array([True]), np.array([4e-3]))
     down = np.array([0.5, -1.0, 0.0]) / np.hypot(0.5, 1.0)
     assert_allclose(np.unique(outward.round(9), axis=0), [[0.0, 1.0, 0.0], down], rtol=0, atol=1e-8)
+
+
+def test_a_point_is_pushed_from_as_far_as_it_keeps_away_and_no_farther():
+    groove, point = folded(np.radians(30.0)), [0.0, 2e-3 / np.cos(np.radians(30.0)), 0.011]
+    points, outside = np.array([point] * 3), np.zeros(3, bool)
+    owner, _ = flanks(groove, points, outside, np.array([1.9e-3, 10.0, 2.1e-3]))
+    assert np.unique(owner).tolist() == [1, 2]
 
 
 def test_flanks_are_the_minima_of_a_dense_sample():
@@ -67,7 +74,7 @@ def test_flanks_are_the_minima_of_a_dense_sample():
     points = hollow.vertices[rng.integers(len(hollow.vertices), size=10)] * 1.06
     points = points[~SurfaceDistance(hollow).inside(points)]
     within = 0.02
-    owner, outward = flanks(hollow, points, np.zeros(len(points), bool), within)
+    owner, outward = flanks(hollow, points, np.zeros(len(points), bool), np.full(len(points), within))
     corners = hollow.vertices[hollow.faces]
     count = 0
     for i, point in enumerate(points):

@@ -24,7 +24,10 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 _PLACES = 10  # named of each kind of crossing
 _NEAR = 5e-3  # m: gaps wider than this are not looked for
-_TOUCHING = 4e-3  # m: a body this near may bear the cloth; skins are 3 mm at most unless asked for
+_SKIN = 3e-3  # m: the most that cloth keeps from bodies, unless more is asked for
+
+JUST = 1e-3
+"""Cloth no farther from what it keeps its skin from than this beyond it may be borne by that [m]."""
 
 
 def audit(
@@ -37,7 +40,7 @@ def audit(
     residual: float,
     fabric: Fabric | None = None,
     friction: float | None = None,
-    touching: float = _TOUCHING,
+    skin: float | FloatArray = _SKIN,
     pinned: Sequence[int] = (),
 ) -> dict[str, object]:
     """Return what is wrong with a draped garment, as plain JSON values; nothing in it depends on run time.
@@ -52,7 +55,8 @@ def audit(
         fabric: What it is made of, where the judge knows its model (`judge.balance.knows`); energy and force are
             then judged.
         friction: Against the body; the fabric's own when None.
-        touching: A body this near may bear the cloth [m].
+        skin: Distance that vertices keep from the body, shape (V,) or one for all [m]. A little more may still be
+            borne by it; by the cloth itself, within the least of them.
         pinned: Vertices that were held, or that something else may bear.
 
     Returns:
@@ -67,7 +71,9 @@ def audit(
     stretch = np.abs(length[natural > 0] / natural[natural > 0] - 1.0)
     nearest = None if body is None else SurfaceDistance(body).signed(mesh.vertices)
     crossing = self_intersections(mesh)
-    near, gaps = gaps_within(mesh.vertices, rest.positions, mesh.faces, max(_NEAR, touching))
+    touching = np.broadcast_to(skin, len(mesh.vertices)) + JUST
+    least = float(touching.min())
+    near, gaps = gaps_within(mesh.vertices, rest.positions, mesh.faces, max(_NEAR, least))
     gap = 0.0 if len(crossing) else float(gaps.min(initial=np.inf))
     found: dict[str, object] = {
         "finite": bool(np.isfinite(mesh.vertices).all()),
@@ -87,7 +93,7 @@ def audit(
         weave = Weave(mesh, rest, fabric)
         free = np.ones(len(mesh.vertices), np.bool_)
         free[list(pinned)] = False
-        free[mesh.faces[near[gaps < touching]]] = False
+        free[mesh.faces[near[gaps < least]]] = False
         mu = fabric.friction if friction is None else friction
         found["judged_energy_j"] = weave.energy(mesh.vertices)
         found["judged_residual"] = left_over_force(

@@ -1,8 +1,9 @@
 """The last pass of a drape: no triangle of the cloth may cross the body.
 
 Contacts are held at the vertices; between them a triangle can still cut a sharp bump. Where one does, the skin of the
-vertices around it thickens and the cloth relaxes, until none is left. The skin stays as it is: it is part of the
-equilibrium.
+vertices around it thickens and the cloth relaxes, until none is left. These vertices slide meanwhile: held by friction
+on the flanks of the bump, the triangle over its top would be stretched between them, and no cloth has rubbed there. The
+skin stays as it is: it is part of the equilibrium.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ def clear_of_body(
     """Thicken and relax until no triangle of the cloth meets the body, the rounds are spent, or bring nothing.
 
     Args:
-        stepper: The cloth among its colliders; its skin is raised.
+        stepper: The cloth among its colliders; its skin is raised, and friction as it was at the end.
         state: The cloth.
         faces: Its triangles, shape (F, 3).
         body: Where the body is now.
@@ -43,7 +44,9 @@ def clear_of_body(
             break
         about = np.unique(faces[pairs[:, 0]])
         stepper.skin[about] += np.maximum(_THICKEN, _FASTER * stepper.skin[about])
+        stepper.loose[about] = True
         state = stepper.run(state, _RELAX)
         pairs = intersecting_faces(TriangleMesh(state.positions, faces), body)
         fewest, since = min(fewest, len(pairs)), 0 if len(pairs) < fewest else since + 1
+    stepper.loose[:] = False
     return state, pairs

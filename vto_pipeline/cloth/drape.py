@@ -27,7 +27,6 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
 _SHOWN = 5  # places named in a message
-_JUST = 1e-3  # m beyond the skin: the judge takes cloth no farther from the body than this to lie on it
 
 
 def drape(
@@ -41,9 +40,10 @@ def drape(
 
     When the body moves, the garment is where its first keyframe has it and rides along; where the body changes much,
     the garment is reshaped with it instead and starts on the body as it ends. When the body is at rest, the garment is
-    put in its place first: unit, axes, shift. Where it then cuts deep into the body, the body grows inside it. Where
-    the garment crosses itself, it is untangled before. Then all settles under gravity, and a last pass takes the
-    remaining crossings with the body out.
+    put in its place first: unit, axes, shift. Where it then cuts deep into the body, the body grows inside it; where
+    even the thinnest would cross it, the garment is led about the body as a whole first. Where the garment crosses
+    itself, it is untangled before. Then all settles under gravity, and a last pass takes the remaining crossings with
+    the body out.
 
     Args:
         garment: The simulation mesh where it is now, and its rest shape; a mesh alone is its own rest shape.
@@ -92,7 +92,7 @@ def drape(
             residual=stepper.residual(state),
             fabric=fabric if knows(config) else None,
             friction=config.friction,
-            touching=float(stepper.skin.max()) + _JUST,
+            skin=stepper.skin,
         ),
         **warn_if_too_small(draped, garment.rest, config.stretch_limit, job),
     }

@@ -7,8 +7,11 @@ Laplacian of the first shape kept, the flow does not pinch off necks.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from vto_pipeline.cloth.lead import led_about
 from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.job import Job
@@ -18,14 +21,46 @@ _STEP = 1e-3  # m²: a limb of radius r shrinks by exp(-1e-3 / r²) a step, a wr
 _MOST = 12  # steps: an arm is a line long before, and a torso still two thirds
 
 
-def growing(body: TriangleMesh, garment: TriangleMesh, job: Job) -> MovingBody:
+class Growth(NamedTuple):
+    """What is to happen.
+
+    Args:
+        garment: Where it is when the body begins to grow.
+        body: From thin to full.
+    """
+
+    garment: TriangleMesh
+    body: MovingBody
+
+
+def growing(body: TriangleMesh, garment: TriangleMesh, job: Job) -> Growth:
     """Return the body's growth, from the least thinning at which it no longer crosses the garment.
+
+    Where it crosses however thin, the garment is not about the body, and is led there as a whole if that helps.
 
     Args:
         body: Closed or with holes [m].
         garment: In its place about the body [m].
-        job: Warned when no thinning gets the body clear of the garment.
+        job: Warned when the garment is led, or no thinning gets the body clear of it.
     """
+    grown, crossing = _thinned(body, garment)
+    if not crossing:
+        return Growth(garment, grown)
+    led = TriangleMesh(led_about(body, garment), garment.faces)
+    about, still = _thinned(body, led)
+    if still:
+        job.warn(f"the garment does not surround the body: {crossing} pairs of triangles cross even the thinnest body")
+        return Growth(garment, grown)
+    way = 1e3 * (led.vertices - garment.vertices).mean(axis=0)
+    job.warn(
+        f"where it stands, the garment does not surround the body: led about it by "
+        f"({', '.join(f'{part:.0f}' for part in way)}) mm (x, y, z) before that grows"
+    )
+    return Growth(led, about)
+
+
+def _thinned(body: TriangleMesh, garment: TriangleMesh) -> tuple[MovingBody, int]:
+    """Return the body's growth from the least thinning that will do or the most there is, and the pairs that cross."""
     import igl
     from scipy.sparse.linalg import splu
 
@@ -37,6 +72,4 @@ def growing(body: TriangleMesh, garment: TriangleMesh, job: Job) -> MovingBody:
     while crossing and len(frames) <= _MOST:
         frames.append(flow.solve(mass @ frames[-1]))
         crossing = len(intersecting_faces(garment, TriangleMesh(frames[-1], body.faces)))
-    if crossing:
-        job.warn(f"the garment does not surround the body: {crossing} pairs of triangles cross even the thinnest body")
-    return MovingBody(np.stack(frames[::-1]), body.faces)
+    return MovingBody(np.stack(frames[::-1]), body.faces), crossing

@@ -193,7 +193,7 @@ class _Outfit:
             config,
             settled=settling.settled,
             residual=stepper.residual(settling.state),
-            skin=float(stepper.skin.max()),
+            skin=stepper.skin,
             job=job,
         )
         job.warnings += together.warnings

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vto_pipeline.cloth.audit import audit, places
+from vto_pipeline.cloth.audit import JUST, audit, places
 from vto_pipeline.cloth.balance import elastic_energy
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.joined import Joined
@@ -23,7 +23,6 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.outfit import Layer
 
-_JUST = 1e-3  # m beyond the skin: the judge takes cloth no farther from the body than this to lie on it
 _NEAR = 5e-3  # m: wider gaps between layers are not looked for
 _PLACES = 10  # named of two garments
 
@@ -36,7 +35,7 @@ def audit_outfit(
     *,
     settled: bool,
     residual: float,
-    skin: float,
+    skin: FloatArray,
     job: Job,
 ) -> dict[str, Any]:
     """Return what is wrong with garments worn one over the other, as plain JSON values.
@@ -48,7 +47,7 @@ def audit_outfit(
         config: How they were modelled.
         settled: Whether they came to rest, all together.
         residual: Out-of-balance force of all, rms, as a share of a vertex's weight, says the solver.
-        skin: Largest distance kept from the body [m].
+        skin: Distance that the vertices of `joined` keep from the body [m], shape (V,).
         job: Warned of garments that are too small, and of layers out of order.
 
     Returns:
@@ -59,7 +58,7 @@ def audit_outfit(
         order_kept (there are none), and the places of these [m].
     """
     x = np.vstack([layer.garment.mesh.vertices for layer in layers])
-    touching = skin + _JUST
+    touching = float(skin.min()) + JUST
     near, gaps = _between(layers, x, joined, max(_NEAR, touching))
     borne = np.unique(joined.mesh.faces[near[gaps < touching]])
     found: dict[str, dict[str, Any]] = {}
@@ -76,7 +75,7 @@ def audit_outfit(
                 residual=residual,
                 fabric=layer.fabric if knows(config) else None,
                 friction=config.friction,
-                touching=touching,
+                skin=skin[span],
                 pinned=borne[(borne >= span.start) & (borne < span.stop)] - span.start,
             ),
             **warn_if_too_small(mesh, rest, config.stretch_limit, told),

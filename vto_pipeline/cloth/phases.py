@@ -102,7 +102,9 @@ class Phases:
             self._job.leave_out(what, f"no cloth deeper in it than {1e3 * max(depth, 0):.1f} mm")
             return state
         self._job.progress(0.05, what)
-        collider = self.collider(growing(body, mesh, self._job), mesh)
+        growth = growing(body, mesh, self._job)
+        state = at_rest(growth.garment.vertices)
+        collider = self.collider(growth.body, growth.garment)
         stepper = self.stepper(without_gravity(self._model), collider, _CALM)
         grown = ride(stepper, state, collider, self._skin, lambda done: self._job.progress(0.05 + 0.25 * done, what))
         return at_rest(grown.positions)

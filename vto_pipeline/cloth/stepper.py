@@ -15,7 +15,7 @@ from vto_pipeline.cloth.balance import out_of_balance
 from vto_pipeline.cloth.build import ClothModel, ClothState
 from vto_pipeline.cloth.collision.active_set import ActiveSet, active_set, no_contacts
 from vto_pipeline.cloth.collision.body import BodyCollider
-from vto_pipeline.cloth.collision.contacts import Collider, Round, gather, nothing
+from vto_pipeline.cloth.collision.contacts import Collider, Round, gather, let_slide, nothing
 from vto_pipeline.cloth.collision.hold_apart import hold_apart
 from vto_pipeline.cloth.collision.pairs import no_pairs
 from vto_pipeline.cloth.collision.penalty import FREQUENCY, Penalty
@@ -77,6 +77,7 @@ class Stepper:
     Attributes:
         choice: The method taken, and why; after `prepare`.
         skin: Distance each vertex keeps from surfaces [m], shape (V,); may be raised between runs.
+        loose: Vertices that slide on surfaces without friction, shape (V,); none, but may be changed between runs.
         substeps: Steps per 1/60 s; after `prepare`, and may be changed between runs.
         steps: Steps taken so far.
         rounds: Times contacts were found.
@@ -100,6 +101,7 @@ class Stepper:
         force_all: bool = False,
     ) -> None:
         self.skin = skin
+        self.loose = np.zeros(len(skin), np.bool_)
         self.steps = 0
         self.rounds = 0
         self._model = model
@@ -231,6 +233,8 @@ class Stepper:
         recovery = np.inf if self._config.contact_forces else self._config.recovery_speed
         span = Round(state.time, state.time + count * h, travel, self.skin, recovery, move)
         self._contacts = gather(self._colliders, state.positions, span)
+        if self.loose.any():
+            self._contacts = let_slide(self._contacts, self.loose)
         assert self._method is not None  # `run` prepared it
         before = state
         if self._pins is not None:

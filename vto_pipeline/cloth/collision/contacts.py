@@ -69,6 +69,13 @@ def gather(colliders: Sequence[Collider], positions: FloatArray, span: Round) ->
     return Contacts(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
 
+def let_slide(found: Contacts, loose: NDArray[np.bool_]) -> Contacts:
+    """Return the contacts with those of some vertices, shape (V,), without friction, each surface twice for that."""
+    point, normal, offset = (np.concatenate([part, part]) for part in (found.point, found.normal, found.offset))
+    active = np.concatenate([found.active & ~loose, found.active & loose])
+    return Contacts(active, point, normal, offset, np.concatenate([found.friction, np.zeros_like(found.friction)]))
+
+
 def nothing(count: int) -> Contacts:
     """Return no contact for this many vertices."""
     return Contacts(

@@ -93,7 +93,7 @@ def left_over_force(
     nearest: Nearest | None,
     *,
     friction: float,
-    touching: float,
+    touching: FloatArray,
     free: NDArray[np.bool_],
 ) -> float:
     """Return the force that nothing bears, rms over the free vertices, as a share of a vertex's weight.
@@ -106,7 +106,7 @@ def left_over_force(
         body: What it lies on.
         nearest: The places of the body that are nearest to the vertices, with signed distances.
         friction: Coulomb coefficient.
-        touching: Distance at which a vertex may be borne by the body [m].
+        touching: Distance at which each vertex may be borne by the body [m], shape (V,).
         free: Which vertices to look at, shape (V,).
     """
     left = weave.forces(positions)
@@ -123,7 +123,7 @@ def left_over_force(
         left[held] = left_by_one(forces[held], outward[held], friction)
         much = np.linalg.norm(left, axis=1) > _MUCH * GRAVITY * weave.mass
         (between,) = np.nonzero(held & much)  # two flanks, perhaps
-        owner, pushes = flanks(body, positions[between], inside[between], touching)
+        owner, pushes = flanks(body, positions[between], inside[between], touching[between])
         first = np.searchsorted(owner, np.arange(len(between) + 1))
         for i, start, end in zip(between, first[:-1], first[1:], strict=True):
             if end - start > 1 and np.ptp(pushes[start:end], axis=0).max() > _ALIKE:

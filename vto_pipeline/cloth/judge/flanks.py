@@ -13,7 +13,7 @@ _SAME = 1e-9  # m: what differs by less is one distance
 
 
 def flanks(
-    body: TriangleMesh, points: FloatArray, inside: NDArray[np.bool_], within: float
+    body: TriangleMesh, points: FloatArray, inside: NDArray[np.bool_], within: FloatArray
 ) -> tuple[IntArray, FloatArray]:
     """Return the directions in which a body's surface may push points: those in which its distance has a minimum.
 
@@ -21,7 +21,7 @@ def flanks(
         body: Triangles oriented outward.
         points: [m], shape (N, 3).
         inside: Which points are inside the body, shape (N,).
-        within: What is farther away does not push [m].
+        within: What is farther away does not push each of them [m], shape (N,).
 
     Returns:
         Which point, shape (K,), in order; and a unit vector outward, shape (K, 3). A place at which several triangles
@@ -37,7 +37,7 @@ def flanks(
     place = np.asarray(trimesh.triangles.closest_point(corners[face], points[owner])).reshape(-1, 3)
     away = points[owner] - place
     distance = np.linalg.norm(away, axis=1)
-    near = (distance <= within) & (distance > 0.0)
+    near = (distance <= within[owner]) & (distance > 0.0)
     owner, face, place, away, distance = owner[near], face[near], place[near], away[near], distance[near]
 
     one, other = _of_one_point(owner)
@@ -53,18 +53,20 @@ def flanks(
     return owner[chosen], outward[chosen]
 
 
-def _in_reach(corners: FloatArray, points: FloatArray, within: float) -> tuple[IntArray, IntArray]:
+def _in_reach(corners: FloatArray, points: FloatArray, within: FloatArray) -> tuple[IntArray, IntArray]:
     """Return pairs of points, in order, and of triangles that may be this near, both of shape (K,)."""
     middle = corners.mean(axis=1)
     radius = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
-    tree = cKDTree(points)
     size = np.ceil(np.log2(radius))
     found = []
     for octave in np.unique(size):  # else one long triangle would bring every other near to everything
         (faces,) = np.nonzero(size == octave)
-        apart = cKDTree(middle[faces]).sparse_distance_matrix(tree, within + 2.0**octave, output_type="ndarray")
-        near = apart["v"] <= within + radius[faces[apart["i"]]]
-        found.append(np.column_stack([apart["j"][near], faces[apart["i"][near]]]))
+        about = cKDTree(middle[faces]).query_ball_point(points, within + 2.0**octave)
+        owner = np.repeat(np.arange(len(points)), [len(one) for one in about])
+        face = faces[np.concatenate([*about, []]).astype(np.int64)]
+        apart = np.linalg.norm(points[owner] - middle[face], axis=1)
+        near = apart <= within[owner] + radius[face]
+        found.append(np.column_stack([owner[near], face[near]]))
     pairs = np.vstack([np.zeros((0, 2), np.int64), *found])
     pairs = pairs[np.lexsort(pairs.T[::-1])].astype(np.int32)
     return pairs[:, 0], pairs[:, 1]
