@@ -39,6 +39,24 @@ def test_the_second_tape_spans_hollows() -> None:
         slice_girth(mesh, 3.0)
 
 
+def test_the_second_tape_goes_round_a_trunk_whose_arms_are_cut_off() -> None:
+    """An arm grown to the trunk is part of its loop; without it the section is in two pieces, and both count."""
+    trunk = trimesh.creation.box((0.4, 1.0, 0.3))
+    arm = trimesh.creation.box((0.2, 0.2, 0.1), trimesh.transformations.translation_matrix((0.3, 0, 0)))
+    other = arm.copy()
+    other.apply_translation((-0.6, 0, 0))
+    body = trimesh.boolean.union([trunk, arm, other])
+    beside = (np.abs(body.triangles_center[:, 0]) > 0.19999) & (np.abs(body.triangles_center[:, 1]) < 0.1001)
+    assert_allclose(
+        slice_girth(TriangleMesh(body.vertices, body.faces), 0.01),
+        2 * (np.hypot(0.2, 0.1) * 2 + 0.5),
+        rtol=0,
+        atol=1e-6,
+    )
+    armless = TriangleMesh(body.vertices, body.faces[~beside])
+    assert_allclose(slice_girth(armless, 0.01, armless=True), 2 * (0.4 + 0.3), rtol=0, atol=1e-6)
+
+
 def test_a_poor_scan_is_as_poor_as_it_says() -> None:
     body = person("female", 4)
     cloud = cloud_of(body, 4, count=6000)
@@ -96,12 +114,14 @@ def test_the_plot_takes_every_kind_of_row() -> None:
     scans = [row("a", "points", s, surface_mean_mm=1 / s, girth_mm=3 / s) for s in (1.0, 2.0)]
     others = [
         row("large girths", "repeated scan", 1.0, spread_mm=0.4, group_limit_mm=9.0),
-        row("female", "tape", 1.0, asked_mm=0.2, unasked_mae_mm=9.0),
+        row("female", "tape", 1.0, asked_mm=0.2, unasked_mae_mm=9.0, unasked_mae_by_the_mean_mm=20.0),
+        row("male", "silhouettes", 1.0, chest_girth_mae_mm=9.0, inside_interval_share=0.9),
+        row("drawn", "scan", 1.0, girths_inside_share=0.96, calf_girth_inside_share=0.9),
     ]
     whole = Image.open(BytesIO(draw_body({"bench": "body", "rows": scans + others})))
     half = Image.open(BytesIO(draw_body({"bench": "body", "rows": others})))
-    assert whole.size == (2200, 1440)
-    assert half.size == (2200, 720)
+    assert whole.size == (2400, 3 * 680)
+    assert half.size == (2400, 2 * 680)
     with pytest.raises(InputError, match="none of a body"):
         draw_body({"bench": "body", "rows": [row("x", "y", 1.0, other=1.0)]})
     assert BENCHES["body"].draw is draw_body

@@ -29,14 +29,14 @@ def test_what_buckles_slowly_is_not_called_at_rest():
     assert_allclose(lengths, 0.6, rtol=1e-4)  # free of force: nothing else bears it
     assert_allclose(np.hypot(*found.state.positions[1, 1:]), np.sqrt(0.6**2 - 0.5**2), rtol=1e-4)
     waiting = [row.error_mm for row in found.trace if row.error_mm < np.inf][:20]
-    assert min(waiting) >= 1.0  # it hardly moves, and no less is promised
+    assert min(waiting) >= 3.0  # it hardly moves, and no less is promised
 
 
 def test_coarse_answers_are_not_waited_for():
     stepper, start = pressed_springs(1e-8)
-    found = settle(stepper, start, SettleLimits(2e-3, 0.01, 100.0, 320))
+    found = settle(stepper, start, SettleLimits(4e-3, 0.01, 100.0, 320))
     assert found.settled
-    assert found.error == 1e-3  # and told that it may be off by as much
+    assert found.error == 3e-3  # and told that it may be off by as much
     assert len(found.trace) < 20
 
 

@@ -30,7 +30,7 @@ def draw_bodies() -> ByteArray:
             body = fit_measurements(
                 Measurements({"stature": stature, "chest_girth": _chest(letter, sex)}, sex=sex)
             ).mesh
-            for side, width in ((FRONT, 330), (LEFT, 170), (BACK, 330)):
+            for side, width in ((FRONT, 370), (LEFT, 170), (BACK, 370)):
                 size = (width, _TALL_PX)
                 views.append(
                     render_picture(

@@ -27,6 +27,9 @@ def clear_of_body(
 ) -> tuple[ClothState, IntArray]:
     """Thicken and relax until no triangle of the cloth meets the body, the rounds are spent, or bring nothing.
 
+    Cloth so soft that nothing but friction holds it up would flow down the body: what sliding does not clear is tried
+    once more without.
+
     Args:
         stepper: The cloth among its colliders; its skin is raised, and friction as it was at the end.
         state: The cloth.
@@ -37,6 +40,17 @@ def clear_of_body(
     Returns:
         The state, and the pairs (cloth face, body face) still meeting, shape (K, 2).
     """
+    skin, known = stepper.skin.copy(), stepper.known
+    cleared, pairs = _thicken(stepper, state, faces, body, rounds, slides=True)
+    if len(pairs) > 0 and rounds > 0:
+        stepper.skin, stepper.known = skin, known
+        cleared, pairs = _thicken(stepper, state, faces, body, rounds, slides=False)
+    return cleared, pairs
+
+
+def _thicken(
+    stepper: Stepper, state: ClothState, faces: IntArray, body: TriangleMesh, rounds: int, *, slides: bool
+) -> tuple[ClothState, IntArray]:
     pairs = intersecting_faces(TriangleMesh(state.positions, faces), body)
     fewest, since = len(pairs), 0
     for _ in range(rounds):
@@ -44,7 +58,7 @@ def clear_of_body(
             break
         about = np.unique(faces[pairs[:, 0]])
         stepper.skin[about] += np.maximum(_THICKEN, _FASTER * stepper.skin[about])
-        stepper.loose[about] = True
+        stepper.loose[about] = slides
         state = stepper.run(state, _RELAX)
         pairs = intersecting_faces(TriangleMesh(state.positions, faces), body)
         fewest, since = min(fewest, len(pairs)), 0 if len(pairs) < fewest else since + 1

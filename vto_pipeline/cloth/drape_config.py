@@ -46,7 +46,7 @@ class DrapeConfig(StepConfig, PlaceConfig, Materials):
         None, gt=0, description="Wall time after which to stop settling [s]; none by default"
     )
     clear_rounds: int = Field(
-        15, ge=0, le=1000, description="Rounds of thickening the skin where triangles still cross"
+        30, ge=0, le=1000, description="Rounds, at most, of thickening the skin where triangles still cross"
     )
     stretch_limit: float = Field(
         0.1, gt=0, le=10, description="Stretch beyond rest above which a garment counts as too small [share]"

@@ -17,7 +17,8 @@ from vto_pipeline.model.cloth import TraceRow
 _QUIET = 3  # looks in a row under the bound: an oscillating cloth stands still for an instant at each turn
 _COARSE = 2.0  # times the bound: waiting longer for a coarse answer, itself in error by more, is waste
 _STILL, _LONG = 1e-4, 10  # m, looks in a row: what stays within that is at rest, whatever forces contacts argue about
-_VAGUE = 1e-3  # m: what is not known to be stable may still buckle by as much
+_VAGUE = 3e-3  # m: what is not known to be stable may still buckle by as much, as dresses of `vto bench drape` do
+_NEAR = 1e-3  # m a look: slow enough to ask whether it is
 _SLOWEST = 0.95  # a decay slower than this cannot be told from none
 
 
@@ -121,7 +122,7 @@ def settle(
         balanced = result.residual < limits.residual or not exact or still >= _LONG
         quiet = quiet + 1 if to_come < bound and balanced and (whole or not stepper.definite) else 0
         if stepper.polishes and limits.error < _VAGUE:
-            polish.choose(moves[-1] < _VAGUE and balanced, residual)
+            polish.choose(moves[-1] < _NEAR and balanced, residual)
         if quiet < (1 if exact and residual < limits.residual else _QUIET):  # at a turn of its way forces are large
             continue
         if result.error <= limits.error:
