@@ -46,7 +46,7 @@ def double_vest(through=0.0):
 
 def test_a_vest_comes_to_rest_on_the_pear():
     job = Job()
-    found = drape(vest(), pear(), fabric(bending=1e-5), {**QUICK, "settle_seconds": 4.0}, job)
+    found = drape(vest(), pear(), fabric(bending=1e-5), {"settle_seconds": 4.0, "target_error_mm": 2.0}, job)
     assert found.audit["finite"] is True
     assert found.audit["settled"] is True
     assert found.audit["mode"] == job.metrics["mode"] == "same_garment"
@@ -56,7 +56,7 @@ def test_a_vest_comes_to_rest_on_the_pear():
     assert -0.1 < found.mesh.vertices[:, 1].min() < 0.05  # it hangs on the pear and has not fallen
     assert len(found.trace) > 4
     assert np.all(np.diff([row.step for row in found.trace]) > 0)
-    assert job.metrics["error_mm"] < 3.0
+    assert job.metrics["error_mm"] < 2.0
     assert ("riding along with the body", "the body is at rest") in job.left_out
 
 

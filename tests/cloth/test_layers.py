@@ -33,8 +33,9 @@ def pear(swell=1.0):
 
 
 def vest(name, radius=0.115, low=0.0, high=0.2, **kinds):
+    """A tight tube, stiff enough not to wrinkle within an edge's length: softer ones end in no stable place."""
     mesh = tube(radius, high - low, 40, 10, base=low)
-    return Layer(name, Garment(mesh, RestShape(mesh.vertices)), fabric(bending=1e-5, **kinds))
+    return Layer(name, Garment(mesh, RestShape(mesh.vertices)), fabric(bending=1e-4, **kinds))
 
 
 def together(outfit):

@@ -201,7 +201,7 @@ def test_the_judge_sees_balance_and_the_want_of_it():
     weave = fabric(stretch=60.0, shear=60.0)
     top = tuple(range(7))
     found = cloth.simulate(
-        mesh, weave, pinned=top, seconds=20.0, settings={"until": "rest", "target_error_mm": 1.0, "damping": 8.0}
+        mesh, weave, pinned=top, seconds=20.0, settings={"until": "rest", "target_error_mm": 4.0, "damping": 8.0}
     )
     hung = TriangleMesh(found.positions, mesh.faces)
     calm = judged(hung, mesh.vertices, fabric=weave, pinned=top)
