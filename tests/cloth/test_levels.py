@@ -5,7 +5,7 @@ import pytest
 from cloth_scenes import fabric, tube
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
-from test_drape import pear, vest
+from test_drape import double_vest, pear, vest
 
 import vto_pipeline.cloth.levels as levels_module
 from vto_pipeline.cloth.coarser import coarser
@@ -97,3 +97,17 @@ def test_a_garment_that_cannot_be_made_coarser_is_draped_as_it_is(monkeypatch):
     found = drape(vest(), pear(), fabric(), {"settle_seconds": 0.1, "coarsen_above": 1000}, job)
     assert {row.level for row in found.trace} == {0}
     assert "remeshing broke the surface" in dict(job.left_out)["coming to rest on a coarser mesh first"]
+
+
+@pytest.mark.parametrize(("garment", "levels"), [(vest(), {0, 1}), (double_vest(), {0})])
+def test_what_cannot_be_freed_on_a_coarse_mesh_begins_on_the_first_that_can(garment, levels):
+    job = Job()
+    found = drape(
+        garment, pear(), fabric(bending=1e-5), {**SETTINGS, "target_error_mm": 4.0, "coarsen_above": 100}, job
+    )
+    given_up = [why for what, why in job.left_out if what.startswith("coming to rest on ")]
+    assert len(given_up) > 1
+    assert all("too few to be freed from the body" in why for why in given_up)
+    assert {row.level for row in found.trace} == levels
+    assert found.audit["settled"] is True
+    assert found.audit["body_intersections"] == found.audit["self_intersections"] == 0

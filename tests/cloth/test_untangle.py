@@ -281,3 +281,13 @@ def test_smoothing_takes_spikes_out_and_touches_nothing_else(rings):
     assert moved_ones.tolist() == [40]
     spiked[41, 1] = 0.01
     assert (smoothed(spiked, laplacian(mesh)[0], np.array([40]), rings)[41, 1] == 0.01) == (rings == 1)
+
+
+def test_smoothing_leaves_pieces_alone_of_which_nothing_would_stay():
+    one, other = sheet(9, 9, 0.1, 0.1, False), sheet(3, 3, 0.1, 0.1, False)
+    mesh = TriangleMesh(np.vstack([one.vertices, other.vertices]), np.vstack([one.faces, other.faces + 81]))
+    spiked = mesh.vertices.copy()
+    spiked[[40, 85], 1] += 0.03
+    found = smoothed(spiked, laplacian(mesh)[0], np.array([40, 85]), 3)  # of the small one, all is near
+    assert_allclose(found[:81], one.vertices, rtol=0, atol=1e-12)
+    assert (found[81:] == spiked[81:]).all()

@@ -92,23 +92,32 @@ class _Descent:
         start = self._coarser[-1].garment if self._coarser else self._garment
         for level in range(len(self._coarser), 0, -1):
             now = time.perf_counter()
+            finer = self._coarser[level - 2].garment if level > 1 else self._garment
             found = self._rest_on(level, start, body, now + _FIRST * (deadline - now))
+            if found is None:
+                self._coarser.pop()
+                start = finer
+                continue
             trace += found.settling.trace
             before += (found.phases,)
             self._job.note(
                 f"came to rest on {len(start.mesh.vertices)} vertices first: {time.perf_counter() - now:.1f} s, "
                 f"{found.stepper.steps} steps"
             )
-            finer = self._coarser[level - 2].garment if level > 1 else self._garment
             there = self._coarser[level - 1].finer(found.settling.state.positions)
             start = Garment(TriangleMesh(there, finer.mesh.faces), finer.rest)
             body = MovingBody(body.keyframes[-1:], body.faces)
         reached = self._rest_on(0, start, body, deadline)
+        assert reached is not None  # only coarser ones are given up
         reached.settling.trace[:0] = trace
         return reached._replace(before=before)
 
-    def _rest_on(self, level: int, garment: Garment, body: MovingBody, deadline: float) -> Reached:
-        """Return the garment at rest on one mesh: 0 is its own, the last the coarsest."""
+    def _rest_on(self, level: int, garment: Garment, body: MovingBody, deadline: float) -> Reached | None:
+        """Return the garment at rest on one mesh: 0 is its own, the last the coarsest.
+
+        None where that is coarser and too coarse to be freed from the body: between large triangles that pass through
+        it, layers would be wedged, and never come to rest.
+        """
         model, config, job = self._model, self._config, self._job
         if level > 0:
             config, job = self._rough, self._part(level)
@@ -118,6 +127,12 @@ class _Descent:
         state = phases.free(at_rest(garment.mesh.vertices))
         if level == len(self._coarser):  # the others start outside the body, but for corners that edges have cut
             state = phases.free(phases.grow(state, first), first)
+            if level > 0 and phases.left > 0:
+                self._job.leave_out(
+                    f"coming to rest on {len(model.mass)} vertices first",
+                    f"too few to be freed from the body: {phases.left} pairs of triangles still meet",
+                )
+                return None
         collider = phases.collider(body, TriangleMesh(state.positions, model.faces))
         stepper = phases.stepper(model, collider, config.damping)
         stepper.prepare(state.positions)

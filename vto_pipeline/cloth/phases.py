@@ -45,6 +45,9 @@ class Phases:
         fabric: What it is made of.
         config: All settings.
         job: For progress, findings and what was left out.
+
+    Attributes:
+        left: Pairs of triangles that still met after it was last freed.
     """
 
     def __init__(self, model: ClothModel, rest: RestShape, fabric: Fabric, config: DrapeConfig, job: Job) -> None:
@@ -55,6 +58,7 @@ class Phases:
         self._skin = default_skin(model.edge_length) if config.skin_mm is None else 1e-3 * config.skin_mm
         self._config = config
         self._job = job
+        self.left = 0
         self._crossed = np.zeros(len(model.mass), np.bool_)
         self._tallies: list[Tally] = []
         self._colliders: list[PacedBody] = []
@@ -66,7 +70,7 @@ class Phases:
         start = free_start(
             state.positions, self._model.faces, self._rest.positions, self._fabric.thickness, self._job, body
         )
-        self._crossed = start.crossed
+        self.left, self._crossed = start.left, start.crossed
         if start.pairs == 0:
             return state
         return replace(state, positions=start.positions, velocities=np.zeros_like(state.velocities))
