@@ -43,7 +43,7 @@ format: $(READY)  ## Bring the source into form
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-bench: $(READY)  ## Measure error against run time (hours; `vto bench NAME --quick` takes a minute)
+bench: $(READY)  ## Measure error against run time (hours; `vto bench NAME --quick` takes minutes)
 	$(BIN)/vto bench solvers integrators stability physics collision drape body scaling
 
 sample-data: $(READY)  ## Generate sample_data/ again

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     metavar="DIR",
     help="Folder for NAME.json and NAME.png.",
 )
-@click.option("--quick", is_flag=True, help="Fewer and smaller points, under a minute each.")
+@click.option("--quick", is_flag=True, help="Fewer and smaller points, in minutes.")
 @click.option("--force", is_flag=True, help="Measure again what an earlier run has measured.")
 @click.option(
     "--against", type=PATH, metavar="FILE.jsonl", help="Rows of other programs on the same scenes, for solvers."
