@@ -28,7 +28,7 @@ def clear_of_body(
     """Thicken and relax until no triangle of the cloth meets the body, the rounds are spent, or bring nothing.
 
     Cloth so soft that nothing but friction holds it up would flow down the body: what sliding does not clear is tried
-    once more without.
+    once more with friction.
 
     Args:
         stepper: The cloth among its colliders; its skin is raised, and friction as it was at the end.
