@@ -1,4 +1,7 @@
-"""A real T-shirt on real bodies it was never on; judged by ipctk. `pytest --log-cli-level=info` shows the seconds, compiling apart."""
+"""A real T-shirt on real bodies it was never on; judged by ipctk.
+
+`pytest --log-cli-level=info` shows the seconds, compiling apart.
+"""
 
 import logging
 import time
