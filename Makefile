@@ -5,11 +5,17 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11 python3.10; 
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.installed
+WORKERS ?= auto
+
+BENCHES := solvers integrators stability physics collision drape body scaling
+SAMPLE_RUNS := demo garment_from_depth garment_from_cloud body_from_measurements body_from_silhouettes body_from_cloud \
+	body_from_depth
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo test test-all check format bench sample-data clean
+.PHONY: help install demo test test-all test-processors check-demo check format docs bench figures first-run sample-data \
+	clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -28,23 +34,47 @@ demo: $(READY)  ## Dress a customer in a shirt from photos (about 10 minutes on 
 	@echo "Look at it: $(CURDIR)/runs/demo/out/page.html"
 
 test: check  ## Check, and run every test that is not slow
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
 
 test-all: check  ## Check, and run all tests
-	$(BIN)/python -m pytest -m ""
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m ""
 
-check: $(READY)  ## Lint, format, types, layers
+test-processors: $(READY)  ## Run the tests as other processors compute (an hour; NAMES="generic x86-64-v3" for some)
+	.ci/processors $(NAMES)
+
+check-demo: $(READY)  ## Run the sample documents from photos, depth, cloud and mesh to the page, against their bars
+	$(BIN)/python -m pytest -m check_demo --basetemp runs/check
+
+check: $(READY)  ## Lint, format, types, layers, spelling, pages
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/codespell
+	$(BIN)/python -m vto_pipeline.bench.docs --check
 
 format: $(READY)  ## Bring the source into form
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
+docs: $(READY)  ## Write README.md and docs/ from docs/source and docs/results
+	$(BIN)/python -m vto_pipeline.bench.docs
+
 bench: $(READY)  ## Measure error against run time (hours; `vto bench NAME --quick` takes minutes)
-	$(BIN)/vto bench solvers integrators stability physics collision drape body scaling
+	$(BIN)/vto bench $(BENCHES)
+
+figures: $(READY)  ## Measure what the pages quote again (under an hour on a quiet machine), and write the pages
+	$(BIN)/vto bench $(BENCHES) --quick --out docs/results
+	for name in $(SAMPLE_RUNS); do \
+		$(BIN)/vto run configs/$$name.yaml -o runs/$$name && \
+		$(BIN)/python -m vto_pipeline.bench runs/$$name --results docs/results || exit; done
+	$(BIN)/python -m vto_pipeline.bench.docs
+
+first-run:  ## In a fresh clone: clock `make demo` and `make test` from nothing
+	@test ! -e $(VENV) || { echo "error: $(VENV) is there; wanted a fresh clone" >&2; exit 2; }
+	@began=$$(date +%s) && $(MAKE) demo && demo=$$(($$(date +%s) - began)) && \
+		$(MAKE) test && test=$$(($$(date +%s) - began - demo)) && \
+		$(BIN)/python -m vto_pipeline.bench.first_run --demo $$demo --test $$test
 
 sample-data: $(READY)  ## Generate sample_data/ again
 	$(BIN)/python -m vto_pipeline.bench.samples --out sample_data

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from vto_pipeline.numerics.block_matrix import BlockMatrix, pattern, to_scipy
+from vto_pipeline.numerics.linear.block_matrix import BlockMatrix, pattern, to_scipy
 
 
 def sheet(count: int, rng: np.random.Generator, reach: int = 1) -> BlockMatrix:

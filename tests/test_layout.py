@@ -5,7 +5,10 @@ from __future__ import annotations
 import ast
 import inspect
 import pickle
+import re
 import statistics
+from collections.abc import Iterator, Mapping
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -15,6 +18,7 @@ from vto_pipeline.cli.work import catalogue, planned
 
 ROOT = Path(__file__).parents[1]
 MODULES = sorted((ROOT / "vto_pipeline").rglob("*.py"))
+FOLDERS = sorted({path.parent for path in MODULES})
 CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
 FAMILY = [kind for _, kind in inspect.getmembers(errors, inspect.isclass) if kind.__module__ == errors.__name__]
 BANNED = {"utils", "helpers", "common", "manager", "core", "misc"}
@@ -24,6 +28,62 @@ def test_files_stay_short():
     lengths = {path: len(path.read_text().splitlines()) for path in MODULES}
     assert {path.name: length for path, length in lengths.items() if length > 400} == {}
     assert 20 < statistics.median(length for length in lengths.values() if length > 1) < 150
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_folders_stay_small_and_have_a_map(folder):
+    rooms = [path for path in folder.iterdir() if path.is_dir() and (path / "__init__.py").exists()]
+    files = [path for path in folder.glob("*.py") if path.stem not in {"__init__", "__main__"}]
+    assert len(files) <= 15
+    assert len(rooms) <= 15
+    if folder.parent != ROOT and len(files) + len(rooms) > 1:
+        said = set(re.findall(r"\w+", (folder / "__init__.py").read_text()))
+        assert {path.stem for path in files + rooms} - said == set(), "__init__ is the folder's map"
+
+
+def test_no_circle_of_imports():
+    imports = {dotted(path): set(imported(path)) for path in MODULES}
+    assert circle(imports) is None
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_no_circle_between_the_rooms_of_a_folder(folder):
+    rooms: dict[str, set[str]] = {}
+    inside = dotted(folder / "__init__.py") + "."
+    for path in folder.glob("*/**/*.py"):
+        room = path.relative_to(folder).parts[0]
+        used = {name[len(inside) :].split(".")[0] for name in imported(path) if name.startswith(inside)}
+        rooms.setdefault(room, set()).update(name for name in used if name != room and (folder / name).is_dir())
+    assert circle(rooms) is None
+
+
+def test_a_circle_would_be_seen():
+    assert circle({"a": {"b"}, "b": {"c"}, "c": set()}) is None
+    assert set(circle({"a": {"b"}, "b": {"c"}, "c": {"a"}})) == {"a", "b", "c"}
+
+
+def dotted(path: Path) -> str:
+    """Name of a module as it is imported."""
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+
+
+def imported(path: Path) -> Iterator[str]:
+    """Yield the modules of the package that a file imports, at its top or inside a function."""
+    known = {dotted(other) for other in MODULES}
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            for alias in node.names:
+                full = f"{node.module}.{alias.name}"
+                yield from {full if full in known else node.module} & known - {dotted(path)}
+
+
+def circle(imports: Mapping[str, set[str]]) -> list[str] | None:
+    """Return a circle of a graph, or None."""
+    try:
+        TopologicalSorter(imports).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return None
 
 
 def test_no_room_for_odds_and_ends():

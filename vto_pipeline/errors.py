@@ -38,13 +38,13 @@ class ConfigError(VtoError):
 
 
 class PlanError(VtoError):
-    """What is wanted cannot be made from what is given, or can be made in two ways."""
+    """A wanted artifact cannot be made from the inputs, or can be made in two ways."""
 
     exit_code = 2
 
 
 class InputError(VtoError):
-    """An input is missing, unreadable, or does not hold what it should."""
+    """An input is missing, unreadable, or lacks what it should hold."""
 
     exit_code = 3
 
@@ -78,7 +78,7 @@ class GarmentError(ComputationError):
 
 
 class AvatarError(ComputationError):
-    """No believable body explains what was given."""
+    """No plausible body explains the input."""
 
 
 class SimulationError(ComputationError):
@@ -86,7 +86,11 @@ class SimulationError(ComputationError):
 
 
 class DivergedError(SimulationError):
-    """Positions or energies left every bound."""
+    """Positions or energies grew without bound."""
+
+
+class FallenError(SimulationError):
+    """Nothing holds the garment: it fell off the body."""
 
 
 class IntersectingError(SimulationError):
@@ -97,9 +101,3 @@ class MissingDependencyError(VtoError):
     """A library or a system package is not installed."""
 
     exit_code = 5
-
-
-class BatchError(VtoError):
-    """A batch ended with failed rows."""
-
-    exit_code = 6

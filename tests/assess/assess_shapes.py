@@ -45,15 +45,6 @@ def sphere(radius: float, rings: int = 64) -> TriangleMesh:
     return TriangleMesh(vertices, np.vstack([quads, *caps]))
 
 
-def joined(*meshes: TriangleMesh) -> TriangleMesh:
-    """Several meshes as one."""
-    starts = np.cumsum([0, *(len(m.vertices) for m in meshes[:-1])])
-    return TriangleMesh(
-        np.vstack([m.vertices for m in meshes]),
-        np.vstack([m.faces + s for m, s in zip(meshes, starts, strict=True)]),
-    )
-
-
 def shifted(mesh: TriangleMesh, offset: tuple[float, float, float]) -> TriangleMesh:
     """The mesh elsewhere."""
     return TriangleMesh(mesh.vertices + np.asarray(offset), mesh.faces)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from assess_shapes import joined, shifted, tube
+from assess_shapes import shifted, tube
 from numpy.testing import assert_allclose
 from scipy.special import ellipe
 
 from vto_pipeline.assess.ease import ease_at
 from vto_pipeline.assess.zones import ease_at_levels, ease_at_openings
+from vto_pipeline.geometry.topology import concatenate
 from vto_pipeline.model.mesh import TriangleMesh
 
 UP = np.array([0.0, 1.0, 0.0])
@@ -73,9 +74,9 @@ def test_the_tape_bridges_a_hollow() -> None:
 def test_arms_beside_the_trunk_do_not_count() -> None:
     trunk = tube(0.15, 0.12, 0.0, 1.8)
     arm = tube(0.05, 0.05, 0.6, 1.4)
-    body = joined(trunk, shifted(arm, (0.3, 0, 0)), shifted(arm, (-0.3, 0, 0)))
+    body = concatenate([trunk, shifted(arm, (0.3, 0, 0)), shifted(arm, (-0.3, 0, 0))])
     sleeve = tube(0.06, 0.06, 0.9, 1.4)
-    garment = joined(tube(0.17, 0.14, 0.5, 1.5), shifted(sleeve, (0.3, 0, 0)), shifted(sleeve, (-0.3, 0, 0)))
+    garment = concatenate([tube(0.17, 0.14, 0.5, 1.5), shifted(sleeve, (0.3, 0, 0)), shifted(sleeve, (-0.3, 0, 0))])
     found = at(garment, body, 1.1)
     assert_allclose(
         found.ease, ellipse_perimeter(0.17, 0.14) - ellipse_perimeter(0.15, 0.12), rtol=1e-3, err_msg="256-gon"

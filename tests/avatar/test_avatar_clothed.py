@@ -8,10 +8,10 @@ from body_judges import distances, inside
 
 from vto_pipeline.avatar.from_scan import ScanConfig, fit_scan
 from vto_pipeline.avatar.measure import measure
-from vto_pipeline.avatar.pose import joint_transforms
-from vto_pipeline.avatar.template import JOINTS
+from vto_pipeline.avatar.model.pose import joint_transforms
+from vto_pipeline.avatar.template.template import JOINTS
 from vto_pipeline.bench.body.clothed import dressed, someone
-from vto_pipeline.io.bodies import write_measurements
+from vto_pipeline.io.bodies.measurements import write_measurements
 from vto_pipeline.model.body import Avatar
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -22,8 +22,12 @@ EASE = 0.020  # at the least, in radius: 13 cm of girth
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("sex", "seed"), [("female", 100), ("male", 101)])
+@pytest.mark.parametrize(("sex", "seed"), [("female", 100), ("male", 101), ("male", 105)])
 def test_the_body_inside_loose_clothes(sex: str, seed: int, tmp_path) -> None:
+    """The last has a chest of 104 cm on a waist of 78: no shirt shows that, and his waist comes out 10 cm too large.
+
+    Two of his eleven girths are outside their intervals, waist and navel, each by less than half as much again.
+    """
     body = someone(sex, seed)
     scan = dressed(body, EASE)
     job = Job()

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from vto_pipeline.avatar.from_measurements import fit_measurements
-from vto_pipeline.io.size_letters import chest_range
+from vto_pipeline.io.bodies.size_letters import chest_range
 from vto_pipeline.model.body import Avatar, Measurements
 
 STEP_M = 0.015

@@ -9,10 +9,10 @@ import trimesh
 from body_judges import crossing, independent_girth
 from numpy.testing import assert_allclose
 
-from vto_pipeline.avatar import population as population_module
 from vto_pipeline.avatar.from_measurements import MeasurementsConfig, fit_measurements
 from vto_pipeline.avatar.measure import measure
-from vto_pipeline.avatar.population import complete, population
+from vto_pipeline.avatar.measuring import population as population_module
+from vto_pipeline.avatar.measuring.population import complete, population
 from vto_pipeline.errors import AvatarError, InputError
 from vto_pipeline.model.body import Measurements
 from vto_pipeline.model.job import Job

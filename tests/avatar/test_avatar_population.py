@@ -13,9 +13,9 @@ from scipy.spatial import ConvexHull
 
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.measure import measure
-from vto_pipeline.avatar.population import complete, population
-from vto_pipeline.avatar.tape import DENSITY_KG_M3
-from vto_pipeline.avatar.template import beyond_armscye, template
+from vto_pipeline.avatar.measuring.population import complete, population
+from vto_pipeline.avatar.measuring.tape import DENSITY_KG_M3
+from vto_pipeline.avatar.template.template import beyond_armscye, template
 from vto_pipeline.model.body import Measurements
 from vto_pipeline.model.job import Job
 
@@ -150,32 +150,39 @@ def test_sizes(sex: str, letter: str) -> None:
     assert not misses(sex, of_size(sex, letter))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "seed",
-    [
-        0,
-        1,
-        pytest.param(2, marks=pytest.mark.xfail(strict=True, reason="one of 50: a volume 9.2 % too large")),
-        *range(3, 8),
-    ],
-)
-def test_people(seed: int) -> None:
-    assert not {k: m for k, (sex, tape) in enumerate(people(50, seed)) if (m := misses(sex, tape))}
+def all_misses(drawn: list[list[tuple[str, dict[str, float]]]]) -> dict[tuple[int, int], dict[str, float]]:
+    """What is wrong with whom, by seed and number."""
+    found = {(seed, k): misses(*one) for seed, group in enumerate(drawn) for k, one in enumerate(group)}
+    return {who: wrong for who, wrong in found.items() if wrong}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "seed",
-    [
-        0,
-        1,
-        pytest.param(2, marks=pytest.mark.xfail(strict=True, reason="1.90 m, 157 kg: legs joined at the thigh's row")),
-        pytest.param(3, marks=pytest.mark.xfail(strict=True, reason="1.49 m, 53 kg: a volume 8.5 % too small")),
-    ],
-)
-def test_all_shapes(seed: int) -> None:
-    assert not {k: m for k, (sex, tape) in enumerate(all_shapes(50, seed)) if (m := misses(sex, tape))}
+def test_people() -> None:
+    """Of 400 drawn at most 1 % miss, and these only their volume: girths and lengths are given, the volume follows.
+
+    A small woman of 43 kg is 9.2 % too large: her tape says more of her size than of how bony she is.
+    """
+    found = all_misses([people(50, seed) for seed in range(8)])
+    assert len(found) <= 4, found
+    assert all(set(wrong) == {"volume"} and abs(wrong["volume"]) < 0.10 for wrong in found.values()), found
+
+
+@pytest.mark.slow
+def test_all_shapes() -> None:
+    """Of 200 spread evenly over stature and mass at most 2 % miss, and nobody by much.
+
+    The causes are two: a volume that follows from the tape up to 9 % off, and thighs of more than 150 kg that are one
+    at the thigh's row, where a tape goes round both.
+    """
+    found = all_misses([all_shapes(50, seed) for seed in range(4)])
+    assert len(found) <= 4, found
+    drawn = {(seed, k): tape for seed in range(4) for k, (_, tape) in enumerate(all_shapes(50, seed))}
+    for who, wrong in found.items():
+        if set(wrong) == {"volume"}:
+            assert abs(wrong["volume"]) < 0.10, (who, wrong)
+        else:
+            assert drawn[who]["mass"] > 150.0, (who, wrong)
+            assert "thigh_girth" in wrong, (who, wrong)
 
 
 # ANSUR II's name for measurements that are defined alike here
@@ -265,7 +272,7 @@ def test_misses_are_told_with_what_was_reached() -> None:
     # the hips' own breadth, twice: no body has both
     tape = {"stature": 1.70, "hip_girth": 0.80, "hip_breadth": 0.50, "hip_depth": 0.40}
     fit_measurements(Measurements(tape, sex="female"), None, job)
-    assert any("hip_breadth: asked 50.0 cm, reached" in warning for warning in job.warnings)
+    assert any("hip_breadth: asked for 50.0 cm, reached" in warning for warning in job.warnings)
 
 
 def test_uncertainty_of_what_was_measured_and_of_what_was_not() -> None:

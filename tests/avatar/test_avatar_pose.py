@@ -9,8 +9,8 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from vto_pipeline.avatar.from_measurements import fit_measurements
-from vto_pipeline.avatar.pose import blend, clear_pose, joint_transforms, morph, named_pose, pose_avatar
-from vto_pipeline.avatar.template import template
+from vto_pipeline.avatar.model.pose import blend, clear_pose, joint_transforms, morph, named_pose, pose_avatar
+from vto_pipeline.avatar.template.template import template
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.intersections import self_intersections
 from vto_pipeline.model.body import Avatar, Measurements

@@ -10,25 +10,25 @@ from body_judges import crossing, distances, independent_girth
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from vto_pipeline.avatar.correspondence import closest_points
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.from_scan import ScanConfig, fit_scan
-from vto_pipeline.avatar.levels import find_levels, with_rows_at
 from vto_pipeline.avatar.measure import measure
-from vto_pipeline.avatar.pose import pose_avatar
-from vto_pipeline.avatar.registration import Fit, model
-from vto_pipeline.avatar.scan_start import upright_starts
-from vto_pipeline.avatar.settle import settle
-from vto_pipeline.avatar.shape import shape_space
-from vto_pipeline.avatar.stance import ARM, stance
-from vto_pipeline.avatar.template import beyond_armscye, membership
-from vto_pipeline.avatar.upright import in_metres, inside_out, turns_upright, without_floor
+from vto_pipeline.avatar.measuring.measuring_levels import find_levels, with_rows_at
+from vto_pipeline.avatar.model.fit import Fit, model
+from vto_pipeline.avatar.model.pose import pose_avatar
+from vto_pipeline.avatar.model.shape import shape_space
+from vto_pipeline.avatar.model.stance import ARM, stance
+from vto_pipeline.avatar.scan.bind_pose import to_bind_pose
+from vto_pipeline.avatar.scan.initial_pose import upright_initial_poses
+from vto_pipeline.avatar.scan.upright import in_metres, inside_out, turns_upright, without_floor
+from vto_pipeline.avatar.template.template import beyond_armscye, membership
 from vto_pipeline.bench.body.people import cloud_of, person
-from vto_pipeline.bench.samples.body import body_distance
 from vto_pipeline.bench.samples.customer import CELL, SHAPE
-from vto_pipeline.bench.samples.surface_nets import zero_surface
+from vto_pipeline.bench.samples.solids.body import body_distance
+from vto_pipeline.bench.samples.solids.surface_nets import zero_surface
 from vto_pipeline.errors import AvatarError
-from vto_pipeline.geometry.decimate import decimate
+from vto_pipeline.geometry.closest import closest_points
+from vto_pipeline.geometry.remeshing.decimate import decimate
 from vto_pipeline.geometry.topology import face_normals
 from vto_pipeline.model.body import Avatar, Measurements
 from vto_pipeline.model.job import Job
@@ -132,7 +132,7 @@ def test_a_ball_is_not_a_body() -> None:
 
 def test_a_size_of_no_unit_is_told() -> None:
     body = true_body()
-    with pytest.raises(AvatarError, match="in no unit"):
+    with pytest.raises(AvatarError, match="no unit of"):
         fit_scan(TriangleMesh(body.vertices * 17, body.faces))
 
 
@@ -145,9 +145,9 @@ def test_units_axes_and_floors_are_found_out() -> None:
         job = Job()
         found = in_metres(TriangleMesh(1000.0 * whole.vertices @ turn, whole.faces), job)
         assert any("millimetres" in note for note in job.notes)
-        assert any("left out" in note for note in job.notes)
+        assert any("were dropped" in note for note in job.notes)
         assert len(found.faces) == len(body.faces), "the floor is gone, the body is whole"
-        stands, _ = upright_starts(found, job)
+        stands, _ = upright_initial_poses(found, job)
         assert_allclose(stands.vertices, body.vertices, rtol=0, atol=1e-9, err_msg=name)
 
 
@@ -172,8 +172,8 @@ def test_what_is_inside_out_is_turned_over() -> None:
     """It is again the mesh that faced outwards, bit for bit, and told; what faced outwards stays."""
     body = true_body().mesh
     told, untold = Job(), Job()
-    turned, _ = upright_starts(TriangleMesh(body.vertices, body.faces[:, ::-1]), told)
-    kept, _ = upright_starts(body, untold)
+    turned, _ = upright_initial_poses(TriangleMesh(body.vertices, body.faces[:, ::-1]), told)
+    kept, _ = upright_initial_poses(body, untold)
     for found in (turned, kept):
         assert_array_equal(found.vertices, body.vertices)
         assert_array_equal(found.faces, body.faces)
@@ -251,7 +251,7 @@ def test_posture_stays_and_arms_do_not() -> None:
     fit = Fit(np.zeros(len(space.names)), pose, np.array([0.3, 0.1, -0.2]), np.zeros(len(space.names)))
     posed = model(space, fit)
     stands = stance(space, fit)
-    body, tangled = settle(space, fit, stands, posed, posed)
+    body, tangled = to_bind_pose(space, fit, stands, posed, posed)
     assert stands.stands
     assert tangled == 0
     assert_allclose(body.vertices, posed, rtol=0, atol=1e-9)

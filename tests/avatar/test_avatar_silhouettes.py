@@ -10,17 +10,17 @@ from numpy.testing import assert_allclose
 from PIL import Image
 from scipy.spatial import ConvexHull, cKDTree
 
-from vto_pipeline.avatar.backdrop import person
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.from_silhouettes import SilhouettesConfig, fit_silhouettes
 from vto_pipeline.avatar.measure import measure
-from vto_pipeline.avatar.outline import Camera, ImageOutline, model_outline
-from vto_pipeline.avatar.population import population
-from vto_pipeline.avatar.pose import joint_transforms
-from vto_pipeline.avatar.registration import Fit
-from vto_pipeline.avatar.shape import shape_space
-from vto_pipeline.avatar.silhouette_fit import View, _camera_rows, _eye_row, _feet_rows, _moved, _posture_rows
-from vto_pipeline.avatar.template import template
+from vto_pipeline.avatar.measuring.population import population
+from vto_pipeline.avatar.model.fit import Fit
+from vto_pipeline.avatar.model.pose import joint_transforms
+from vto_pipeline.avatar.model.shape import shape_space
+from vto_pipeline.avatar.silhouettes.backdrop import person
+from vto_pipeline.avatar.silhouettes.fit import View, _camera_rows, _eye_row, _feet_rows, _moved, _posture_rows
+from vto_pipeline.avatar.silhouettes.outline import Camera, ImageOutline, model_outline
+from vto_pipeline.avatar.template.template import template
 from vto_pipeline.bench.body.silhouettes import photograph as shot
 from vto_pipeline.errors import AvatarError
 from vto_pipeline.model.body import Avatar, Measurements
@@ -249,23 +249,21 @@ def test_intervals_hold_bodies_of_another_model(another_model: tuple[np.ndarray,
 
 
 @pytest.mark.parametrize(
-    ("k", "bar"),
+    ("k", "least", "most"),
     [
-        pytest.param(0, 0.025, id="chest"),
-        pytest.param(1, 0.020, id="waist"),
-        pytest.param(
-            2,
-            0.020,
-            id="hip",
-            marks=pytest.mark.xfail(strict=True, reason="exact outlines leave as much open: the test below"),
-        ),
+        pytest.param(0, 0.005, 0.025, id="chest"),
+        pytest.param(1, 0.002, 0.020, id="waist"),
+        # missed: 0.020 is asked. Exact outlines leave 0.023 open (the test below), and the seat is found too low
+        pytest.param(2, 0.020, 0.032, id="hip"),
     ],
 )
 @pytest.mark.slow
 @pytest.mark.real_data
 @pytest.mark.skipif(not BODIES.exists(), reason="shared data absent")
-def test_girths_of_bodies_of_another_model(another_model: tuple[np.ndarray, list[bool]], k: int, bar: float) -> None:
-    assert np.abs(another_model[0][:, k]).mean() < bar
+def test_girths_of_bodies_of_another_model(
+    another_model: tuple[np.ndarray, list[bool]], k: int, least: float, most: float
+) -> None:
+    assert least < np.abs(another_model[0][:, k]).mean() < most
 
 
 @pytest.mark.real_data
@@ -305,7 +303,7 @@ def test_sample_customer(sex: str) -> None:
     assert abs(job.metrics["hip_girth_m"] - true["hip_girth"]) < 0.030, "a leaning model made the picture too small"
     for girth, known in (("chest_girth", "bust_girth"), ("waist_girth", "waist_girth"), ("hip_girth", "hip_girth")):
         assert abs(job.metrics[f"{girth}_m"] - true[known]) < job.metrics[f"{girth}_interval_mm"] * 1e-3
-    assert any("rather a female" in note for note in job.notes) == (sex == "neutral")
+    assert any("fit a female" in note for note in job.notes) == (sex == "neutral")
 
 
 @pytest.mark.slow  # fits the pictures both ways round
@@ -340,7 +338,7 @@ def test_the_person_is_cut_out_to_the_pixel_before_a_shaded_backdrop() -> None:
         (backdrop(), "nothing stands out"),
         (with_figure((40, 200, 50, 90)), "cut off at the picture's bottom"),
         (with_figure((0, 190, 50, 90)), "cut off at the picture's top"),
-        (with_figure((20, 190, 10, 50), (30, 190, 90, 130)), "2 things of a person's size"),
+        (with_figure((20, 190, 10, 50), (30, 190, 90, 130)), "2 objects of a person's size"),
         (with_figure((90, 130, 50, 90)), "40 of 200 pixels tall"),
     ],
 )

@@ -9,12 +9,12 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipe
 
-from vto_pipeline.avatar.definitions import DEFINITIONS, definition
 from vto_pipeline.avatar.measure import measure
-from vto_pipeline.avatar.pose import named_pose
-from vto_pipeline.avatar.shape import shape_space
-from vto_pipeline.avatar.tape import Section, Tape
-from vto_pipeline.avatar.template import template
+from vto_pipeline.avatar.measuring.definitions import DEFINITIONS, definition
+from vto_pipeline.avatar.measuring.tape import RowSection, Tape
+from vto_pipeline.avatar.model.pose import named_pose
+from vto_pipeline.avatar.model.shape import shape_space
+from vto_pipeline.avatar.template.template import template
 from vto_pipeline.errors import InputError
 
 
@@ -34,7 +34,9 @@ def test_girth_of_a_tube_converges_to_the_ellipse(a: float, b: float) -> None:
     errors = []
     for around in (16, 32, 64):
         vertices, edges = tube(a, b, around)
-        errors.append(true - Section(vertices, np.array([2 * around]), np.array([0.0, 1.0, 0.0]), edges).hull().value)
+        errors.append(
+            true - RowSection(vertices, np.array([2 * around]), np.array([0.0, 1.0, 0.0]), edges).hull().value
+        )
     assert all(e > 0 for e in errors), "an inscribed polygon is shorter"
     rates = np.log2(np.array(errors[:-1]) / errors[1:])
     assert_allclose(rates, 2.0, rtol=0, atol=0.15)  # a chord's error falls with the square of its length

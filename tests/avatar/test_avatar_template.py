@@ -7,9 +7,9 @@ from body_judges import crossing, inside
 from numpy.testing import assert_allclose
 
 from vto_pipeline.avatar.measure import measure
-from vto_pipeline.avatar.regions import trunk
-from vto_pipeline.avatar.shape import shape_space
-from vto_pipeline.avatar.template import template
+from vto_pipeline.avatar.model.shape import shape_space
+from vto_pipeline.avatar.template.regions import trunk
+from vto_pipeline.avatar.template.template import template
 from vto_pipeline.errors import InputError
 
 # means of ANSUR II: stature, mass, chest, navel girth, hip, inside leg

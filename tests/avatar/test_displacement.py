@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from vto_pipeline.avatar.correspondence import Target
-from vto_pipeline.avatar.displacement import displace
 from vto_pipeline.avatar.from_scan import ScanConfig, fit_scan
 from vto_pipeline.avatar.measure import measure
+from vto_pipeline.avatar.scan.correspondence import Target
+from vto_pipeline.avatar.scan.displacement import displace
 from vto_pipeline.bench.body.extremes import _one_armed
 from vto_pipeline.bench.body.people import person
 from vto_pipeline.model.job import Job

@@ -7,12 +7,12 @@ from body_judges import distances
 from numpy.testing import assert_allclose
 from scipy.spatial import ConvexHull
 
-from vto_pipeline.avatar.bust import toward_bust_points
 from vto_pipeline.avatar.from_measurements import fit_measurements
-from vto_pipeline.avatar.levels import find_levels
-from vto_pipeline.avatar.likeness import likeness
-from vto_pipeline.avatar.slide import slide
-from vto_pipeline.avatar.template import membership
+from vto_pipeline.avatar.measuring.measuring_levels import find_levels
+from vto_pipeline.avatar.scan.bust_points import toward_bust_points
+from vto_pipeline.avatar.scan.misfit_correlation import likeness
+from vto_pipeline.avatar.scan.tangential_slide import slide_along_surface
+from vto_pipeline.avatar.template.template import membership
 from vto_pipeline.model.body import Avatar, Measurements
 
 
@@ -26,7 +26,7 @@ def test_a_slide_keeps_to_a_ball() -> None:
     ball = trimesh.creation.icosphere(subdivisions=4, radius=0.1)
     vertices, faces = np.asarray(ball.vertices), np.asarray(ball.faces, dtype=np.int32)
     shift = np.tile([0.0, 0.5 * ball.edges_unique_length.mean(), 0.0], (len(vertices), 1))
-    slid = slide(vertices, faces, shift)
+    slid = slide_along_surface(vertices, faces, shift)
     sagitta = 0.1 - np.linalg.norm(ball.triangles_center, axis=1)
     assert np.abs(0.1 - np.linalg.norm(slid, axis=1)).max() < 0.2 * sagitta.max()
     moved = (slid - vertices)[:, 1]
@@ -80,7 +80,7 @@ def test_bust_points_come_to_the_tips(body: Avatar) -> None:
     fine.vertices += np.outer(front * 0.005 * np.exp(-((away / 0.006) ** 2)), [0.0, 0.0, 1.0])
     tip = fine.vertices[np.argmax(np.where(away < 0.02, fine.vertices[:, 2], -1.0))]
     shift = toward_bust_points(body.bind_vertices, np.asarray(fine.vertices), body)
-    there = slide(body.bind_vertices, body.faces, shift)[body.landmarks["left_bust_point"]]
+    there = slide_along_surface(body.bind_vertices, body.faces, shift)[body.landmarks["left_bust_point"]]
     assert_allclose(there[:2], tip[:2], rtol=0, atol=0.003)
     assert np.linalg.norm((at - tip)[:2]) > 0.008
     assert np.abs(distances(body.bind_vertices + shift, body.bind_vertices, body.faces)).max() < 0.01

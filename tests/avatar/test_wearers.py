@@ -5,9 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import gamma
 
-from vto_pipeline.avatar import ease
-from vto_pipeline.avatar.ease import ZONES, Zone, wearers
-from vto_pipeline.avatar.population import Population, population
+from vto_pipeline.avatar.measuring.population import Population, population
+from vto_pipeline.avatar.scan import body_under_clothes as ease
+from vto_pipeline.avatar.scan.body_under_clothes import ZONES, Zone, likely_wearers
 from vto_pipeline.model.body import Measurements
 
 SEEN = ease._SEEN_M
@@ -28,7 +28,7 @@ def test_what_is_surely_tight_is_measured() -> None:
     clothes = of_the_mean(people) | {"chest_girth": 1.02, "neck_girth": 0.31}
     read = Measurements(clothes, {"neck_girth": 0.012})  # as near a collar
     tight = (Zone(("chest",), 1 - 1e-12), Zone(("neck",), 1 - 1e-12))
-    draws = [wearers(people, read, seed, tight) for seed in (1, 2, 3)]
+    draws = [likely_wearers(people, read, seed, tight) for seed in (1, 2, 3)]
     sigmas = SEEN | {"chest_girth": ease._TIGHT_M, "neck_girth": float(np.hypot(ease._TIGHT_M, 0.012))}
     true = people.given({name: clothes[name] for name in sigmas}, sigmas)
     # the population's own widening for the unusual is not in question here
@@ -44,7 +44,7 @@ def test_what_is_surely_loose_is_smaller_as_the_ease_says() -> None:
     """One girth: the product of a normal and a gamma density, integrated on a grid."""
     people = population("male")
     clothes = of_the_mean(people) | {"chest_girth": 1.10}
-    found = wearers(people, Measurements(clothes), 2, (Zone(("chest",), 1e-12),))
+    found = likely_wearers(people, Measurements(clothes), 2, (Zone(("chest",), 1e-12),))
     mean, spread = girth(people.given({name: clothes[name] for name in SEEN}, SEEN), "chest")
     at = np.linspace(0.5, 1.5, 20001)
     density = np.exp(-0.5 * ((at - mean) / spread) ** 2) * gamma.pdf(1.10 - at, 2, scale=ease._EASE_M)
@@ -57,7 +57,7 @@ def test_what_is_surely_loose_is_smaller_as_the_ease_says() -> None:
 def test_nobody_is_larger_than_the_clothes() -> None:
     people = population("female")
     narrow = {name: 0.93 * value if name.endswith("_girth") else value for name, value in of_the_mean(people).items()}
-    found = wearers(people, Measurements(narrow), 3)
+    found = likely_wearers(people, Measurements(narrow), 3)
     for zone in ZONES:
         for row in zone.rows:
             assert girth(found, row)[0] < narrow[f"{row}_girth"] + ease._TIGHT_M
@@ -80,7 +80,7 @@ def test_intervals_hold_people_who_dress_as_assumed() -> None:
             more -= more.min()
             for row, extra in zip(zone.rows, more, strict=True):
                 clothes[f"{row}_girth"] += least + extra
-        found = wearers(people, Measurements(clothes), k)
+        found = likely_wearers(people, Measurements(clothes), k)
         spread = np.sqrt(np.diag(found.covariance))
         held.append(np.abs(found.mean - [true[name] for name in found.names]) < 1.96 * spread)
     share = np.mean(held, axis=0)

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from vto_pipeline.bench.bench import Row
-from vto_pipeline.bench.comparison import compare, level_as_json, read_peers
+from vto_pipeline.bench.cloth.comparison import compare, level_as_json, read_peers
 from vto_pipeline.errors import FormatError
 
 

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import subprocess
 from collections.abc import Iterator
+from datetime import date, datetime, timezone
+from pathlib import Path
 
 import pytest
 
@@ -14,7 +17,8 @@ from vto_pipeline.bench.machine import same_machine, this_machine
 from vto_pipeline.bench.record import Files, carry_out
 from vto_pipeline.bench.timing import Timing, timed
 
-NAMES = ("solvers", "integrators", "stability", "physics", "collision", "drape", "body", "scaling")
+ROOT = Path(__file__).parents[2]
+NAMES = ("solvers", "integrators", "stability", "physics", "collision", "drape", "body", "peers", "scaling")
 
 
 class Counted:
@@ -56,6 +60,10 @@ def test_document_and_picture(bench_of, tmp_path):
     assert files.picture.read_bytes() == b"4"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["toy.json", "toy.png"]
     assert document["bench"] == "toy"
+    assert document["command"] == "vto bench toy"
+    assert date.fromisoformat(document["date"]) <= datetime.now(timezone.utc).date()
+    head = subprocess.run(["git", "rev-parse", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=False).stdout
+    assert head[:12] == (document["commit"] or "").removesuffix("+changes")
     assert document["rows"][2] == {
         "scene": "hang",
         "method": "toy",
@@ -112,7 +120,7 @@ def test_rows_of_another_machine_or_code_do_not_count(bench_of, tmp_path, monkey
 def test_load_is_a_state_and_not_the_machine():
     here = this_machine()
     assert here["cores"] >= here["threads"] >= 1
-    assert same_machine(here, {**here, "load_at_start": 99.0})
+    assert same_machine(here, {**here, "load_at_start": 99.0, "niceness": 19})
     assert not same_machine(here, {**here, "python": "3.99"})
 
 

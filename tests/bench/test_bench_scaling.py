@@ -7,16 +7,18 @@ import pytest
 from scipy.stats import linregress
 
 from vto_pipeline.bench.bench import Watch
-from vto_pipeline.bench.overhead import _spinning
-from vto_pipeline.bench.roofline import bandwidth
-from vto_pipeline.bench.scaling import growth
-from vto_pipeline.bench.throughput import _KERNELS, kernel_rows
+from vto_pipeline.bench.scaling import direct_solvers
+from vto_pipeline.bench.scaling.direct_solvers import direct_rows
+from vto_pipeline.bench.scaling.overhead import _spinning
+from vto_pipeline.bench.scaling.roofline import bandwidth
+from vto_pipeline.bench.scaling.sizes import power_law
+from vto_pipeline.bench.scaling.throughput import _KERNELS, kernel_rows
 from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM
 
 
 def test_exponent_of_an_exact_power():
     vertices = np.array([1e3, 4e3, 1.6e4, 6.4e4])
-    found = growth(vertices, 3e-6 * vertices**1.15)
+    found = power_law(vertices, 3e-6 * vertices**1.15)
     assert found.exponent == pytest.approx(1.15, rel=1e-12)
     assert found.uncertainty == pytest.approx(0.0, abs=1e-12)
 
@@ -26,13 +28,13 @@ def test_exponent_and_uncertainty_are_those_of_regression():
     vertices = np.geomspace(1e3, 1e6, 7)
     seconds = vertices**1.3 * np.exp(0.2 * rng.standard_normal(7))
     truth = linregress(np.log(vertices), np.log(seconds))
-    found = growth(vertices, seconds)
+    found = power_law(vertices, seconds)
     assert found.exponent == pytest.approx(truth.slope, rel=1e-12)
     assert found.uncertainty == pytest.approx(truth.stderr, rel=1e-9)
 
 
 def test_two_sizes_have_no_uncertainty():
-    assert np.isnan(growth([1.0, 2.0], [1.0, 2.0]).uncertainty)
+    assert np.isnan(power_law([1.0, 2.0], [1.0, 2.0]).uncertainty)
 
 
 def test_cache_is_faster_than_memory_and_both_are_possible():
@@ -70,3 +72,19 @@ def test_the_busy_neighbour_ends_with_the_block():
         pass
     with pytest.raises(KeyError), _spinning(1):
         raise KeyError
+
+
+def test_direct_solvers_solve_and_ours_keeps_its_bits():
+    rows = {row.method: row.errors for row in direct_rows(20, Watch())}
+    assert {"own Cholesky", "SuperLU"} <= set(rows)
+    for method, errors in rows.items():
+        assert 0.0 < errors["residual"] < 1e-10, method  # rounding times the condition of one step
+        assert errors["factor_s"] > errors["solve_s"] > 0.0, method
+    assert rows["own Cholesky"]["same_bits_on_one_thread"]
+
+
+def test_a_solver_that_is_not_installed_is_left_out_with_a_reason(monkeypatch):
+    monkeypatch.setattr(direct_solvers, "find_spec", lambda name: None)
+    said = []
+    assert "MKL PARDISO" not in [row.method for row in direct_rows(4, Watch(said.append))]
+    assert any("MKL PARDISO is left out: no package pypardiso" in text for text in said)

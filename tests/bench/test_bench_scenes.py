@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from vto_pipeline.bench.scenes import AREAL_DENSITY, RADIUS, Scene, distance_mm, hang, measures, shirt, sphere
-from vto_pipeline.cloth.build import ClothState, at_rest
+from vto_pipeline.bench.cloth.scenes import AREAL_DENSITY, RADIUS, Scene, hang, measures, shirt, sphere
+from vto_pipeline.bench.measures import distance_mm
+from vto_pipeline.cloth.model.build import ClothState, at_rest
 from vto_pipeline.geometry.topology import boundary_loops, edges
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -105,7 +106,7 @@ def test_the_shirt_stands_on_its_form():
 def test_stiffness_is_a_parameter():
     soft, stiff = (hang(5, stiffness) for stiffness in (1e3, 1e5))
     start = soft.rest * [1.01, 1.0, 1.0]
-    from vto_pipeline.cloth.balance import elastic_energy
+    from vto_pipeline.cloth.dynamics.residual import elastic_energy
 
     ratio = elastic_energy(stiff.model, start) / elastic_energy(soft.model, start)
     assert ratio == pytest.approx(100.0, rel=1e-9)

@@ -9,18 +9,18 @@ from numpy.testing import assert_allclose
 from PIL import Image
 from scipy.spatial import cKDTree
 
-from vto_pipeline.avatar.correspondence import closest_points
-from vto_pipeline.avatar.definitions import DEFINITIONS
+from vto_pipeline.avatar.measuring.definitions import DEFINITIONS
 from vto_pipeline.bench import BENCHES
-from vto_pipeline.bench.body.coverage import told
+from vto_pipeline.bench.body.coverage import interval_errors
 from vto_pipeline.bench.body.iso20685 import CLASSES, LIMITS_MM
 from vto_pipeline.bench.body.people import as_standing, cloud_of, person
 from vto_pipeline.bench.body.silhouettes import photograph
 from vto_pipeline.bench.body.slices import slice_girth
+from vto_pipeline.bench.plots.body_plot import draw_body
 from vto_pipeline.errors import InputError
+from vto_pipeline.geometry.closest import closest_points
 from vto_pipeline.model.body import Measurements
 from vto_pipeline.model.mesh import TriangleMesh
-from vto_pipeline.report.body_plot import draw_body
 
 
 def test_the_second_tape_spans_hollows() -> None:
@@ -87,7 +87,7 @@ def test_intervals_of_normal_errors_hold_95_percent() -> None:
         spread = {name: 0.008 if what.kind == "height" else 0.004 for name, what in DEFINITIONS.items()}
         off = {name: float(rng.normal(0.0, size)) for name, size in spread.items()}
         pairs.append((Measurements({name: 1.0 + away for name, away in off.items()}, sigmas), dict.fromkeys(off, 1.0)))
-    row = told(pairs)
+    row = interval_errors(pairs)
     assert_allclose(row["girths_inside_share"], 0.95, rtol=0, atol=0.01)
     assert_allclose(row["heights_inside_share"], 0.673, rtol=0, atol=0.03)
     assert_allclose([row["calf_girth_rms_mm"], row["calf_girth_interval_mm"]], [4.0, 1.96 * 4.0], rtol=0.1)

@@ -13,12 +13,12 @@ from vto_pipeline.bench.collision import left_out, scenes
 from vto_pipeline.bench.collision.contact_scene import ContactScene, contact_errors
 from vto_pipeline.bench.collision.penetration import penetration
 from vto_pipeline.bench.collision.sheets import folded_twice, funnel, square, stacked
+from vto_pipeline.bench.plots.collision_plot import draw_collision
 from vto_pipeline.cloth import Box, Capsule, MeshCollider, Moving, Path, Plane, Sphere, Trajectory
-from vto_pipeline.cloth.collision.tally import Tally
+from vto_pipeline.cloth.collision.self_collision.tally import Tally
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.topology import edges
 from vto_pipeline.model.mesh import TriangleMesh
-from vto_pipeline.report.collision_plot import draw_collision
 
 QUICK = [make() for make in scenes._scenes(True)]
 

@@ -1,18 +1,21 @@
 """The drape bench: its judgements on made-up drapes, its cases, and the picture of all kinds of rows."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from vto_pipeline.bench.bench import Row, Watch
 from vto_pipeline.bench.drape import budget, left_out, refinement, scanned
-from vto_pipeline.bench.drape.case import Case, distance_mm
-from vto_pipeline.bench.samples.wearer import wearer
+from vto_pipeline.bench.drape.case import Case
+from vto_pipeline.bench.measures import distance_mm, edge_strain
+from vto_pipeline.bench.plots.drape_plot import draw_drape
+from vto_pipeline.bench.samples.garments.wearer import wearer
 from vto_pipeline.bench.timing import Timing
 from vto_pipeline.errors import InputError, IntersectingError
 from vto_pipeline.model.cloth import Draped, TraceRow
 from vto_pipeline.model.mesh import TriangleMesh
-from vto_pipeline.report.drape_plot import draw_drape
 
 CLEAN = {
     "finite": True,
@@ -67,7 +70,8 @@ def test_a_failed_drape_is_a_row_too(shirt, monkeypatch):
         raise IntersectingError("7 pairs still cross")
 
     monkeypatch.setattr(Case, "drape", fail)
-    assert budget._measure(shirt, {}, {})[1] == {"status": "7 pairs still cross"}
+    row = Watch().row("shirt", "drape", {}, 0, partial(budget._measure, shirt, {}, {}))
+    assert row.errors == {"status": "7 pairs still cross"}
 
 
 def test_there_are_ten_cases_of_every_garment_and_body():
@@ -94,9 +98,9 @@ def test_figures_of_a_tube_about_the_body():
     assert 50.0 < found["clearance_mm"] < 350.0
 
 
-def test_length_errors_are_relative():
+def test_strains_are_relative():
     mesh = TriangleMesh([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-    assert_allclose(scanned.length_errors(1.01 * mesh.vertices, mesh.vertices, mesh), 0.01, rtol=1e-9)
+    assert_allclose(edge_strain(1.01 * mesh.vertices, mesh.vertices, mesh.faces), 0.01, rtol=1e-9)
 
 
 def rows():

@@ -13,7 +13,7 @@ from vto_pipeline.bench.physics.elastica import cantilever
 from vto_pipeline.bench.physics.hanging import hanging_rows
 from vto_pipeline.bench.physics.meshes import disc, strip
 from vto_pipeline.bench.physics.modes import bending_frequencies
-from vto_pipeline.cloth.equilibrium import equilibrium
+from vto_pipeline.cloth.rest.equilibrium import equilibrium
 from vto_pipeline.units import GRAVITY
 
 

@@ -7,8 +7,8 @@ import pytest
 import trimesh
 
 from vto_pipeline.bench.samples.customer import _girth, measure_truth
-from vto_pipeline.io.bodies import read_measurements, read_silhouettes
-from vto_pipeline.io.images import read_image
+from vto_pipeline.io.bodies.measurements import read_measurements, read_silhouettes
+from vto_pipeline.io.captures.images import read_image
 from vto_pipeline.io.meshes import read_mesh
 from vto_pipeline.model.mesh import TriangleMesh
 

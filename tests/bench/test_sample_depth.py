@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from vto_pipeline.bench.samples.depth import BASELINE, SUBPIXEL, axial_sigma, noisy_depth, quantized
-from vto_pipeline.io.cameras import read_trajectory
-from vto_pipeline.io.depth import read_depth, read_depth_frames
+from vto_pipeline.bench.samples.captures.depth import BASELINE, SUBPIXEL, axial_sigma, noisy_depth, quantized
+from vto_pipeline.io.captures.cameras import read_trajectory
+from vto_pipeline.io.captures.depth import read_depth, read_depth_frames
 from vto_pipeline.io.meshes import read_mesh
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"

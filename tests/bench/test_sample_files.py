@@ -20,6 +20,7 @@ FOLDERS = {
 FILES = {
     "README.md",
     "shirt_on_form/form.ply",
+    "shirt_on_form/shirt.ply",
     "shirt_on_form/cloud.ply",
     "shirt_on_form/depth/intrinsics.json",
     "customer/measurements.yaml",

@@ -8,12 +8,12 @@ import pytest
 from numpy.testing import assert_allclose
 from PIL import Image
 
-from vto_pipeline.bench.samples.board import BOARD, charuco, world_from_board
-from vto_pipeline.bench.samples.photos import exposed
-from vto_pipeline.bench.samples.viewpoints import on_ring
-from vto_pipeline.io.cameras import read_cameras
-from vto_pipeline.io.images import read_image_size
-from vto_pipeline.io.photos import read_photos
+from vto_pipeline.bench.samples.captures.board import BOARD, charuco, world_from_board
+from vto_pipeline.bench.samples.captures.photos import exposed
+from vto_pipeline.bench.samples.captures.viewpoints import on_ring
+from vto_pipeline.io.captures.cameras import read_cameras
+from vto_pipeline.io.captures.images import read_image_size
+from vto_pipeline.io.captures.photos import read_photos
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"
 

@@ -93,7 +93,7 @@ def test_shirt_is_tight_on_the_shoulders_and_loose_below(shirt, form):
 
 
 def test_folds_stand_up_to_some_fifteen_millimetres():
-    from vto_pipeline.bench.samples.folds import SLEEVE_FOLDS, TRUNK_FOLDS, fold_height, hem_flutes
+    from vto_pipeline.bench.samples.garments.folds import SLEEVE_FOLDS, TRUNK_FOLDS, fold_height, hem_flutes
 
     turn, height = np.meshgrid(np.linspace(-np.pi, np.pi, 400), np.linspace(0.2, 0.75, 200))
     trunk = fold_height(TRUNK_FOLDS, 0.15 * turn.ravel(), height.ravel(), 0.3 * np.pi)

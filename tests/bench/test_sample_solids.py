@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from vto_pipeline.bench.samples.clip import clip
-from vto_pipeline.bench.samples.solids import cone, ellipsoid, smooth_cut, smooth_union
-from vto_pipeline.bench.samples.surface_nets import zero_surface
+from vto_pipeline.bench.samples.solids.clip import clip
+from vto_pipeline.bench.samples.solids.primitives import cone, ellipsoid, smooth_cut, smooth_union
+from vto_pipeline.bench.samples.solids.surface_nets import zero_surface
 
 BOX = np.array([-0.15, -0.15, -0.15]), np.array([0.15, 0.15, 0.15])
 

@@ -8,8 +8,8 @@ import pytest
 import trimesh
 from numpy.testing import assert_allclose
 
-from vto_pipeline.bench.samples.wardrobe import WARDROBE
-from vto_pipeline.bench.samples.wearer import SIZES, wearer
+from vto_pipeline.bench.samples.garments.wardrobe import WARDROBE
+from vto_pipeline.bench.samples.garments.wearer import SIZES, wearer
 from vto_pipeline.geometry.topology import boundary_loops
 
 OPENINGS = {"shirt": 4, "dress": 4, "skirt": 2, "trousers": 3}

@@ -8,8 +8,9 @@ from importlib import metadata
 
 import pytest
 
-from vto_pipeline.cli import doctor, setup_system
-from vto_pipeline.cli.doctor import Finding
+from vto_pipeline.cli import setup_system
+from vto_pipeline.cli.commands import doctor
+from vto_pipeline.cli.commands.doctor import Finding
 
 
 def test_every_dependency_is_looked_at():
@@ -28,7 +29,7 @@ def test_doctor_answers_with_the_command_that_mends(vto, monkeypatch):
     found = {finding["name"]: finding for finding in said.data["findings"]}
     assert found["numpy"]["state"] == "ok"
     assert found["no-such-thing"]["mend"].endswith("-m pip install no-such-thing")
-    assert "does not load: ModuleNotFoundError" in found["rich"]["seen"]
+    assert "fails to load: ModuleNotFoundError" in found["rich"]["seen"]
     if sys.platform == "linux":
         assert found["libGL.so.1"]["mend"] == "sudo apt-get install -y --no-install-recommends libgl1"
         assert found["libX11.so.6"]["state"] == "ok" or "libx11-6" in setup_system.missing_libraries()

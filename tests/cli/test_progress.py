@@ -11,7 +11,7 @@ from toy_tables import STAGES
 from vto_pipeline.cli import progress as progress_module
 from vto_pipeline.cli.progress import Bars, Lines
 from vto_pipeline.cli.session import Session
-from vto_pipeline.pipeline.record import StageRecord
+from vto_pipeline.pipeline.execution.record import StageRecord
 
 
 def test_plain_lines_are_throttled(monkeypatch, capsys):

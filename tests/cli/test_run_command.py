@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,10 @@ import pytest
 from toy_tables import CALLS, STAGES, TOY
 
 from vto_pipeline.cli import work
+from vto_pipeline.cli.results import result_lines
 from vto_pipeline.errors import DivergedError, MissingDependencyError
+from vto_pipeline.model.body import Measurements
+from vto_pipeline.stages import CATALOGUE
 
 
 def test_run_says_where_things_are(vto):
@@ -85,17 +89,18 @@ def test_a_failed_computation_keeps_the_partial_result(vto):
     assert said.code == 4
     assert "error: sum diverged" in said.err
     assert "in stage add" in said.err
-    assert "hint: use smaller numbers; what was reached is in runs/toy/out/partial" in said.err
+    assert "hint: use smaller numbers; the partial result is in runs/toy/out/partial" in said.err
     assert Path("runs/toy/out/partial/total.txt").read_text() == "-1"
 
 
 @pytest.mark.parametrize(
     ("raised", "code", "message"),
     [
-        (KeyboardInterrupt(), 130, "interrupted; run the same command again to go on"),
+        (KeyboardInterrupt(), 130, "interrupted; run the same command again to resume"),
         (ModuleNotFoundError("No module named 'open3d'", name="open3d"), 5, "hint: run `vto doctor`"),
         (MissingDependencyError("no open3d"), 5, "error: no open3d"),
         (DivergedError("blew up"), 4, "error: blew up"),
+        (OSError(errno.ENOSPC, "No space left on device", "left"), 3, "error: the system refuses: No space left"),
     ],
 )
 def test_exit_codes(vto, monkeypatch, raised, code, message):
@@ -153,3 +158,22 @@ def test_stages_and_schema(vto):
     schema = vto("schema").data
     assert schema == vto("schema", "--json").data
     assert "offset" in json.dumps(schema)
+
+
+def test_a_run_folder_that_cannot_be_made_is_bad_usage(vto):
+    for folder in ("left.txt/run", "/proc/no/such/place"):
+        said = vto("run", "toy.yaml", "-o", folder)
+        assert said.code == 2
+        assert "the run's folder cannot be made or written to" in said.err
+        assert "give another folder with -o" in said.err
+
+
+def test_results_are_told_in_words_and_json_stays_alone(tmp_path):
+    body = Measurements({"stature": 1.72, "waist_girth": 0.813, "knee_height": 0.48}, {"waist_girth": 0.0051})
+    CATALOGUE.kind("measurements").write(tmp_path / "measurements.json", body)
+    CATALOGUE.kind("fit_report").write(tmp_path / "fit_report.json", {"verdict": "Chest tight (+3.3 cm)."})
+    lines = list(result_lines(["avatar", "measurements", "fit_report"], tmp_path, CATALOGUE))
+    assert [line.split() for line in lines if "waist" in line] == [["waist", "81.3", "1.0"]]  # 1.96 times 0.51 cm
+    assert [line.split() for line in lines if "stature" in line] == [["stature", "172.0", "-"]]
+    assert not any("knee" in line for line in lines)
+    assert lines[-1] == "fit: Chest tight (+3.3 cm)."

@@ -69,7 +69,7 @@ def test_fit_takes_one_way_in(typed):
     for arguments in ([], ["--front", "a.png"], ["--scan", "mesh.ply", "--measurements", "tape.yaml"]):
         code, caught, err = typed("fit", *arguments)
         assert (code, caught) == (2, {})
-        assert "give one of" in err or "go together" in err
+        assert "give one of" in err or "must be given together" in err
 
 
 def test_drape_takes_avatars_meshes_and_measurements(typed):

@@ -2,23 +2,22 @@
 
 import numpy as np
 from cloth_scenes import sheet
+from vto_pipeline.cloth.constraints.points.mass_spring import bending_springs, membrane_springs
 
-from vto_pipeline.cloth.constraints.attachment import attachments
-from vto_pipeline.cloth.constraints.bend import bend, hinge_angles, solid_hinges
-from vto_pipeline.cloth.constraints.bend_friction import bend_friction
-from vto_pipeline.cloth.constraints.curve import curve
-from vto_pipeline.cloth.constraints.green import green
-from vto_pipeline.cloth.constraints.isometric import isometric_bend
-from vto_pipeline.cloth.constraints.mass_spring import bending_springs, membrane_springs
-from vto_pipeline.cloth.constraints.seam import seams
-from vto_pipeline.cloth.constraints.shape_operator import shape_operator
-from vto_pipeline.cloth.constraints.spring import springs
-from vto_pipeline.cloth.constraints.strain_friction import strain_friction
-from vto_pipeline.cloth.constraints.strain_limit import strain_limit
-from vto_pipeline.cloth.constraints.stretch import stretch
+from vto_pipeline.cloth.constraints.bending.bend_friction import bend_friction
+from vto_pipeline.cloth.constraints.bending.hinge import bend, hinge_angles, solid_hinges
+from vto_pipeline.cloth.constraints.bending.isometric import isometric_bend
+from vto_pipeline.cloth.constraints.bending.shape_operator import shape_operator
+from vto_pipeline.cloth.constraints.membrane.curve import curve
+from vto_pipeline.cloth.constraints.membrane.green import green
+from vto_pipeline.cloth.constraints.membrane.strain_friction import strain_friction
+from vto_pipeline.cloth.constraints.membrane.strain_limit import strain_limit
+from vto_pipeline.cloth.constraints.membrane.stretch import stretch
+from vto_pipeline.cloth.constraints.points.attachment import attachments
+from vto_pipeline.cloth.constraints.points.spring import springs
 from vto_pipeline.geometry.topology import hinges
 from vto_pipeline.model.fabric import Fabric
-from vto_pipeline.numerics.monotone_curve import monotone_curve
+from vto_pipeline.numerics.mechanics.monotone_curve import monotone_curve
 
 MESH = sheet(4, 5, 0.3, 0.4)
 FABRIC = Fabric("made up", 0.2, 3e-4, 900, 500, 100, 0.3, 1e-3, 5e-4, 0, 0.3)
@@ -65,9 +64,6 @@ def examples(mesh=MESH):
         "green": green(faces, rest, FABRIC),
         "isometric": isometric_bend(found, rest, FABRIC),
         "membrane springs": membrane_springs(faces, found, rest, FABRIC),
-        "seam onto edges": seams(ends, np.array([[5, 6], [6, 7], [8, 9]]), rest, 1e-3, shares=[[0.2, 0.8]] * 3),
-        "seam onto triangles": seams(ends, faces[5:8], rest, 1e-3),
-        "seam onto vertices": seams(ends, ends + 5, rest, 1e-3),
         "shape_operator": shape_operator(mesh, rest, False, SOFT_FABRIC),
         "strain_friction": _strain_friction(mesh, 0.01),
         "strain_limit": _limits(mesh),

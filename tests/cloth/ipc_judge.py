@@ -11,4 +11,13 @@ def crosses(cloth, body):
     near = body.faces[((corners.min(axis=1) <= high) & (corners.max(axis=1) >= low)).all(axis=1)]
     vertices = np.vstack([cloth.vertices, body.vertices])
     faces = np.vstack([cloth.faces, near + len(cloth.vertices)])
+    return _cross(vertices, faces)
+
+
+def self_crosses(cloth):
+    """Whether a garment crosses itself."""
+    return _cross(np.array(cloth.vertices), np.array(cloth.faces))
+
+
+def _cross(vertices, faces):
     return ipctk.has_intersections(ipctk.CollisionMesh(vertices, ipctk.edges(faces), faces), vertices)

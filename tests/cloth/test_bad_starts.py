@@ -6,12 +6,12 @@ from bad_starts import finned, shifted, sleeves_up, two, upside_down
 from ipc_judge import crosses
 from numpy.testing import assert_allclose
 
-from vto_pipeline.bench.samples.form import make_form
-from vto_pipeline.bench.samples.shirt import make_shirt
+from vto_pipeline.bench.samples.garments.shirt import make_shirt
+from vto_pipeline.bench.samples.solids.form import make_form
 from vto_pipeline.cloth.drape import drape
 from vto_pipeline.errors import IntersectingError
 from vto_pipeline.garment.simulation_mesh import SimulationMeshConfig, remesh_for_simulation
-from vto_pipeline.geometry.repair import RepairConfig, repair
+from vto_pipeline.geometry.remeshing.repair import RepairConfig, repair
 from vto_pipeline.geometry.topology import vertex_normals
 from vto_pipeline.io.fabrics import read_fabric
 from vto_pipeline.model.job import Job
@@ -51,7 +51,7 @@ def test_a_shirt_upside_down_and_in_centimetres_is_put_right(dressed):
     job = Job()
     strayed = TriangleMesh(100.0 * shirt.vertices * [-1.0, -1.0, 1.0], shirt.faces)
     found = ends_clean(strayed, form, job=job)
-    assert any("taken to be in cm" in note for note in job.notes)
+    assert any("assumed to be in cm" in note for note in job.notes)
     assert any(note.startswith("garment turned: its (-x, -y, z)") for note in job.notes)
     assert found.audit["too_small"] is False
     assert found.audit["rms_stretch"] < 0.03

@@ -8,14 +8,14 @@ from cloth_scenes import ball, fabric, moved, sheet
 from numpy.testing import assert_allclose, assert_array_equal
 from unclean_bodies import doubled, fine_box, flipped, soup, together
 
-import vto_pipeline.cloth.stepper
+import vto_pipeline.cloth.dynamics.stepper
 from vto_pipeline.cloth import MeshCollider, simulate
-from vto_pipeline.cloth.collision.body import BodyCollider
-from vto_pipeline.cloth.collision.hold_apart import hold_apart
-from vto_pipeline.cloth.collision.self_contact import SelfContact
+from vto_pipeline.cloth.collision.body.contacts import BodyCollider
+from vto_pipeline.cloth.collision.response.projected_gauss_seidel import hold_apart
+from vto_pipeline.cloth.collision.self_collision.self_contact import SelfContact
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.mesh import TriangleMesh
-from vto_pipeline.numerics.threads import limited_threads
+from vto_pipeline.numerics.cpu_threads import limited_threads
 
 FABRIC = fabric(stretch=1000.0, shear=200.0, bending=1e-5, density=0.2, friction=0.3)
 REACH = 5e-4  # m
@@ -91,7 +91,7 @@ def test_coarse_cloth_falls_on_a_body_and_nothing_comes_through(name, monkeypatc
     def planes_only(*given, bodies, **more):
         return SelfContact(*given, **more)
 
-    monkeypatch.setattr(vto_pipeline.cloth.stepper, "SelfContact", planes_only)
+    monkeypatch.setattr(vto_pipeline.cloth.dynamics.stepper, "SelfContact", planes_only)
     ended, faces = dropped(body)
     through = ended.positions[:, 1].max() < body.vertices[:, 1].min()
     assert through or crosses(ended.positions, faces, body)  # so the test tests something

@@ -7,20 +7,16 @@ from cloth_scenes import sheet
 from moving_sheets import boxes_of, brute_pairs, crumple, fold, judge
 from numpy.testing import assert_array_equal
 
-from vto_pipeline.cloth.collision.candidates import cross_candidates, self_candidates
-from vto_pipeline.cloth.collision.features import features
-from vto_pipeline.numerics import bvh
-from vto_pipeline.numerics.spatial_hash import hashed
-from vto_pipeline.numerics.threads import limited_threads
+from vto_pipeline.cloth.collision.self_collision.candidates import cross_candidates, self_candidates
+from vto_pipeline.cloth.collision.self_collision.surface_features import features
+from vto_pipeline.numerics.cpu_threads import limited_threads
+from vto_pipeline.numerics.spatial import bvh
 
 
 def tree_of(start, end, faces, radius):
     tree = bvh.build(start, faces)
     bvh.refit_swept(tree, start, end, faces, radius)
     return tree
-
-
-BROAD = pytest.mark.parametrize("broad", [tree_of, hashed])
 
 
 def by_brute_force(kinds, start, end, radius, skip):
@@ -77,32 +73,29 @@ SCENES = [
 ]
 
 
-@BROAD
 @pytest.mark.parametrize("name", SCENES)
-def test_all_pairs_and_no_others(name, broad):
+def test_all_pairs_and_no_others(name):
     start, end, faces, radius = scene(name)
     kinds = features(faces, len(start))
-    to_face, to_edge = self_candidates(broad(start, end, faces, radius), kinds, start, end, radius)
+    to_face, to_edge = self_candidates(tree_of(start, end, faces, radius), kinds, start, end, radius)
     wanted_face, wanted_edge = by_brute_force(kinds, start, end, radius, np.zeros(len(start), np.bool_))
     assert_array_equal(to_face, wanted_face)
     assert_array_equal(to_edge, wanted_edge)
     assert name == "flat, touching" or len(to_edge) > 50
 
 
-@BROAD
-def test_what_is_skipped_takes_no_part(broad):
+def test_what_is_skipped_takes_no_part():
     start, end, faces, radius = scene("crumpled")
     kinds = features(faces, len(start))
     skip = np.random.default_rng(0).random(len(start)) < 0.2
-    found = self_candidates(broad(start, end, faces, radius), kinds, start, end, radius, skip)
+    found = self_candidates(tree_of(start, end, faces, radius), kinds, start, end, radius, skip)
     wanted = by_brute_force(kinds, start, end, radius, skip)
     assert_array_equal(found[0], wanted[0])
     assert_array_equal(found[1], wanted[1])
     assert 50 < len(found[0]) < len(by_brute_force(kinds, start, end, radius, ~skip & skip)[0])
 
 
-@BROAD
-def test_two_surfaces(broad):
+def test_two_surfaces():
     start, end, faces, radius = scene("crumpled")
     kinds, skip = features(faces, len(start)), np.random.default_rng(0).random(len(start)) < 0.1
     body = sheet(9, 7, 0.8, 1.2)
@@ -111,12 +104,12 @@ def test_two_surfaces(broad):
     none = np.zeros(len(before))
     other = features(body.faces, len(before))
     found = cross_candidates(
-        broad(start, end, faces, radius),
+        tree_of(start, end, faces, radius),
         kinds,
         start,
         end,
         radius,
-        broad(before, after, body.faces, none),
+        tree_of(before, after, body.faces, none),
         other,
         before,
         after,
@@ -156,8 +149,7 @@ def test_nothing_is_missed_that_ipctk_finds(seed):
     assert len(to_face) < 1.02 * len(wanted_face)  # they, too, take boxes: no more than rounding between them
 
 
-@BROAD
-def test_the_same_for_any_number_of_threads(broad):
+def test_the_same_for_any_number_of_threads():
     mesh = sheet(48, 48, 1.0, 1.0, upright=False)
     start = fold(mesh.vertices, 6, 0.01)
     end, radius = start + np.array([0.0, -0.01, 0.0]), np.full(len(start), 0.003)
@@ -165,7 +157,7 @@ def test_the_same_for_any_number_of_threads(broad):
     found = []
     for threads in (1, 2):
         with limited_threads(threads):
-            found.append(self_candidates(broad(start, end, mesh.faces, radius), kinds, start, end, radius))
+            found.append(self_candidates(tree_of(start, end, mesh.faces, radius), kinds, start, end, radius))
     assert_array_equal(found[0][0], found[1][0])
     assert_array_equal(found[0][1], found[1][1])
     assert len(found[0][0]) > 10_000

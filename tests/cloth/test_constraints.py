@@ -7,14 +7,14 @@ from numba import njit
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from vto_pipeline.cloth.build import at_rest, model_of
 from vto_pipeline.cloth.collision.contacts import nothing
 from vto_pipeline.cloth.constraints import KINDS
 from vto_pipeline.cloth.constraints.sweep import add_damping_forces, add_forces, linearised, multipliers, project
+from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
+from vto_pipeline.cloth.model.build import at_rest, model_of
 from vto_pipeline.cloth.solvers.xpbd import Xpbd
-from vto_pipeline.cloth.stiffness import Stiffness
-from vto_pipeline.numerics.block_matrix import to_scipy
-from vto_pipeline.numerics.threads import limited_threads
+from vto_pipeline.numerics.cpu_threads import limited_threads
+from vto_pipeline.numerics.linear.block_matrix import to_scipy
 
 EXAMPLES = examples()
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from vto_pipeline.cloth.collision.active_set import no_contacts
-from vto_pipeline.cloth.collision.contact_springs import add_contacts, contact_energy, linked_contacts, revise
-from vto_pipeline.numerics.block_matrix import BlockMatrix
+from vto_pipeline.cloth.collision.response.active_set import no_contacts
+from vto_pipeline.cloth.collision.response.contact_springs import add_contacts, contact_energy, linked_contacts, revise
+from vto_pipeline.numerics.linear.block_matrix import BlockMatrix
 
 COUNT, STEP = 6, 1e-7
 

@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation
 from unclean_bodies import doubled, fine_box, flipped, from_box, slit, soup, together
 
 from vto_pipeline import cloth
-from vto_pipeline.cloth.build import at_rest, build
-from vto_pipeline.cloth.collision.body import BodyCollider
+from vto_pipeline.cloth.collision.body.contacts import BodyCollider
 from vto_pipeline.cloth.collision.contacts import Round
-from vto_pipeline.cloth.stepper import StepConfig, Stepper
+from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
+from vto_pipeline.cloth.model.build import at_rest, build
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.job import Job

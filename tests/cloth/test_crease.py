@@ -5,11 +5,11 @@ import pytest
 from cloth_scenes import fabric
 from numpy.testing import assert_allclose
 
-from vto_pipeline.cloth.build import at_rest, build
-from vto_pipeline.cloth.collision.body import BodyCollider
+from vto_pipeline.cloth.collision.body.contacts import BodyCollider
 from vto_pipeline.cloth.collision.contacts import Round
-from vto_pipeline.cloth.joined import WornOn
-from vto_pipeline.cloth.stepper import StepConfig, Stepper
+from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
+from vto_pipeline.cloth.model.build import at_rest, build
+from vto_pipeline.cloth.outfit.combined_cloth import WornOn
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.garment import RestShape

@@ -5,9 +5,9 @@ import pytest
 from cloth_scenes import ball, fabric, moved, tube
 from numpy.testing import assert_allclose, assert_array_equal
 
-import vto_pipeline.cloth.phases as phases_module
+import vto_pipeline.cloth.rest.phases as phases_module
 from vto_pipeline.cloth.drape import drape
-from vto_pipeline.cloth.start import Start
+from vto_pipeline.cloth.placement.collision_free_start import Start
 from vto_pipeline.errors import ConfigError, IntersectingError
 from vto_pipeline.geometry.intersections import intersecting_faces, meeting_vertices, self_intersections
 from vto_pipeline.model.body import MovingBody
@@ -57,7 +57,7 @@ def test_a_vest_comes_to_rest_on_the_pear():
     assert len(found.trace) > 4
     assert np.all(np.diff([row.step for row in found.trace]) > 0)
     assert job.metrics["error_mm"] < 2.0
-    assert ("riding along with the body", "the body is at rest") in job.left_out
+    assert ("moving along with the body", "the body is at rest") in job.left_out
 
 
 def test_a_garment_beside_its_body_is_put_on_it():
@@ -75,8 +75,8 @@ def test_the_garment_rides_on_a_body_that_swells():
     found = drape(vest(), body, fabric(bending=1e-5), QUICK, job)
     assert len(intersecting_faces(found.mesh, fat)) == 0
     assert found.audit["rms_stretch"] > 0.005  # 0.132 m about the waist stretches the 0.115 m tube
-    assert "riding along with the body" not in dict(job.left_out)
-    assert any(note.endswith("mm: the garment rides along") for note in job.notes)
+    assert "moving along with the body" not in dict(job.left_out)
+    assert any(note.endswith("mm; the garment moves along with it") for note in job.notes)
 
 
 def test_where_the_body_changes_much_the_garment_starts_reshaped():
@@ -85,8 +85,8 @@ def test_where_the_body_changes_much_the_garment_starts_reshaped():
     job = Job()
     found = drape(vest(), body, fabric(bending=1e-5), {**QUICK, "ride_up_to_mm": 10}, job)
     rides = drape(vest(), body, fabric(bending=1e-5), QUICK)
-    assert any(note.endswith("the garment starts reshaped on the body as it ends") for note in job.notes)
-    assert "riding along with the body" in dict(job.left_out)
+    assert any(note.endswith("the garment starts reshaped on the final body") for note in job.notes)
+    assert "moving along with the body" in dict(job.left_out)
     assert len(intersecting_faces(found.mesh, fat)) == 0
     # the same stretch whichever way it came there: friction holds it a little higher or lower
     assert_allclose(found.audit["rms_stretch"], rides.audit["rms_stretch"], rtol=0.3)
@@ -110,7 +110,7 @@ def test_what_the_search_for_self_contacts_saved_is_told_and_nothing_when_all_is
     quick, plain, whole = {**QUICK, "settle_seconds": 0.3}, Job(), Job(force_all=True)
     ends = [drape(double_vest(), pear(), fabric(bending=1e-5), quick, job).mesh.vertices for job in (plain, whole)]
     assert_allclose(ends[1], ends[0], rtol=0, atol=1e-4)  # the promise: 0.1 mm
-    assert "questions needed none" in dict(plain.left_out)["self-collision search"]
+    assert "queries needed none" in dict(plain.left_out)["self-collision search"]
     assert plain.metrics["self_searches_left_out"] > 0 < plain.metrics["self_searches_saved_s"]
     assert "self-collision search" not in dict(whole.left_out)
     assert whole.metrics["self_searches_left_out"] == 0 == whole.metrics["self_searches_saved_s"]

@@ -5,13 +5,13 @@ import pytest
 from cloth_scenes import fabric, sheet
 from numpy.testing import assert_allclose
 
-from vto_pipeline.bench.closed_forms import ROOTS, growth_and_frequency, implicit_dumbbell
-from vto_pipeline.bench.integrators import KEEP_SPIN, dominant_root, dumbbell, oscillator, spin
-from vto_pipeline.cloth.build import ClothState, at_rest, build, model_of
+from vto_pipeline.bench.cloth.closed_forms import ROOTS, growth_and_frequency, implicit_dumbbell
+from vto_pipeline.bench.cloth.integrators import KEEP_SPIN, dominant_root, dumbbell, oscillator, spin
 from vto_pipeline.cloth.collision.contacts import Round, nothing
-from vto_pipeline.cloth.collision.shapes import Plane
-from vto_pipeline.cloth.constraints.spring import springs
+from vto_pipeline.cloth.collision.shapes.colliders import Plane
+from vto_pipeline.cloth.constraints.points.spring import springs
 from vto_pipeline.cloth.integrators import INTEGRATORS
+from vto_pipeline.cloth.model.build import ClothState, at_rest, build, model_of
 from vto_pipeline.cloth.solvers.xpbd import Xpbd
 from vto_pipeline.model.garment import RestShape
 

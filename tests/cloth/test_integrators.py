@@ -8,18 +8,17 @@ from cloth_scenes import fabric, sheet
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-from vto_pipeline.cloth.build import ClothState, at_rest, build, model_of
 from vto_pipeline.cloth.collision.contacts import Round, nothing
-from vto_pipeline.cloth.collision.shapes import Plane
-from vto_pipeline.cloth.constraints.attachment import attachments
+from vto_pipeline.cloth.collision.shapes.colliders import Plane
+from vto_pipeline.cloth.constraints.points.attachment import attachments
 from vto_pipeline.cloth.integrators import INTEGRATORS
-from vto_pipeline.cloth.integrators.air import AirDrag
 from vto_pipeline.cloth.integrators.potential import IncrementalPotential
 from vto_pipeline.cloth.integrators.system import ForceSystem
-from vto_pipeline.cloth.materials import Materials
+from vto_pipeline.cloth.model.build import ClothState, at_rest, build, model_of
+from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.errors import ConfigError
 from vto_pipeline.model.garment import RestShape
-from vto_pipeline.numerics.block_matrix import to_scipy
+from vto_pipeline.numerics.linear.block_matrix import to_scipy
 from vto_pipeline.units import GRAVITY
 
 ORDER = {
@@ -74,7 +73,7 @@ def exactly(system, state, seconds):
 @pytest.mark.parametrize("name", INTEGRATORS)
 def test_order_of_convergence(name, damped):
     model, state = flag(rayleigh=2e-3 if damped else 0.0)
-    settings = {"damping": 1.5, "air": AirDrag(coefficient=1.0)} if damped else {}
+    settings = {"damping": 1.5, "air": 0.5 * 1.2} if damped else {}
     seconds = 0.1
     errors = []
     reference = exactly(ForceSystem(model, **settings), state, seconds)
@@ -88,7 +87,7 @@ def test_order_of_convergence(name, damped):
 
 def test_gradient_of_the_incremental_potential():
     model, state = flag(rayleigh=3e-3)
-    system = ForceSystem(model, 2.0, AirDrag(coefficient=1.2))
+    system = ForceSystem(model, 2.0, 0.5 * 1.2 * 1.2)
     x, v = state.positions, state.velocities
     potential = IncrementalPotential.of_backward_euler(system, x, v, 0.01)
     y = x + 0.01 * v + np.random.default_rng(1).normal(0, 2e-3, x.shape) * system.free
@@ -106,7 +105,7 @@ def test_matrix_is_the_slope_of_the_resistance():
     """With no elastic stress, what is left of the Hessian is exact."""
     mesh = sheet(4, 4, 0.3, 0.3)
     model = build(mesh, RestShape(mesh.vertices), fabric(bending=1e-4), pinned=(0,), materials=Materials(rayleigh=3e-3))
-    system = ForceSystem(model, 2.0, AirDrag(coefficient=1.2))
+    system = ForceSystem(model, 2.0, 0.5 * 1.2 * 1.2)
     x, v = mesh.vertices, np.random.default_rng(2).normal(0, 1, mesh.vertices.shape)
     rate = 40.0
     with_rate = to_scipy(system.matrix(x, v, 7.0, rate)).toarray()
@@ -128,7 +127,7 @@ def plate(coefficient, name, *, damping=0.0, h=0.01, seconds=1.0):
     mesh = sheet(4, 3, 0.3, 0.2, upright=False)
     mass = build(mesh, RestShape(mesh.vertices), fabric(density=0.15)).mass
     model = model_of((), mass, faces=mesh.faces)
-    method = method_of(name, model, damping=damping, air=AirDrag(coefficient=coefficient))
+    method = method_of(name, model, damping=damping, air=0.5 * 1.2 * coefficient)
     end = method.advance(at_rest(mesh.vertices), nothing(12), h, round(seconds / h))
     assert_allclose(np.ptp(end.velocities, axis=0), 0.0, rtol=0, atol=1e-6)  # stays flat but for rounding
     return -end.velocities[:, 1].mean()

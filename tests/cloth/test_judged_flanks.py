@@ -6,7 +6,7 @@ from cloth_scenes import ball, fabric, sheet
 from numpy.testing import assert_allclose
 from scipy.optimize import minimize, nnls
 
-from vto_pipeline.cloth.audit import audit
+from vto_pipeline.cloth.judge.audit import audit
 from vto_pipeline.cloth.judge.bearing import left_by_all, left_by_one
 from vto_pipeline.cloth.judge.flanks import flanks
 from vto_pipeline.geometry.signed_distance import SurfaceDistance

@@ -1,4 +1,4 @@
-"""Garments one over the other: nothing crosses, the order is kept, and all is at rest."""
+"""Garments in layers: nothing crosses, the order is kept, and all is at rest."""
 
 import numpy as np
 import pytest
@@ -6,22 +6,23 @@ from cloth_scenes import ball, fabric, tube
 from ipc_judge import crosses
 from numpy.testing import assert_allclose, assert_array_equal
 
-import vto_pipeline.cloth.layers as layers_module
-from vto_pipeline.bench.samples.wardrobe import WARDROBE
-from vto_pipeline.bench.samples.wearer import wearer
+import vto_pipeline.cloth.outfit.layers as layers_module
+from vto_pipeline.bench.samples.garments.wardrobe import WARDROBE
+from vto_pipeline.bench.samples.garments.wearer import wearer
 from vto_pipeline.cloth.judge.order import outside
-from vto_pipeline.cloth.layers import drape_layers
+from vto_pipeline.cloth.outfit.layers import drape_layers
 from vto_pipeline.errors import ConfigError, InputError, IntersectingError
 from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.io.fabrics import read_fabric
 from vto_pipeline.model.body import MovingBody
+from vto_pipeline.model.cloth import Draped
 from vto_pipeline.model.garment import Garment, RestShape
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.outfit import Layer
 
 STAYS = {"place": "as_it_stands"}
-QUICK = {**STAYS, "settle_seconds": 2.0, "target_error_mm": 2.0}
+QUICK = {**STAYS, "settle_seconds": 4.0, "target_error_mm": 2.0}
 
 
 def pear(swell=1.0):
@@ -127,7 +128,7 @@ def test_one_garment_twice_is_refused():
         drape_layers([vest("shirt"), vest("jacket")], pear())
     with pytest.raises(InputError, match="no garment"):
         drape_layers([], pear())
-    with pytest.raises(InputError, match="two garments are called shirt"):
+    with pytest.raises(InputError, match="two garments are named shirt"):
         drape_layers([vest("shirt"), vest("shirt", 0.12)], pear())
 
 
@@ -140,6 +141,32 @@ def test_layers_that_end_the_wrong_way_about_are_told_with_places():
     beyond = outside(partial["shirt_draped"], partial["waistcoat_draped"], pear())
     assert partial["audit"]["out_of_order_vertices"] == len(beyond) > 100
     assert partial["audit"]["order_kept"] is False
+
+
+def test_what_went_wrong_while_garments_were_put_on_is_told(monkeypatch):
+    """Crossings with the room over what is beneath are no end; they, and each drape's own words, reach the report."""
+    asked = []
+
+    def drape(garment, body, fabric, settings, job):
+        asked.append(body)
+        job.note("a word")
+        job.warn("a verdict")
+        if len(asked) == 2:
+            raise IntersectingError("7 pairs still cross", partial={"draped": garment.mesh})
+        return Draped(garment.mesh, np.zeros_like(garment.mesh.vertices), None, (), {})
+
+    monkeypatch.setattr(layers_module, "drape", drape)
+    monkeypatch.setattr(layers_module, "dressed", lambda body, worn: body)
+    monkeypatch.setattr(layers_module._Outfit, "_settle", lambda self, worn, seconds: worn)
+    job = Job()
+    drape_layers([vest("shirt"), vest("waistcoat", 0.13, 0.03, 0.17)], pear(), QUICK, job)
+    assert len(asked) == 2
+    for name in ("shirt", "waistcoat"):
+        assert f"{name}: a word" in job.notes
+        assert f"{name}, when put on: a verdict" in job.warnings
+    told = [text for text in job.warnings if "7 pairs still cross" in text]
+    assert len(told) == 1
+    assert told[0].startswith("waistcoat, when put on: over the spare room")
 
 
 def test_settings_are_checked():

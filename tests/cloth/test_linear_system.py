@@ -7,8 +7,8 @@ import pytest
 from block_sheets import links, sheet, whole
 from scipy.sparse.linalg import spsolve
 
-from vto_pipeline.cloth.solvers import linear_system
-from vto_pipeline.cloth.solvers.linear_system import LinearSystem
+from vto_pipeline.cloth.implicit_step import linear_system
+from vto_pipeline.cloth.implicit_step.linear_system import LinearSystem
 
 COUNT = 12
 NOBODY = np.zeros(COUNT * COUNT, np.bool_)

@@ -6,10 +6,10 @@ from cloth_scenes import fabric, sheet, tube
 from numpy.testing import assert_allclose
 from scipy.spatial import Delaunay
 
-from vto_pipeline.cloth.build import build
-from vto_pipeline.cloth.constraints.stretch import stretch
+from vto_pipeline.cloth.constraints.membrane.stretch import stretch
 from vto_pipeline.cloth.constraints.sweep import add_forces
-from vto_pipeline.cloth.materials import Materials
+from vto_pipeline.cloth.model.build import build
+from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.errors import ConfigError, InputError
 from vto_pipeline.geometry.topology import boundary_loops
 from vto_pipeline.model.fabric import Fabric, StretchCurve
@@ -173,7 +173,7 @@ def test_rest_angles_keep_a_crease(bending):
 
 def test_isometric_bending_refuses_rest_angles():
     mesh = tube(0.2, 0.4, 20, 12)
-    with pytest.raises(ConfigError, match="flat rest shapes only"):
+    with pytest.raises(ConfigError, match="needs a flat rest shape"):
         build(mesh, RestShape(mesh.vertices, True), fabric(bending=1e-3), materials=Materials(bending="isometric"))
 
 

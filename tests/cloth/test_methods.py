@@ -6,18 +6,18 @@ from cloth_scenes import fabric, sheet
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import eigh
 
-from vto_pipeline.cloth.build import ClothState, build, model_of
 from vto_pipeline.cloth.collision.contacts import Round, gather
-from vto_pipeline.cloth.collision.shapes import Sphere
-from vto_pipeline.cloth.constraints.spring import springs
-from vto_pipeline.cloth.materials import Materials
-from vto_pipeline.cloth.methods import FRAME, METHODS, choose, highest_frequency
+from vto_pipeline.cloth.collision.shapes.colliders import Sphere
+from vto_pipeline.cloth.constraints.points.spring import springs
+from vto_pipeline.cloth.dynamics.methods import FRAME, METHODS, choose, highest_frequency
+from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
+from vto_pipeline.cloth.model.build import ClothState, build, model_of
+from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.simulation import simulate
-from vto_pipeline.cloth.stiffness import Stiffness
 from vto_pipeline.errors import ConfigError, DivergedError
 from vto_pipeline.model.garment import RestShape
-from vto_pipeline.numerics.block_matrix import to_scipy
-from vto_pipeline.numerics.threads import limited_threads
+from vto_pipeline.numerics.cpu_threads import limited_threads
+from vto_pipeline.numerics.linear.block_matrix import to_scipy
 
 EXPLICIT = ["explicit_euler", "symplectic_euler", "verlet", "leapfrog", "rk2", "rk4", "predictor_corrector"]
 ROD = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.2, 0.0, 0.0]])
@@ -60,7 +60,7 @@ def test_what_was_asked_for_is_taken(name):
     model, x = cloth()
     choice = choose(model, x, name, 7, 5)
     assert (choice.method, choice.substeps, choice.sweeps) == (name, 7, 5)
-    assert choice.reason == "asked for"
+    assert choice.reason == "chosen by the user"
     usual = choose(model, x, name, None, None)
     assert usual.substeps >= 1
     assert usual.sweeps >= 1

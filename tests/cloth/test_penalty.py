@@ -9,17 +9,17 @@ from numpy.testing import assert_allclose
 from scipy.optimize import check_grad
 
 from vto_pipeline.cloth import Moving, Path, Plane, simulate
-from vto_pipeline.cloth.build import build
 from vto_pipeline.cloth.collision.contacts import Round, gather
-from vto_pipeline.cloth.collision.penalty import Penalty
-from vto_pipeline.cloth.collision.self_contact import SelfContact
+from vto_pipeline.cloth.collision.response.penalty import Penalty
+from vto_pipeline.cloth.collision.self_collision.self_contact import SelfContact
+from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
+from vto_pipeline.cloth.model.build import build
 from vto_pipeline.cloth.simulation import AnyCollider
-from vto_pipeline.cloth.stiffness import Stiffness
 from vto_pipeline.errors import ConfigError
 from vto_pipeline.geometry.intersections import self_intersections
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.mesh import TriangleMesh
-from vto_pipeline.numerics.block_matrix import to_scipy
+from vto_pipeline.numerics.linear.block_matrix import to_scipy
 from vto_pipeline.units import GRAVITY
 
 FABRIC = fabric(stretch=1000.0, shear=200.0, bending=1e-5, density=0.2, friction=0.3)

@@ -5,8 +5,8 @@ import pytest
 from cloth_scenes import moved, tube
 from numpy.testing import assert_allclose
 
-from vto_pipeline.cloth.fill import Cubes, quarter_turns
-from vto_pipeline.cloth.place import PlaceConfig, place
+from vto_pipeline.cloth.placement.place import PlaceConfig, place
+from vto_pipeline.cloth.placement.voxel_fit import Cubes, quarter_turns
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.job import Job
@@ -63,7 +63,7 @@ def test_a_garment_that_stands_well_is_left_alone():
     collar = tube(0.09, 0.1, 36, 8, base=0.55)
     job = Job()
     assert_allclose(place(collar, spool(), FINE, job).put(collar.vertices), collar.vertices, rtol=0, atol=0)
-    assert job.notes == ["garment left where it stands: 100% as good as the best place"]
+    assert job.notes == ["garment left where it stands: its place scores 100% of the best"]
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_unit_and_axes_are_found_and_told(unit, metres, turn):
     assert_allclose(found[:, [0, 2]].mean(axis=0), 0.0, rtol=0, atol=0.01)
     rest = placement.turned(strayed.vertices)
     assert_allclose(np.ptp(rest, axis=0), np.ptp(worn.vertices, axis=0), rtol=1e-9)
-    assert any(f"taken to be in {unit}:" in note for note in job.notes) == (unit != "m")
+    assert any(f"assumed to be in {unit}:" in note for note in job.notes) == (unit != "m")
     assert any(note.startswith("garment turned") for note in job.notes) == (turn[1, 1] != 1.0)
 
 
@@ -94,6 +94,20 @@ def test_a_garment_too_small_starts_around_the_body_and_that_is_told():
     assert (SurfaceDistance(rod).signed(start.vertices).distance > -0.015).all()  # a cube
     assert_allclose(placement.turned(small.vertices), small.vertices, rtol=0, atol=0)  # it is as small as before
     assert job.warnings[0].startswith("too small")
+
+
+@pytest.mark.parametrize("turn", [np.eye(3), np.eye(3)[[0, 2, 1]]])
+def test_a_flat_sheet_goes_around_nothing(turn):
+    """Lying or standing; where it is asked to stay, it may."""
+    step = np.linspace(0.0, 0.6, 13)
+    x, z = np.meshgrid(step, step, indexing="ij")
+    at = np.arange(x.size).reshape(x.shape)
+    a, b, c, d = at[:-1, :-1].ravel(), at[1:, :-1].ravel(), at[1:, 1:].ravel(), at[:-1, 1:].ravel()
+    points = np.column_stack([x.ravel(), np.full(x.size, 0.9), z.ravel()]) @ turn.T
+    flat = TriangleMesh(points, np.vstack([np.column_stack([a, c, b]), np.column_stack([a, d, c])]))
+    with pytest.raises(InputError, match="goes around nothing"):
+        place(flat, tube(0.15, 1.0, 64, 51), PlaceConfig(), Job())
+    assert place(flat, tube(0.15, 1.0, 64, 51), PlaceConfig(place="as_it_stands"), Job()).scale == 1.0
 
 
 def test_a_garment_of_no_size_is_refused():

@@ -11,18 +11,18 @@ from numpy.testing import assert_allclose
 from scipy.optimize import minimize
 
 from vto_pipeline import cloth
-from vto_pipeline.cloth.audit import audit
-from vto_pipeline.cloth.balance import elastic_energy
-from vto_pipeline.cloth.build import at_rest, build
-from vto_pipeline.cloth.clear import clear_of_body
-from vto_pipeline.cloth.collision.body import BodyCollider
+from vto_pipeline.cloth.collision.body.contacts import BodyCollider
 from vto_pipeline.cloth.constraints.sweep import add_forces
-from vto_pipeline.cloth.grow import growing
-from vto_pipeline.cloth.judge.balance import Weave, knows
+from vto_pipeline.cloth.dynamics.residual import elastic_energy
+from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
+from vto_pipeline.cloth.judge.audit import audit
 from vto_pipeline.cloth.judge.gap import gaps_within
-from vto_pipeline.cloth.materials import Materials
-from vto_pipeline.cloth.rest_shape import RestShapeConfig, rest_shape
-from vto_pipeline.cloth.stepper import StepConfig, Stepper
+from vto_pipeline.cloth.judge.residual import Weave, knows
+from vto_pipeline.cloth.model.build import at_rest, build
+from vto_pipeline.cloth.model.materials import Materials
+from vto_pipeline.cloth.placement.body_growth import growing
+from vto_pipeline.cloth.placement.clear_body import clear_of_body
+from vto_pipeline.cloth.rest_shape.from_hanging import RestShapeConfig, rest_shape
 from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.geometry.topology import edges
 from vto_pipeline.model.body import MovingBody
@@ -212,6 +212,21 @@ def test_the_judge_sees_balance_and_the_want_of_it():
     x[45] += [0.002, 0, 0]
     assert judged(TriangleMesh(x, mesh.faces), mesh.vertices, fabric=weave, pinned=top)["judged_residual"] > 0.5
     assert judged(hung, mesh.vertices, fabric=weave)["judged_residual"] > 1.0  # the pins bear all of it
+    assert calm["judged_residual_left_out"] == len(top)
+    assert judged(hung, mesh.vertices, fabric=weave)["judged_residual_left_out"] == 0
+
+
+def test_the_judge_says_how_many_vertices_it_leaves_out():
+    """What other cloth may bear is not judged, here where two layers 0.5 mm apart overlap; nor are loose points."""
+    one = sheet(9, 9, 0.2, 0.2, upright=False)
+    high = moved(one, 0.1 + 1e-4, 5e-4, 0.0)  # half of it covers half of the other
+    loose = [[1.0, 1.0, 1.0]]
+    both = TriangleMesh(np.vstack([one.vertices, high.vertices, loose]), np.vstack([one.faces, high.faces + 81]))
+    apart = np.vstack([one.vertices, moved(high, 0, 0.1, 0).vertices, loose])
+    covered = np.sum(one.vertices[:, 0] > 0.1 - 0.025 - 1e-9) + np.sum(high.vertices[:, 0] < 0.2 + 0.026)
+    found = judged(both, apart, fabric=fabric(), skin=1e-3)
+    assert found["judged_residual_left_out"] == covered + 1
+    assert judged(TriangleMesh(apart, both.faces), apart, fabric=fabric(), skin=1e-3)["judged_residual_left_out"] == 1
 
 
 @pytest.mark.parametrize(("friction", "bears"), [(0.6, True), (0.3, False)])

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from bars import missed
 from ipc_judge import crosses
 
 from vto_pipeline.cloth.drape import drape
@@ -35,9 +36,14 @@ def test_tshirt(body, finer):
     began = time.perf_counter()
     found = drape(shirt, person, read_fabric("jersey"))
     LOG.info("%s, %d vertices: %.1f s", body, len(shirt.vertices), time.perf_counter() - began)
-    assert found.audit["settled"] is True
-    assert found.audit["penetration_mm"] == 0.0
-    assert found.audit["body_intersections"] == found.audit["self_intersections"] == 0
-    assert 0.0 < found.audit["rms_stretch"] < 0.05
+    audit, words = found.audit, ("settled", "residual", "judged_residual", "rms_stretch", "penetration_mm")
+    figures = {word: audit[word] for word in words} | {
+        "predicted_mm": found.trace[-1].error_mm,
+        "body_crossings": audit["body_intersections"],
+        "self_crossings": audit["self_intersections"],
+    }
+    LOG.info("%s", figures)
+    assert not missed("real_tshirt", figures)
+    assert audit["judged_residual_left_out"] < 0.1 * len(shirt.vertices)
     assert not crosses(found.mesh, person)
     assert crosses(TriangleMesh(found.mesh.vertices + np.array([0, 0, 0.01]), found.mesh.faces), person)  # it can tell

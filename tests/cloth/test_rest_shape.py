@@ -7,8 +7,8 @@ from cloth_scenes import fabric, sheet, tube
 from numpy.testing import assert_allclose
 
 from vto_pipeline.cloth.drape import drape
-from vto_pipeline.cloth.realise import realise
-from vto_pipeline.cloth.rest_shape import RestShapeConfig, rest_shape
+from vto_pipeline.cloth.rest_shape.edge_length_embedding import embed_edge_lengths
+from vto_pipeline.cloth.rest_shape.from_hanging import RestShapeConfig, rest_shape
 from vto_pipeline.errors import ConfigError
 from vto_pipeline.geometry.topology import edges
 from vto_pipeline.model.garment import Garment, RestShape
@@ -59,10 +59,12 @@ def test_lengths_that_can_be_met_are_met_and_nothing_else_changes():
     cut = tube(0.125, 0.3, 48, 16)
     pairs = edges(cut)
     wider = cut.vertices * np.array([1.02, 0.98, 1.02])
-    found = realise(cut.vertices, pairs, lengths(wider, cut))
+    found = embed_edge_lengths(cut.vertices, pairs, lengths(wider, cut))
     assert_allclose(lengths(found, cut), lengths(wider, cut), rtol=2e-4)  # the way is convex, and staying weighs 1e-4
     assert_allclose(found.mean(axis=0), cut.vertices.mean(axis=0), rtol=0, atol=1e-4)
-    assert_allclose(realise(cut.vertices, pairs, lengths(cut.vertices, cut)), cut.vertices, rtol=0, atol=1e-12)
+    assert_allclose(
+        embed_edge_lengths(cut.vertices, pairs, lengths(cut.vertices, cut)), cut.vertices, rtol=0, atol=1e-12
+    )
 
 
 def test_a_known_rest_shape_comes_back(scan):

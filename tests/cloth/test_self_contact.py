@@ -9,9 +9,9 @@ from cloth_scenes import fabric, moved, sheet
 from numpy.testing import assert_allclose, assert_array_equal
 
 from vto_pipeline.cloth import Plane, simulate
-from vto_pipeline.cloth.collision.self_contact import SelfContact
+from vto_pipeline.cloth.collision.self_collision.self_contact import SelfContact
 from vto_pipeline.model.mesh import TriangleMesh
-from vto_pipeline.numerics.threads import limited_threads
+from vto_pipeline.numerics.cpu_threads import limited_threads
 from vto_pipeline.units import GRAVITY
 
 FABRIC = fabric(stretch=1000.0, shear=200.0, bending=1e-5, density=0.2, friction=0.3)
@@ -170,8 +170,8 @@ def test_two_sheets_lie_one_on_the_other(solver):
 def test_sheets_that_collide_keep_their_momentum():
     mesh = stack(sheet(6, 6, 0.1, 0.1, upright=False), moved(sheet(6, 6, 0.1, 0.1, upright=False), 0.013, 0.004, 0.02))
     count = len(mesh.vertices) // 2
-    from vto_pipeline.cloth.build import ClothState, build
-    from vto_pipeline.cloth.stepper import StepConfig, Stepper
+    from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
+    from vto_pipeline.cloth.model.build import ClothState, build
     from vto_pipeline.model.garment import RestShape
 
     model = build(mesh, RestShape(mesh.vertices), FABRIC, gravity=(0.0, 0.0, 0.0))
@@ -203,4 +203,5 @@ def test_cloth_slides_on_cloth_as_on_a_plane(friction):
     )
     way = (found.positions - tilted.vertices)[count:].mean(axis=0) @ axes[0]
     fall = 0.5 * GRAVITY * seconds**2 * (1 + 1 / found.report["steps"])
-    assert_allclose((np.sin(slope) - way / fall) / np.cos(slope), friction, rtol=0, atol=0.01)
+    # measured off by 1e-4 in steps of 1/60 s; a hundred times that would be an edge that catches
+    assert_allclose((np.sin(slope) - way / fall) / np.cos(slope), friction, rtol=0, atol=3e-4)

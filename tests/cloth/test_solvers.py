@@ -6,19 +6,19 @@ from cloth_scenes import fabric, sheet
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import root
 
-from vto_pipeline.cloth.build import ClothState, at_rest, build, model_of
 from vto_pipeline.cloth.collision.contacts import Round, gather, nothing
-from vto_pipeline.cloth.collision.shapes import Plane, Sphere
-from vto_pipeline.cloth.constraints.combination import combinations
-from vto_pipeline.cloth.constraints.spring import springs
+from vto_pipeline.cloth.collision.shapes.colliders import Plane, Sphere
+from vto_pipeline.cloth.constraints.points.combination import combinations
+from vto_pipeline.cloth.constraints.points.spring import springs
 from vto_pipeline.cloth.constraints.sweep import add_forces
-from vto_pipeline.cloth.materials import Materials
+from vto_pipeline.cloth.implicit_step.frozen_step import frozen_step, residual_history, rms
+from vto_pipeline.cloth.model.build import ClothState, at_rest, build, model_of
+from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.solvers import SOLVERS
 from vto_pipeline.cloth.solvers.fast_projection import FastProjection
-from vto_pipeline.cloth.solvers.frozen_step import frozen_step, residual_history, rms
 from vto_pipeline.errors import ConfigError
 from vto_pipeline.model.garment import RestShape
-from vto_pipeline.numerics.threads import limited_threads
+from vto_pipeline.numerics.cpu_threads import limited_threads
 
 GRAVITY = 9.81
 SAME = 1e-6  # m: how far apart solvers may end

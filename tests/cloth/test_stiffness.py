@@ -6,14 +6,14 @@ from cloth_scenes import fabric, sheet
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from vto_pipeline.cloth.build import build, model_of
-from vto_pipeline.cloth.constraints.spring import springs
+from vto_pipeline.cloth.constraints.points.spring import springs
 from vto_pipeline.cloth.constraints.sweep import add_damping_forces, add_forces
-from vto_pipeline.cloth.materials import Materials
-from vto_pipeline.cloth.stiffness import Stiffness
+from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
+from vto_pipeline.cloth.model.build import build, model_of
+from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.model.garment import RestShape
-from vto_pipeline.numerics.block_matrix import PARALLEL_FROM, to_scipy
-from vto_pipeline.numerics.threads import limited_threads
+from vto_pipeline.numerics.cpu_threads import limited_threads
+from vto_pipeline.numerics.linear.block_matrix import PARALLEL_FROM, to_scipy
 
 MATERIALS = {
     "threads": Materials(bending="none"),

@@ -8,9 +8,9 @@ from cloth_scenes import moved, sheet
 from numpy.testing import assert_array_equal
 from test_self_contact import crosses, stack, triangles
 
-from vto_pipeline.cloth.collision import self_contact
-from vto_pipeline.cloth.collision.self_contact import SelfContact
-from vto_pipeline.cloth.collision.tally import Tally, tell
+from vto_pipeline.cloth.collision.self_collision import self_contact
+from vto_pipeline.cloth.collision.self_collision.self_contact import SelfContact
+from vto_pipeline.cloth.collision.self_collision.tally import Tally, tell
 from vto_pipeline.model.job import Job
 
 
@@ -125,7 +125,7 @@ def test_times_saved_are_those_of_what_was_done_times_what_was_not():
     assert job.metrics["self_searches_saved_s"] == 3.0
     assert (job.metrics["body_searches_left_out"], job.metrics["body_searches_saved_s"]) == (4, 2.0)
     assert (job.metrics["impacts_left_out"], job.metrics["impacts_saved_s"]) == (50, 2.0)
-    assert "60% of 10 questions needed none" in dict(job.left_out)["self-collision search"]
+    assert "60% of 10 queries needed none" in dict(job.left_out)["self-collision search"]
 
 
 def test_nothing_asked_is_nothing_told():

@@ -94,7 +94,7 @@ def test_what_is_not_tangled_stays_as_it_is_to_the_bit():
     found = untangle(x, faces, body=ball(0.1, (0, -0.2, 0)), thickness=GAP, job=job)
     assert_array_equal(found.positions, x)
     assert (found.left, found.rounds, found.area_growth) == (0, 0, 0.0)
-    assert job.left_out == [("untangling the start", "no triangles meet")]
+    assert job.left_out == [("untangling the start", "no triangles intersect")]
 
 
 def test_what_is_left_is_named_and_not_more_than_there_was():

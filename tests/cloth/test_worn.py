@@ -43,7 +43,7 @@ def test_cloth_that_does_not_touch_does_not_press():
 
 
 def test_the_whole_weight_of_a_flat_sheet_is_borne():
-    from vto_pipeline.bench.scenes import grid
+    from vto_pipeline.bench.cloth.scenes import grid
 
     across, along, faces = grid(11)
     sheet = TriangleMesh(0.2 * np.column_stack([across, np.full(121, 1e-2), -along]), faces)

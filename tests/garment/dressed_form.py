@@ -122,6 +122,49 @@ def make_scene(cell=0.006, noise=0.0003, holes=4, motion=None, color=True, seed=
     return Scene(form, shirt, surface, is_shirt[source], on_ledge[source], motion)
 
 
+SHORT_FORM_ENDS, SKIRT_TOP, SKIRT_HEM = 0.30, 0.52, 0.06  # heights [m]
+
+
+def short_form_distance(p):
+    """The form without its stand, cut off at the hips."""
+    return np.maximum(form_distance(p), SHORT_FORM_ENDS - p[:, 1])
+
+
+def skirt_distance(p):
+    """A cone round the form from the waist to near the floor, taken as a solid."""
+    x, y, z = p.T
+    wider = 0.22 * (SKIRT_TOP - y)
+    cone = (np.hypot(x / (0.178 + wider), z / (0.125 + wider)) - 1.0) * 0.15
+    return np.maximum(cone, np.maximum(y - SKIRT_TOP, SKIRT_HEM - y))
+
+
+def make_skirt_scene(cell=0.008, noise=0.0003, floor=True, seed=0):
+    """A long skirt on a short form, as a scanner sees it: no underside, and the floor only if asked for."""
+    rng = np.random.default_rng(seed)
+    low, high = (-0.56, -0.03, -0.36), (0.56, 0.94, 0.36)
+    form = outward(*level_set(short_form_distance, low, high, cell))
+
+    def seen(p):
+        dressed = np.minimum(short_form_distance(p), skirt_distance(p))
+        board = np.max(np.abs(p - [0, -0.01, 0]) - [0.5, 0.01, 0.33], axis=1)
+        return np.minimum(dressed, board) if floor else dressed
+
+    scan = outward(*level_set(seen, low, high, cell))
+    v = scan.vertices
+    is_skirt = (
+        (np.abs(skirt_distance(v)) < 0.5 * cell) & (short_form_distance(v) > 0.5 * cell) & (v[:, 1] > 0.5 * SKIRT_HEM)
+    )
+    middle = v[scan.faces].mean(axis=1)
+    under = np.abs(middle[:, 1] - SKIRT_HEM) < 0.75 * cell  # the cut through the solid, with its bevel
+    keep = ~under & (middle[:, 1] > -0.004)
+    rgb = np.where(is_skirt[:, None], [60, 90, 160], [205, 190, 170]).astype(float)
+    rgb = np.clip(rgb + rng.normal(0, 6, rgb.shape), 0, 255).astype(np.uint8)
+    v = v + vertex_normals(scan) * rng.normal(0, noise, (len(v), 1))
+    surface, source = submesh(TriangleMesh(v, scan.faces, rgb), keep)
+    on_ledge = np.abs(v[:, 1] - SKIRT_TOP) < cell
+    return Scene(form, form, surface, is_skirt[source], on_ledge[source], np.eye(4))
+
+
 def outward(v, f):
     mesh = TriangleMesh(v, f)
     a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))

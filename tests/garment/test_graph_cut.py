@@ -12,28 +12,28 @@ from vto_pipeline.garment.color_model import cielab, color_evidence
 from vto_pipeline.garment.graph_cut import cut
 
 
-def energy(label, leaning, edges, price):
-    wrong = np.where(label, np.maximum(-leaning, 0.0), np.maximum(leaning, 0.0)).sum()
-    return wrong + price[label[edges[:, 0]] != label[edges[:, 1]]].sum()
+def energy(label, unary, edges, pairwise):
+    wrong = np.where(label, np.maximum(-unary, 0.0), np.maximum(unary, 0.0)).sum()
+    return wrong + pairwise[label[edges[:, 0]] != label[edges[:, 1]]].sum()
 
 
 @pytest.mark.parametrize("seed", range(30))
 def test_no_division_is_cheaper(seed):
     rng = np.random.default_rng(seed)
     count = 9
-    leaning = rng.normal(0, 1.5, count)
+    unary = rng.normal(0, 1.5, count)
     edges = np.array([(i, j) for i in range(count) for j in range(i) if rng.random() < 0.4])
-    price = rng.uniform(0, 2, len(edges))
-    best = min(energy(np.array(label), leaning, edges, price) for label in product([False, True], repeat=count))
-    found = energy(cut(leaning, edges, price), leaning, edges, price)
+    pairwise = rng.uniform(0, 2, len(edges))
+    best = min(energy(np.array(label), unary, edges, pairwise) for label in product([False, True], repeat=count))
+    found = energy(cut(unary, edges, pairwise), unary, edges, pairwise)
     assert_allclose(found, best, atol=count * 1e-4)  # whole-number capacities of 1e-4
 
 
 def test_prices_bring_lone_dissenters_round_and_free_edges_do_not():
-    leaning = np.array([3.0, 3.0, -1.0, 3.0, -3.0, -3.0])
+    unary = np.array([3.0, 3.0, -1.0, 3.0, -3.0, -3.0])
     chain = np.column_stack([np.arange(5), np.arange(1, 6)])
-    assert cut(leaning, chain, np.ones(5)).tolist() == [True] * 4 + [False] * 2
-    assert cut(leaning, chain, np.zeros(5)).tolist() == (leaning > 0).tolist()
+    assert cut(unary, chain, np.ones(5)).tolist() == [True] * 4 + [False] * 2
+    assert cut(unary, chain, np.zeros(5)).tolist() == (unary > 0).tolist()
 
 
 def test_lab_of_known_colours():

@@ -6,8 +6,8 @@ import trimesh
 from numpy.testing import assert_allclose
 
 from vto_pipeline.garment.simulation_mesh import SimulationMeshConfig, least_angles, remesh_for_simulation
-from vto_pipeline.geometry.remesh import edge_lengths, perimeter
-from vto_pipeline.geometry.repair import is_manifold
+from vto_pipeline.geometry.remeshing.remesh import edge_lengths, perimeter
+from vto_pipeline.geometry.remeshing.repair import is_manifold
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import boundary_loops, edge_face_counts, edge_faces, edges, face_components
 from vto_pipeline.model.job import Job
@@ -75,7 +75,7 @@ CASES = {
 
 @pytest.mark.parametrize("how", CASES)
 def test_a_tube_comes_out_as_a_tube_whatever_was_wrong_with_it(how):
-    from vto_pipeline.geometry.repair import RepairConfig, repair
+    from vto_pipeline.geometry.remeshing.repair import RepairConfig, repair
 
     mesh, job = broken(how), Job()
     if how == "100 edges of three faces":

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from dressed_form import SHORT_FORM_ENDS, SKIRT_HEM, SKIRT_TOP, make_skirt_scene
 from numpy.testing import assert_allclose
 
 from vto_pipeline.errors import GarmentError
+from vto_pipeline.garment.openings import OpeningsConfig, close_scan_holes
 from vto_pipeline.garment.subtract import SubtractConfig, extract_garment, label_garment
-from vto_pipeline.geometry.repair import is_manifold
+from vto_pipeline.geometry.remeshing.repair import is_manifold
 from vto_pipeline.geometry.rigid import moved
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import face_components
@@ -76,3 +78,25 @@ def test_the_shell_is_one_manifold_piece_on_the_true_shirt(scene, placed):
 def test_a_bare_form_is_refused(scene):
     with pytest.raises(GarmentError, match="stands off"):
         label_garment(scene.form, scene.form, SubtractConfig(thickness_mm=1.0), Job())
+
+
+@pytest.mark.parametrize("floor", [True, False])
+def test_a_long_skirt_on_a_short_form_is_cloth_down_to_its_hem(floor):
+    """Half of it hangs below the form; the floor is where the level surface is, not where the form ends."""
+    dressed = make_skirt_scene(floor=floor)
+    job = Job()
+    labels = label_garment(dressed.scan, dressed.form, SubtractConfig(), job)
+    height = dressed.scan.vertices[:, 1]
+    hanging = dressed.is_shirt & (height < SHORT_FORM_ENDS)
+    assert hanging.sum() > 0.4 * dressed.is_shirt.sum()
+    assert labels.garment[hanging].mean() > 0.99
+    assert (labels.garment == dressed.is_shirt)[~dressed.on_ledge].mean() > 0.97
+    if floor:
+        assert_allclose(job.metrics["floor_mm"], 0.0, rtol=0, atol=0.5)  # the board's top, in noise of 0.3 mm
+        assert labels.garment[height < 0.5 * SKIRT_HEM].mean() < 0.005  # single vertices in the tail of the noise
+    shell = extract_garment(dressed.scan, labels, SubtractConfig(), job)
+    skirt, openings, _ = close_scan_holes(shell, dressed.form, OpeningsConfig(), job)
+    assert_allclose(
+        [one.center[1] for one in openings], [SKIRT_TOP, SKIRT_HEM], rtol=0, atol=0.012
+    )  # a cell and a half
+    assert skirt.vertices[:, 1].min() < SKIRT_HEM + 0.016

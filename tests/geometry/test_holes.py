@@ -8,11 +8,11 @@ import shapes
 from numpy.testing import assert_allclose, assert_array_equal
 
 from vto_pipeline.errors import GarmentError
-from vto_pipeline.geometry.holes import fill_bay, fill_holes
-from vto_pipeline.geometry.remesh import edge_lengths
-from vto_pipeline.geometry.repair import is_manifold
+from vto_pipeline.geometry.remeshing.holes import fill_bay, fill_holes
+from vto_pipeline.geometry.remeshing.remesh import edge_lengths
+from vto_pipeline.geometry.remeshing.repair import is_manifold
+from vto_pipeline.geometry.remeshing.triangulate import triangulate_loop
 from vto_pipeline.geometry.topology import boundary_loops, boundary_walks, face_normals, submesh
-from vto_pipeline.geometry.triangulate import triangulate_loop
 from vto_pipeline.model.mesh import TriangleMesh
 
 

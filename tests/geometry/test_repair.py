@@ -9,7 +9,7 @@ import trimesh
 from numpy.testing import assert_allclose
 
 from vto_pipeline.errors import InputError
-from vto_pipeline.geometry.repair import RepairConfig, is_manifold, repair
+from vto_pipeline.geometry.remeshing.repair import RepairConfig, is_manifold, repair
 from vto_pipeline.geometry.topology import boundary_loops, face_components
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh

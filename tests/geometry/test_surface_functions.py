@@ -8,12 +8,12 @@ import shapes
 from numpy.testing import assert_allclose
 
 from vto_pipeline.errors import InputError
-from vto_pipeline.geometry.cut import keep_positive
 from vto_pipeline.geometry.geodesic import distance_from
 from vto_pipeline.geometry.laplace import extend, laplacian
+from vto_pipeline.geometry.remeshing.cut import keep_positive
+from vto_pipeline.geometry.remeshing.subdivide import split_long_edges
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.subdivide import split_long_edges
 from vto_pipeline.geometry.topology import boundary_loops, edge_faces, edges, face_area_vectors, submesh
 from vto_pipeline.model.mesh import TriangleMesh
 

@@ -92,6 +92,16 @@ def test_pieces_that_share_only_a_vertex_are_two():
     assert topology.face_components(mesh)[0] == 2
 
 
+def test_two_balls_as_one_mesh_are_two_pieces_with_their_areas():
+    small, large = shapes.sphere(4), shapes.sphere(4)
+    large = TriangleMesh(3.0 * large.vertices, large.faces)
+    both = topology.concatenate([small, large])
+    assert_array_equal(both.vertices[both.faces[len(small.faces) :]], large.vertices[large.faces])
+    piece, area = topology.component_areas(both)
+    assert_array_equal(piece, np.repeat([0, 1], [len(small.faces), len(large.faces)]))
+    assert_allclose(area[1], 9.0 * area[0], rtol=1e-12)  # rounding
+
+
 def test_an_edge_of_three_faces_is_refused():
     fin = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]], [[0, 1, 2], [1, 0, 3], [0, 1, 4]])
     with pytest.raises(InputError, match="more than two faces"):

@@ -1,4 +1,4 @@
-"""A mesh to write and read: a capsule the size of a person, with colours."""
+"""A mesh to write and read: a capsule the size of a person, with colours; and what may happen to a file."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+DAMAGES = 200
 
 
 def capsule() -> Any:
@@ -38,3 +40,17 @@ def write_all_formats(folder: Path) -> dict[str, Path]:
         kind = "ply" if name == "ply_ascii" else name
         mesh.export(files[name], file_type=kind, **options)
     return files
+
+
+def damages(data: bytes, rng: np.random.Generator) -> list[bytes]:
+    """A quarter cut short, a quarter with changes in the header (first 400 bytes), the rest with changes anywhere."""
+    found = []
+    for i in range(DAMAGES):
+        damaged = np.frombuffer(data, np.uint8).copy()
+        if i % 4 == 0:
+            damaged = damaged[: rng.integers(1, len(data))]
+        else:
+            reach = min(len(data), 400) if i % 4 == 1 else len(data)
+            damaged[rng.integers(0, reach, rng.integers(1, 9))] = rng.integers(0, 256)
+        found.append(damaged.tobytes())
+    return found

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from vto_pipeline.errors import InputError
-from vto_pipeline.io.artifacts import ARTIFACTS
+from vto_pipeline.io.runs.artifacts import ARTIFACTS
 from vto_pipeline.model.artifact import ArtifactKind
 from vto_pipeline.model.body import Measurements, MovingBody
 from vto_pipeline.model.camera import CameraSet, Intrinsics
@@ -42,7 +42,7 @@ VALUES: dict[str, Any] = {
     "garment_trajectory": POSES,
     "garment_surface": TriangleMesh(POINTS, FACES, COLORS),
     "garment_placement": POSES[0],
-    "labels": SurfaceLabels(RNG.random(8) > 0.5, RNG.random(8) > 0.5, RNG.random(8)),
+    "labels": SurfaceLabels(RNG.random(8) > 0.5, RNG.random(8)),
     "garment_shell": MESH,
     "garment": MESH,
     "openings": (
@@ -140,9 +140,9 @@ def test_a_given_mesh_is_received_with_its_guess_told_and_ours_is_taken_as_it_is
     assert kind.receive is not None
     job = Job()
     assert np.ptp(kind.receive(tmp_path / "form.ply", job).vertices) < 2.0
-    assert any("unit: taken as cm" in note for note in job.notes)
+    assert any("unit: assumed to be cm" in note for note in job.notes)
     assert kind.inline is not None
     given = kind.inline({"file": tmp_path / "form.ply", "unit": "mm"})
     assert np.ptp(given.vertices) < 0.2
-    with pytest.raises(InputError, match="wanted a path, or a mapping such as {file: shirt.obj, unit: cm}"):
+    with pytest.raises(InputError, match="expected a path, or a mapping such as {file: shirt.obj, unit: cm}"):
         kind.inline({"path": "x"})

@@ -12,8 +12,8 @@ from PIL import Image
 
 from vto_pipeline.errors import FormatError, InputError
 from vto_pipeline.io.arrays import read_arrays, write_arrays
-from vto_pipeline.io.avatars import read_avatar, receive_avatar, write_avatar
-from vto_pipeline.io.bodies import (
+from vto_pipeline.io.bodies.avatars import read_avatar, receive_avatar, write_avatar
+from vto_pipeline.io.bodies.measurements import (
     read_landmarks,
     read_measurements,
     read_silhouettes,
@@ -54,15 +54,28 @@ def test_measurements_come_back_exactly(tmp_path: Path) -> None:
     ("old", "new", "problem", "line", "hint"),
     [
         ("chest_girth", "chest_grith", "measurements.chest_grith: unknown measurement (got 96.5)", 5, "chest_girth?"),
-        ("cm", "m", "measurements.stature: 178 m is not a body's; wanted 0.5 to 2.6 m", 4, "read in m: set unit:"),
-        ("178", "17.8", "measurements.stature: 0.178 m is not a body's; wanted 0.5 to 2.6 m", 4, "read in cm"),
+        (
+            "cm",
+            "m",
+            "measurements.stature: 178 m is not plausible; expected 0.5 to 2.6 m",
+            4,
+            "read in m; to change that, set unit:",
+        ),
+        ("178", "17.8", "measurements.stature: 0.178 m is not plausible; expected 0.5 to 2.6 m", 4, "read in cm"),
         ("cm", "inch", "unit: input should be 'm', 'cm', 'mm' or 'in' (got 'inch')", 2, ""),
         ("male", "boy", "sex: input should be 'female', 'male' or 'neutral' (got 'boy')", 1, ""),
         ("178", "-178", "measurements.stature: -1.78 m", 4, ""),
         ("178", ".nan", "measurements.stature: input should be a finite number (got nan)", 4, ""),
-        ("75", "7500", "measurements.mass: 7500 kg is not a body's; wanted 10.0 to 400.0 kg", 7, ""),
+        ("75", "7500", "measurements.mass: 7500 kg is not plausible; expected 10.0 to 400.0 kg", 7, ""),
         ("sigmas", "sigma", "sigma: unknown key", 8, "did you mean sigmas?"),
         ("{waist_girth", "{waist", "sigmas.waist: unknown measurement", 8, "waist_girth?"),
+        (
+            "sigmas:",
+            "waist girth: 80\n#",
+            "outside the section measurements (got 80)",
+            8,
+            "measurements: {waist girth: 80}",
+        ),
     ],
 )
 def test_a_wrong_protocol_is_named_with_its_line(
@@ -113,9 +126,9 @@ def test_incomplete_silhouettes_are_named(tmp_path: Path) -> None:
         read_silhouettes(tmp_path)
     assert caught.value.hint == "is it in centimetres?"
     (tmp_path / "side.jpg").unlink()
-    with pytest.raises(InputError, match="0 pictures called side"):
+    with pytest.raises(InputError, match="0 pictures named side"):
         read_silhouettes(tmp_path)
-    with pytest.raises(InputError, match="silhouettes hold front; wanted front, side, stature"):
+    with pytest.raises(InputError, match="silhouettes hold front; expected front, side, stature"):
         read_silhouettes({"front": tmp_path / "front.png"})
 
 
@@ -215,7 +228,7 @@ def test_letter_beside_a_chest() -> None:
     ("document", "says"),
     [
         ({"size": "M"}, "letters differ between women and men"),
-        ({"sex": "male", "size": "huge"}, "size 'huge' is not known; wanted XXS"),
+        ({"sex": "male", "size": "huge"}, "size 'huge' is not known; expected XXS"),
         ({"sex": "male"}, "neither measurements nor size"),
     ],
 )

@@ -94,12 +94,12 @@ CASES: dict[str, tuple[dict[str, Any], str]] = {
     "web address": ({"buffers": [{"byteLength": 44, "uri": "http://example.com/x.bin"}]}, "leads out of the folder"),
     "image path": ({"images": [{"uri": "../x.png"}]}, "leads out of the folder"),
     "buffer missing": ({"buffers": [{"byteLength": 44, "uri": "x.bin"}]}, "buffer x.bin has no bytes"),
-    "draco": ({"extensionsRequired": ["KHR_draco_mesh_compression"]}, "KHR_draco_mesh_compression is not read"),
+    "meshopt": ({"extensionsRequired": ["EXT_meshopt_compression"]}, "EXT_meshopt_compression is not supported"),
     "loop": ({"nodes": [{"children": [1]}, {"children": [0], "mesh": 0}]}, "the nodes form a loop"),
     "version": ({"asset": {"version": "1.0"}}, "not glTF 2.0"),
     "nothing": ({"nodes": [{}]}, "no triangles"),
     "wrong kind": ({"meshes": [3]}, "meshes is not a list of objects"),
-    "transform": ({"nodes": [{"mesh": 0, "scale": [1, 2]}]}, "transform is not understood"),
+    "transform": ({"nodes": [{"mesh": 0, "scale": [1, 2]}]}, "cannot parse a node's transform"),
 }
 
 

@@ -47,7 +47,7 @@ CASES = {
     ),
     "index_negative.ply": (ascii_ply("3 0 1 2\n3 0 1 -1\n"), "face 1 has the vertices 0, 1, -1"),
     "index_negative_binary.ply": (binary_ply([0, 1, -1]), "face 0 has the vertices 0, 1, -1"),
-    "index_fraction.ply": (ascii_ply("3 0 1 2\n3 0 1 2.5\n"), "vertex index 2.5 is no whole number"),
+    "index_fraction.ply": (ascii_ply("3 0 1 2\n3 0 1 2.5\n"), "vertex index 2.5 is not a whole number"),
     "nan.ply": (ascii_ply(points="0 0 0\n1 nan 0\n0 1.5 0\n0 0 0.5\n"), "vertex 1 is (1, nan, 0)"),
     "infinite.ply": (ascii_ply(points="0 0 0\n1 0 0\n0 inf 0\n0 0 0.5\n"), "vertex 2 is (0, inf, 0)"),
     "claims_two_thousand_million.ply": (
@@ -60,7 +60,7 @@ CASES = {
     ),
     "list_claims.ply": (binary_ply([0, 1, 2])[:-13] + bytes([255]) + bytes(12), "a list claims 255 entries"),
     "decimal_comma.ply": (ascii_ply(points=POINTS.replace("1.5", "1,5")), "'1,5' is not a number"),
-    "points_only.ply": (ascii_ply("", count=0), "4 points and no faces; wanted a mesh"),
+    "points_only.ply": (ascii_ply("", count=0), "4 points and no faces; expected a mesh"),
     "not_a_ply.ply": (b"hello", "not a PLY file"),
     "more_than_promised.ply": (ascii_ply(count=1), "left over after the last element"),
     "header_without_end.ply": (b"ply\nformat ascii 1.0\nelement vertex 4\n", "no 'ply ... end_header'"),
@@ -71,10 +71,10 @@ CASES = {
     "nan.obj": (OBJ.replace(b"1.5", b"nan") + b"f 1 2 3\n", "vertex 2 is (0, nan, 0)"),
     "cut_in_a_face.obj": (OBJ + b"f 1 2 3\nf 1 2", "a face with 2 corners"),
     "cut_in_a_vertex.obj": (OBJ + b"v 1 2\nf 1 2 3\n", "2 numbers in this line, 3 in the lines before"),
-    "cut_in_a_keyword.obj": (OBJ + b"f 1 2 3\nuse", "'use' is no OBJ keyword"),
+    "cut_in_a_keyword.obj": (OBJ + b"f 1 2 3\nuse", "'use' is not an OBJ keyword"),
     "decimal_comma.obj": (OBJ.replace(b"1.5", b"1,5") + b"f 1 2 3\n", "'1,5' is not a number"),
     "no_faces.obj": (OBJ, "3 vertices and 0 faces"),
-    "bytes.obj": (b"v 0 0 0\n\0\0\0", "no text file"),
+    "bytes.obj": (b"v 0 0 0\n\0\0\0", "not a text file"),
     "cut.stl": (
         b"solid a\n" + STL_FACET.encode() + b"facet normal 0 0 1\nouter loop\n",
         "2 facets, 3 corners, 0 endsolid",
@@ -82,6 +82,20 @@ CASES = {
     "cut_between_facets.stl": (b"solid a\n" + STL_FACET.encode(), "1 facets, 3 corners, 0 endsolid"),
     "count.stl": (bytes(80) + np.uint32(2_000_000_000).tobytes() + bytes(50), "take 100000000084"),
     "empty_solid.stl": (b"solid nothing\nendsolid nothing\n", "0 facets"),
+    "decimal_comma.stl": (
+        b"solid a\n" + STL_FACET.replace("1.5", "1,5").encode() + b"endsolid\n",
+        "'1,5' is not a number",
+    ),
+    "corner_short_of_a_number.stl": (
+        b"solid a\n" + STL_FACET.replace("1 0 0", "1 0").encode() + b"endsolid\n",
+        "2 numbers in this line, 3 in the lines before",
+    ),
+    "decimal_comma.off": (b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1,5 0\n3 0 1 2\n", "'1,5' is not a number"),
+    "index_out_of_range.off": (b"OFF\n4 1 0\n" + POINTS.encode() + b"3 0 1 4\n", "face 0 has the vertices 0, 1, 4"),
+    "index_fraction.off": (
+        b"OFF\n4 1 0\n" + POINTS.encode() + b"3 0 1 2.5\n",
+        "vertex index 2.5 is not a whole number",
+    ),
     "counts.off": (
         b"OFF\n4 9 0\n" + POINTS.encode() + b"3 0 1 2\n",
         "promises 4 vertices and 9 faces, but 5 lines follow",
@@ -127,7 +141,7 @@ def test_a_truncated_file_is_an_error_and_never_a_shorter_mesh(tmp_path: Path, n
         (
             "body.fbx",
             b"Kaydara",
-            "files of type .fbx are not read here; wanted .glb, .gltf, .npz, .obj, .off, .ply, .stl",
+            "files of type .fbx are not supported; expected .glb, .gltf, .npz, .obj, .off, .ply, .stl",
             "",
         ),
     ],
@@ -144,10 +158,10 @@ def test_what_is_no_mesh_file_is_refused_unopened(
 def test_a_zip_is_not_opened_whatever_its_name(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
         archive.writestr("mesh.obj", OBJ + b"f 1 2 3\n")
-    with pytest.raises(InputError, match="files of type .zip are not read"):
+    with pytest.raises(InputError, match="files of type .zip are not supported"):
         read_mesh(tmp_path / "a.zip")
     (tmp_path / "a.zip").rename(tmp_path / "a.obj")
-    with pytest.raises(FormatError, match="no text file"):
+    with pytest.raises(FormatError, match="not a text file"):
         read_mesh(tmp_path / "a.obj")
 
 

@@ -26,21 +26,29 @@ def cloud() -> PointCloud:
     return PointCloud(points, normals, rng.integers(0, 256, (COUNT, 3)).astype(np.uint8))
 
 
-def write_with_open3d(path: Path, ascii_: bool) -> None:
+def write_with_open3d(path: Path, ascii_: bool, compressed: bool = False) -> None:
     import open3d as o3d
 
     truth = cloud()
     theirs = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.array(truth.points)))
     theirs.normals = o3d.utility.Vector3dVector(np.array(truth.normals))
     theirs.colors = o3d.utility.Vector3dVector(truth.colors / 255.0)
-    o3d.io.write_point_cloud(str(path), theirs, write_ascii=ascii_)
+    o3d.io.write_point_cloud(str(path), theirs, write_ascii=ascii_, compressed=compressed)
 
 
-@pytest.mark.parametrize("ascii_", [False, True])
-@pytest.mark.parametrize("suffix", [".pcd", ".ply"])
-def test_clouds_of_open3d_are_read(tmp_path: Path, suffix: str, ascii_: bool) -> None:
+@pytest.mark.parametrize(
+    ("suffix", "ascii_", "compressed"),
+    [
+        (".pcd", False, False),
+        (".pcd", True, False),
+        (".pcd", False, True),
+        (".ply", False, False),
+        (".ply", True, False),
+    ],
+)
+def test_clouds_of_open3d_are_read(tmp_path: Path, suffix: str, ascii_: bool, compressed: bool) -> None:
     path = tmp_path / f"a{suffix}"
-    write_with_open3d(path, ascii_)
+    write_with_open3d(path, ascii_, compressed)
     truth, back = cloud(), read_cloud(path)
     assert back.normals is not None
     assert back.colors is not None
@@ -81,7 +89,7 @@ def test_unusable_normals_are_left_out_and_told(tmp_path: Path) -> None:
     np.savetxt(tmp_path / "a.xyz", np.hstack([cloud().points, np.zeros((COUNT, 3))]))
     job = Job()
     assert read_cloud(tmp_path / "a.xyz", job=job).normals is None
-    assert "a.xyz: left out the normals: some are zero or not finite" in job.notes
+    assert "a.xyz: ignored the normals, as some are zero or not finite" in job.notes
 
 
 def test_points_without_a_reading_are_dropped_and_told(tmp_path: Path) -> None:
@@ -99,7 +107,7 @@ def test_points_without_a_reading_are_dropped_and_told(tmp_path: Path) -> None:
     [
         ("a.xyz", b"1 2 3\n4 5\n", "2 numbers in this line, 3 in the lines before"),
         ("b.xyz", b"1 2 3\n4 5,5 6\n", "'5,5' is not a number"),
-        ("c.xyz", b"1 2\n3 4\n", "2 numbers in a line; wanted 3, 6"),
+        ("c.xyz", b"1 2\n3 4\n", "2 numbers in a line; expected 3, 6"),
         ("d.xyz", b"# nothing\n", "there are no points"),
         ("e.xyz", b"0 0 0\nnan 1 1\n", "vertex 1 is (nan, 1, 1)"),
         ("a.pcd", b"VERSION 0.7\n", "no DATA line"),
@@ -109,9 +117,21 @@ def test_points_without_a_reading_are_dropped_and_told(tmp_path: Path) -> None:
             "24000000000 bytes), 3",
         ),
         ("c.pcd", b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 9\nDATA ascii\n1 2 3\n", "9 points promised, 1 lines"),
-        ("d.pcd", b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 1\nDATA binary_compressed\n1", "binary_compressed"),
+        ("d.pcd", b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 1\nDATA zipped\n1", "DATA zipped is not supported"),
+        (
+            "g.pcd",
+            b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 9\nDATA binary_compressed\n\x01\0\0\0\xff\0\0\0a",
+            "108 bytes promised, 255 packed into 1, 9 bytes follow",
+        ),
+        (
+            "h.pcd",
+            b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 1\nDATA binary_compressed\n\x02\0\0\0\x0c\0\0\0\xff\xff",
+            "Open3D cannot read",
+        ),
+        ("i.pcd", b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 1\nDATA ascii\n1 2,5 3\n", "'2,5' is not a number"),
+        ("j.pcd", b"FIELDS x y w\nSIZE 4 4 4\nTYPE F F F\nPOINTS 1\nDATA ascii\n1 2 3\n", "no x, y, z; found x, y, w"),
         ("e.pcd", b"FIELDS x y z\nSIZE 4 4\nTYPE F F F\nPOINTS 1\nDATA ascii\n1 2 3\n", "differ in length"),
-        ("f.pcd", b"FIELDS x y z\nSIZE 3 4 4\nTYPE F F F\nPOINTS 1\nDATA ascii\n1 2 3\n", "header is not understood"),
+        ("f.pcd", b"FIELDS x y z\nSIZE 3 4 4\nTYPE F F F\nPOINTS 1\nDATA ascii\n1 2 3\n", "cannot parse the header"),
         ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nend_header\n", "there are no vertices"),
     ],
 )

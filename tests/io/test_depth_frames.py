@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from PIL import Image
 
 from vto_pipeline.errors import InputError
-from vto_pipeline.io.depth import read_depth, read_depth_frames
+from vto_pipeline.io.captures.depth import read_depth, read_depth_frames
 from vto_pipeline.model.job import Job
 
 CAMERA = {"width": 64, "height": 48, "fx": 60.0, "fy": 61.0, "cx": 31.5, "cy": 23.5, "depth_scale": 1000.0}
@@ -103,13 +103,13 @@ def no_depth(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("damage", "problem", "where"),
     [
-        (eight_bits, "of the kind L; wanted one channel of 16 bits", "000001.png"),
+        (eight_bits, "pixel mode L; expected one 16-bit channel", "000001.png"),
         (other_size, "the frame is 64 x 24, intrinsics.json says 64 x 48", "000001.png"),
         (colour_missing, "3 depth frames but 2 colour frames", ""),
-        (cut, "broken or cut off", "000002.png"),
-        (scaled_pose, "pose 1 is no rigid transform", "poses.json"),
-        (mirrored_pose, "pose 0 is no rigid transform", "poses.json"),
-        (too_few_poses, "poses have shape (2, 4, 4); wanted (3, 4, 4)", "poses.json"),
+        (cut, "damaged or truncated", "000002.png"),
+        (scaled_pose, "pose 1 is not a rigid transform", "poses.json"),
+        (mirrored_pose, "pose 0 is not a rigid transform", "poses.json"),
+        (too_few_poses, "poses have shape (2, 4, 4); expected (3, 4, 4)", "poses.json"),
         (no_intrinsics, "no such file", "intrinsics.json"),
         (no_depth, "there are no depth frames", "depth"),
     ],

@@ -104,7 +104,7 @@ def test_missing_empty_and_foreign_files_are_named(tmp_path: Path) -> None:
     assert caught.value.hint == "did you mean demo.yaml?"
     with pytest.raises(ConfigError, match="empty"):
         load_yaml(written(tmp_path, "", "empty.yaml"))
-    with pytest.raises(ConfigError, match="not read here; wanted .json, .yaml, .yml"):
+    with pytest.raises(ConfigError, match="not supported; expected .json, .yaml, .yml"):
         load_yaml(written(tmp_path, "a: 1", "demo.txt"))
     (tmp_path / "latin.yaml").write_bytes(b"name: caf\xe9")
     with pytest.raises(ConfigError, match="not UTF-8 text \\(byte 9\\)"):

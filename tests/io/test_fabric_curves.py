@@ -10,10 +10,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from vto_pipeline.errors import InputError
-from vto_pipeline.io.fabric_curves import lost_share, measured_curve, power_law, secant
+from vto_pipeline.io.fabric_formats.curves import lost_share, measured_curve, power_law, secant
 from vto_pipeline.io.fabrics import read_fabric
 from vto_pipeline.model.fabric import StretchCurve
-from vto_pipeline.numerics.monotone_curve import curve_at, monotone_curve
+from vto_pipeline.numerics.mechanics.monotone_curve import curve_at, monotone_curve
 
 DATA = Path(__file__).parents[3] / "shared" / "reference" / "data"
 CURVES, SUMMARY = DATA / "u3m_fab_tensile_curves.csv", DATA / "u3m_fab_tensile_summary.csv"

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from vto_pipeline.errors import InputError, VtoError
 from vto_pipeline.io.fabrics import read_fabric
-from vto_pipeline.numerics.monotone_curve import curve_at, monotone_curve
+from vto_pipeline.numerics.mechanics.monotone_curve import curve_at, monotone_curve
 
 KES = """\
 instrument: KES-FB
@@ -189,29 +189,29 @@ def test_a_stiff_thread_whose_extensions_the_dial_rounds_together() -> None:
 @pytest.mark.parametrize(
     ("name", "text", "problem", "line"),
     [
-        ("a.yaml", KES.replace("KES-FB", "KES-FX"), "instrument: 'KES-FX' is not known", 1),
+        ("a.yaml", KES.replace("KES-FB", "KES-FX"), "instrument: 'KES-FX' is not supported", 1),
         ("a.yaml", KES.replace("W: 16.29\n", ""), "W: missing (mass per area [mg/cm²])", None),
         ("a.yaml", KES.replace("MMD:", "MND:"), "MND: unknown parameter", 16),
-        ("a.yaml", KES.replace("W: 16.29", "W: 1629"), "W: mass per area of 1629 mg/cm²; wanted 0.1 to 500", 4),
-        ("a.yaml", KES.replace("T0: 0.407", "T0 [cm]: 0.0407"), "T0: unit 'cm'; wanted one of mm", 5),
-        ("a.yaml", KES.replace("T0: 0.407", "T0: {warp: 1, weft: 1}"), "T0: wanted one number", 5),
-        ("a.yaml", KES.replace("weft: 0.5}", "wfet: 0.5}"), "G: wanted warp and weft (got warp, wfet)", 10),
+        ("a.yaml", KES.replace("W: 16.29", "W: 1629"), "W: mass per area of 1629 mg/cm²; expected 0.1 to 500", 4),
+        ("a.yaml", KES.replace("T0: 0.407", "T0 [cm]: 0.0407"), "T0: unit 'cm'; expected one of mm", 5),
+        ("a.yaml", KES.replace("T0: 0.407", "T0: {warp: 1, weft: 1}"), "T0: expected one number", 5),
+        ("a.yaml", KES.replace("weft: 0.5}", "wfet: 0.5}"), "G: expected warp and weft (got warp, wfet)", 10),
         ("a.yaml", KES.replace("2HB: 0.033", "2HB: .nan"), "2HB: 'nan' is not a number", 14),
         ("a.yaml", KES.replace("2HB: 0.033", "2HB: [1, 2]"), "2HB: '[1, 2]' is not a number", 14),
         ("a.yaml", KES.replace("2HB: 0.033", "2HB: true"), "2HB: 'True' is not a number", 14),
         ("a.yaml", KES + "B [µN·m]: 7\n", "B: given twice", 22),
         ("a.yaml", KES.replace("{warp: 6.0, weft: 10.0}", "{warp: 60, weft: 100}"), "WT / (½ Fmax EMT) is 0.062", 7),
-        ("a.yaml", KES.replace("LT: {warp: 0.62", "LT: {warp: 0.9"), "WT / (½ Fmax EMT) is 0.62; wanted LT, 0.9", 7),
-        ("a.yaml", "instrument: FAST\nW: 200\nE5: 2\nE20: 1\n", "E5: more than at a heavier load", 3),
+        ("a.yaml", KES.replace("LT: {warp: 0.62", "LT: {warp: 0.9"), "WT / (½ Fmax EMT) is 0.62; expected LT, 0.9", 7),
+        ("a.yaml", "instrument: FAST\nW: 200\nE5: 2\nE20: 1\n", "E5: larger than at a heavier load", 3),
         ("a.yaml", "instrument: FAST\nE5: 2\n", "W: missing", None),
-        ("a.csv", KES_CSV.replace("2HB, 0.033,", "2HB"), "wanted a name and one value, or two", 14),
-        ("a.csv", KES_CSV.replace("LT, 0.62, 0.58", "LT, 0.62, 0.58, 0.6"), "wanted a name and one value, or two", 7),
-        ("a.csv", KES_CSV.replace("LT, 0.62, 0.58", "LT, , 0.58"), "wanted a name and one value, or two", 7),
+        ("a.csv", KES_CSV.replace("2HB, 0.033,", "2HB"), "expected a name and one value, or two", 14),
+        ("a.csv", KES_CSV.replace("LT, 0.62, 0.58", "LT, 0.62, 0.58, 0.6"), "expected a name and one value, or two", 7),
+        ("a.csv", KES_CSV.replace("LT, 0.62, 0.58", "LT, , 0.58"), "expected a name and one value, or two", 7),
         ("a.csv", KES_CSV.replace("T0, 0.407", "W, 16"), "W: given twice (also in line 5)", 6),
         ("a.csv", KES_CSV.replace("16.29", "sixteen"), "W: 'sixteen' is not a number", 5),
         ("a.csv", "W,\x00", "byte 2 is zero", None),
         ("a.csv", KES_CSV.replace("our laboratory", "a; b").replace("16.29", "x"), "W: 'x' is not a number", 5),
-        ("a.csv", '"' + "x" * 90_000, "wanted a name and one value", 1),
+        ("a.csv", '"' + "x" * 90_000, "expected a name and one value", 1),
     ],
 )  # fmt: skip
 def test_a_wrong_sheet_is_refused_with_its_line(

@@ -120,7 +120,7 @@ S2 = ("raw_data", "L", "S2")
 @pytest.mark.parametrize(
     ("change", "problem"),
     [
-        (_set("raw_data", to=None), "raw_data is null; what is in `custom` belongs to its vendor"),
+        (_set("raw_data", to=None), "raw_data is null; vendor data in `custom`"),
         (_set("schema", to="0.9"), "schema: input should be '1.1'"),
         (_set("raw_data", "M", to=None), "raw_data.M: input should be a valid number"),
         (_set("raw_data", "M", to=0.1), "raw_data.M: input should be greater than or equal to 1"),
@@ -130,8 +130,8 @@ S2 = ("raw_data", "L", "S2")
         (_set(*S2, "samplesTree", to=[[8.0, 0.0]] * 100), "list should have at most 64 items"),
         (_set(*S2, "samplesTree", 0, 3, to=float("nan")), "raw_data.L.S2.samplesTree.0.3: input should be"),
         (_set(*S2, "samplesTree", 0, 3, to=1e300), "raw_data.L.S2.samplesTree.0.3: input should be"),
-        (_set(*S2, "samplesTree", 2, to=[8.0, 0.0, 8.1]), "a branch of unpaired distances and forces"),
-        (_set(*S2, "samplesTree", to=[[8.0, 0.0, 8.2, 9.0]] * 2), "no branch up followed by one back"),
+        (_set(*S2, "samplesTree", 2, to=[8.0, 0.0, 8.1]), "a branch needs two or more pairs"),
+        (_set(*S2, "samplesTree", to=[[8.0, 0.0, 8.2, 9.0]] * 2), "no loading branch followed by an unloading one"),
         (_set(*S2, "samplesTree", to=[[8.2, 5, 8.3, 3, 8.4, 0], [8.4, 0, 8.2, 0]]), "the tension never rises"),
     ],
 )

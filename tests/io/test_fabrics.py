@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from vto_pipeline.errors import ConfigError
-from vto_pipeline.io.fabric_assumed import ASSUMED, told
+from vto_pipeline.io.fabric_formats.assumed import ASSUMED, told
 from vto_pipeline.io.fabrics import preset_names, read_fabric
 from vto_pipeline.model.fabric import Fabric, StretchCurve
 
@@ -208,7 +208,7 @@ def test_presets_the_documents_name_exist() -> None:
         (LOSSES.replace("[0.5, 20]", "[0.5, 0]"), "membrane.curve_weft: stretch curve: tension must incr", 6, ""),
         (LOSSES.replace("[0.5, 20]", "[0.5]"), "membrane.curve_weft.1.1: field required", 6, ""),
         (LOSSES.replace("[0.5, 20]", "[0.5, -20]"), "membrane.curve_weft.1.1: input should be greater", 6, ""),
-        (LOSSES.replace("[areal_density]", "[mass]"), "assumed: mass is no figure of this file", 8, None),
+        (LOSSES.replace("[areal_density]", "[mass]"), "assumed: mass is not a value in this file", 8, None),
     ],
 )
 def test_a_wrong_file_is_named_with_its_line(

@@ -10,31 +10,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from io_shapes import capsule, write_all_formats
+from io_shapes import DAMAGES, capsule, damages, write_all_formats
 from PIL import Image
 
 from vto_pipeline.errors import InputError
-from vto_pipeline.io import clouds, images, meshes
+from vto_pipeline.io import clouds, meshes
 from vto_pipeline.io.arrays import Arrays
+from vto_pipeline.io.captures import images
+from vto_pipeline.io.formats.clean_up import check_sound, drop_needless
 from vto_pipeline.io.sandbox import run_limited
-from vto_pipeline.io.tidy import check_sound, drop_needless
 from vto_pipeline.model.mesh import PointCloud, TriangleMesh
-
-COUNT = 200
-
-
-def damages(data: bytes, rng: np.random.Generator) -> list[bytes]:
-    """A quarter cut short, a quarter with changes in the header (first 400 bytes), the rest with changes anywhere."""
-    found = []
-    for i in range(COUNT):
-        damaged = np.frombuffer(data, np.uint8).copy()
-        if i % 4 == 0:
-            damaged = damaged[: rng.integers(1, len(data))]
-        else:
-            reach = min(len(data), 400) if i % 4 == 1 else len(data)
-            damaged[rng.integers(0, reach, rng.integers(1, 9))] = rng.integers(0, 256)
-        found.append(damaged.tobytes())
-    return found
 
 
 def read_damaged(name: str) -> Arrays:
@@ -75,16 +60,23 @@ def read_one(path: Path) -> None:
     TriangleMesh(arrays["vertices"], arrays["faces"], arrays.get("colors"))
 
 
+def write_compressed(path: Path, points: np.ndarray) -> None:
+    """A compressed cloud by Open3D."""
+    import open3d as o3d
+
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+    o3d.io.write_point_cloud(str(path), cloud, compressed=True)
+
+
 def write_others(folder: Path) -> dict[str, Path]:
     """Clouds and pictures."""
     points = np.array(capsule().vertices)
-    files = {
-        name: folder / name for name in ("a.xyz", "ascii.pcd", "binary.pcd", "a.png", "a.jpg", "a.tif", "deep.png")
-    }
+    files = {name: folder / name for name in OTHERS}
     np.savetxt(files["a.xyz"], points)
-    header = f"VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nPOINTS {len(points)}\nDATA "
+    header = f"VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nDAMAGES 1 1 1\nPOINTS {len(points)}\nDATA "
     files["ascii.pcd"].write_text(header + "ascii\n" + "\n".join(" ".join(map(str, p)) for p in points) + "\n")
     files["binary.pcd"].write_bytes(f"{header}binary\n".encode() + points.astype("<f4").tobytes())
+    write_compressed(files["compressed.pcd"], points)
     rng = np.random.default_rng(12)
     picture = Image.fromarray(rng.integers(0, 256, (30, 40, 3)).astype(np.uint8))
     tags = picture.getexif()
@@ -96,7 +88,7 @@ def write_others(folder: Path) -> dict[str, Path]:
 
 
 MESHES = ["ply", "ply_ascii", "obj", "stl", "stl_ascii", "off", "glb"]
-OTHERS = ["a.xyz", "ascii.pcd", "binary.pcd", "a.png", "a.jpg", "a.tif", "deep.png"]
+OTHERS = ["a.xyz", "ascii.pcd", "binary.pcd", "compressed.pcd", "a.png", "a.jpg", "a.tif", "deep.png"]
 
 
 @pytest.mark.parametrize("name", MESHES + OTHERS)
@@ -105,7 +97,7 @@ def test_damaged_files_are_refused_or_sound(tmp_path: Path, name: str) -> None:
     read_one(path)  # undamaged
     counts = run_limited(read_damaged, str(path), seconds=60.0)
     refused, sound = int(counts["refused"]), int(counts["sound"])
-    assert refused + sound == COUNT
-    assert refused > COUNT // 8  # most cuts at least
+    assert refused + sound == DAMAGES
+    assert refused > DAMAGES // 8  # most cuts at least
     if name not in ("obj", "a.xyz"):  # these two count nothing, so that a cut between two lines leaves no trace
         assert int(counts["shorter"]) <= (2 if name in ("a.jpg", "ply_ascii", "ascii.pcd", "off", "stl_ascii") else 0)

@@ -10,10 +10,10 @@ from io_shapes import capsule
 from numpy.testing import assert_allclose, assert_array_equal
 
 from vto_pipeline.errors import InputError
-from vto_pipeline.io.gltf import decode_srgb, read_glb, write_glb
-from vto_pipeline.io.gltf_read import encode_srgb
+from vto_pipeline.io.gltf.write import read_glb, write_glb
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.render import GlbPart
+from vto_pipeline.numerics.srgb import decode_srgb, encode_srgb
 
 SINGLE = {"rtol": 0, "atol": 1.2e-7}  # single precision at 1 to 2 m
 

@@ -15,11 +15,11 @@ from io_shapes import capsule
 from numpy.testing import assert_allclose, assert_array_equal
 
 from vto_pipeline.errors import FormatError, InputError
-from vto_pipeline.io.gltf_read import parse_gltf
-from vto_pipeline.io.makehuman import parse_makehuman
+from vto_pipeline.io.bodies.makehuman import parse_makehuman
+from vto_pipeline.io.bodies.skinned import read_skinned
+from vto_pipeline.io.bodies.smpl import parse_smpl
+from vto_pipeline.io.gltf.read import parse_gltf
 from vto_pipeline.io.meshes import read_mesh
-from vto_pipeline.io.skinned import read_skinned
-from vto_pipeline.io.smpl import parse_smpl
 from vto_pipeline.io.sniff import find_kind
 from vto_pipeline.model.body import SkinnedBody
 
@@ -192,7 +192,7 @@ def test_a_pickle_is_never_opened(tmp_path: Path) -> None:
         ({"weights": np.zeros((3, 2))}, "weights has the shape (3, 2)"),
         ({"kintree_table": np.array([[1, 0]])}, "parent before each joint"),
         ({"v_template": np.zeros((300_000, 3))}, "at most 200000"),
-        ({"J_regressor": np.array(["a", "b"])}, "wanted numbers"),
+        ({"J_regressor": np.array(["a", "b"])}, "expected numbers"),
     ],
 )
 def test_a_wrong_body_model_is_refused(tmp_path: Path, changes: dict[str, Any], problem: str) -> None:
@@ -230,7 +230,7 @@ def test_a_wrong_skin_is_refused(tmp_path: Path, change: Callable[[dict[str, Any
 @pytest.mark.parametrize(
     ("name", "text", "problem"),
     [
-        ("targets.yaml", "../../etc/passwd: 1\n", "a file of this folder"),
+        ("targets.yaml", "../../etc/passwd: 1\n", "a file in this folder"),
         ("targets.yaml", "taller.target.gz: .nan\n", "outside"),
         ("targets.yaml", "smaller.target: 1\n", "no such file"),
         ("taller.target.gz", "no gzip", "not a gzipped target"),

@@ -1,4 +1,4 @@
-"""What a path holds is found out and said."""
+"""What a path holds is detected and reported."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_what_it_is_and_why(tmp_path: Path, name: str, kind: str, reason: str) -
 @pytest.mark.parametrize("name", ["empty", "config.yaml", "notes.docx"])
 def test_what_is_unclear_is_asked(tmp_path: Path, name: str) -> None:
     make(tmp_path)
-    with pytest.raises(InputError, match="it is not clear what this is") as caught:
+    with pytest.raises(InputError, match="cannot tell what this is") as caught:
         find_kind(tmp_path / name)
     assert "a folder of photos" in caught.value.hint
     with pytest.raises(InputError, match="no such file or folder"):

@@ -3,8 +3,8 @@
 import numpy as np
 from scipy import sparse
 
-from vto_pipeline.numerics.block_matrix import pattern
-from vto_pipeline.numerics.multigrid import hierarchy, update
+from vto_pipeline.numerics.linear.block_matrix import pattern
+from vto_pipeline.numerics.linear.multigrid import hierarchy, update
 
 
 def grid_edges(side, first=0):

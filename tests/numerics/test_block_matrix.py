@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.sparse import coo_array
 
-from vto_pipeline.numerics.block_matrix import PARALLEL_FROM, multiply, pattern, row_times, to_scipy
-from vto_pipeline.numerics.threads import limited_threads
+from vto_pipeline.numerics.cpu_threads import limited_threads
+from vto_pipeline.numerics.linear.block_matrix import PARALLEL_FROM, multiply, pattern, row_times, to_scipy
 
 
 def random_matrix(count, seed=0):

@@ -5,12 +5,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from vto_pipeline.numerics import bvh, spatial_hash
-from vto_pipeline.numerics.bvh_pairs import cross_pairs, self_pairs
+from vto_pipeline.numerics.cpu_threads import limited_threads
 from vto_pipeline.numerics.distance import EDGE, FACE, VERTEX, closest_on_triangle
-from vto_pipeline.numerics.morton import morton_order
-from vto_pipeline.numerics.spatial_hash import hashed
-from vto_pipeline.numerics.threads import limited_threads
+from vto_pipeline.numerics.spatial import bvh
+from vto_pipeline.numerics.spatial.bvh_pairs import cross_pairs, self_pairs
+from vto_pipeline.numerics.spatial.morton import morton_order
 
 
 @pytest.fixture
@@ -120,22 +119,17 @@ def in_order(pairs):
 
 
 @pytest.mark.parametrize("count", [1, 2, 5, 300, 3000])  # one leaf, two, and more and fewer than the serial limits
-@pytest.mark.parametrize("broad", ["tree", "hash"])
-def test_pairs_of_one_surface(count, broad):
+def test_pairs_of_one_surface(count):
     soup = moving_soup(count, 4)
-    found = self_pairs(swept_tree(*soup)) if broad == "tree" else spatial_hash.self_pairs(hashed(*soup))
+    found = self_pairs(swept_tree(*soup))
     every = overlapping(soup, soup)
     assert_array_equal(in_order(np.sort(found, axis=1)), every[every[:, 0] < every[:, 1]])
 
 
-@pytest.mark.parametrize("broad", ["tree", "hash"])
 @pytest.mark.parametrize("sizes", [(0.1, 0.1), (0.01, 0.5)])  # alike, and small triangles among large ones
-def test_pairs_of_two_surfaces(sizes, broad):
+def test_pairs_of_two_surfaces(sizes):
     one, other = moving_soup(700, 5, sizes[0]), moving_soup(400, 6, sizes[1])
-    if broad == "tree":
-        found = cross_pairs(swept_tree(*one), swept_tree(*other))
-    else:
-        found = spatial_hash.cross_pairs(hashed(*one), hashed(*other))
+    found = cross_pairs(swept_tree(*one), swept_tree(*other))
     assert_array_equal(in_order(found), overlapping(one, other))
     assert len(found) > 1000
 
@@ -148,7 +142,6 @@ def test_a_hub_gets_more_room_than_expected():
     every = every[every[:, 0] < every[:, 1]]
     assert (every[:, 0] <= 1).sum() > 600
     assert_array_equal(in_order(np.sort(self_pairs(swept_tree(*soup)), axis=1)), every)
-    assert_array_equal(in_order(np.sort(spatial_hash.self_pairs(hashed(*soup)), axis=1)), every)
 
 
 def test_the_boxes_are_the_same_for_any_number_of_threads():

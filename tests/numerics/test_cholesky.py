@@ -11,11 +11,11 @@ from numba import get_num_threads, set_num_threads
 from scipy import sparse
 from scipy.linalg import cho_factor, cho_solve
 
-from vto_pipeline.numerics.block_matrix import BlockMatrix
-from vto_pipeline.numerics.cholesky import factor_room, factorise
-from vto_pipeline.numerics.elimination import Elimination, eliminate
-from vto_pipeline.numerics.elimination_tree import dissection
-from vto_pipeline.numerics.substitution import solve
+from vto_pipeline.numerics.linear.block_matrix import BlockMatrix
+from vto_pipeline.numerics.linear.cholesky import factor_room, factorise
+from vto_pipeline.numerics.linear.elimination import Elimination, eliminate
+from vto_pipeline.numerics.linear.elimination_tree import dissection
+from vto_pipeline.numerics.linear.substitution import solve
 
 NO_LINKS = np.empty((0, 4), np.int32), np.empty((0, 4)), np.empty((0, 3, 3))
 

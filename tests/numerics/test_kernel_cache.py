@@ -4,10 +4,13 @@ import os
 import shutil
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 
 import numba
 import pytest
+from numba.core.caching import IndexDataCacheFile
 
 from vto_pipeline.numerics import kernel_cache
 
@@ -93,3 +96,29 @@ def test_a_newer_numba_has_a_folder_of_its_own(monkeypatch, tmp_path):
         kernel_cache.use_kernel_cache()
         found.append(numba.config.CACHE_DIR)
     assert found[0] != found[1]
+
+
+class SlowFile(IndexDataCacheFile):
+    """A cache file that takes its time between choosing a name and telling others which."""
+
+    def _save_index(self, overloads):
+        time.sleep(0.2)
+        super()._save_index(overloads)
+
+
+class NumbasOwn(SlowFile):
+    """As it was before `save_in_turn`."""
+
+    save = IndexDataCacheFile.save.__wrapped__
+
+
+@pytest.mark.parametrize(("kind", "safe"), [(NumbasOwn, False), (SlowFile, True)])
+def test_two_that_compile_at_the_same_time_never_load_each_others_code(tmp_path, kind, safe):
+    """The first case shows that Numba alone does not see to it; once it does, `save_in_turn` may go."""
+    files = [kind(str(tmp_path), "kernel", "stamp") for _ in range(2)]
+    threads = [threading.Thread(target=file.save, args=(k, f"code {k}")) for k, file in enumerate(files)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert all(files[0].load(k) == f"code {k}" for k in (0, 1)) is safe

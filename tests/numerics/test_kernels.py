@@ -9,10 +9,10 @@ import pytest
 from numba import njit, prange
 from numpy.testing import assert_allclose, assert_array_equal
 
-from vto_pipeline.numerics.blocks import blocks
-from vto_pipeline.numerics.friction import friction_shift
-from vto_pipeline.numerics.membrane import solve_symmetric
-from vto_pipeline.numerics.threads import limited_threads
+from vto_pipeline.numerics.cpu_threads import limited_threads
+from vto_pipeline.numerics.linear.coloured_blocks import blocks
+from vto_pipeline.numerics.mechanics.friction import friction_shift
+from vto_pipeline.numerics.mechanics.membrane import solve_symmetric
 
 
 def test_friction_holds_inside_the_cone_and_slides_outside():

@@ -5,11 +5,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from stiff_sheets import grid_edges, interpolation, level_matrix, levels_of
 
-from vto_pipeline.numerics.block_matrix import Sparse
-from vto_pipeline.numerics.linear import pcg
-from vto_pipeline.numerics.links import link, no_links, pull, pull_back
-from vto_pipeline.numerics.multigrid import cycle, update
-from vto_pipeline.numerics.threads import limited_threads
+from vto_pipeline.numerics.cpu_threads import limited_threads
+from vto_pipeline.numerics.linear.block_matrix import Sparse
+from vto_pipeline.numerics.linear.conjugate_gradients import pcg
+from vto_pipeline.numerics.linear.links import link, no_links, pull, pull_back
+from vto_pipeline.numerics.linear.multigrid import cycle, update
 
 SIDE = 14
 COUNT = SIDE * SIDE

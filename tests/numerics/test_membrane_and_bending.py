@@ -8,10 +8,10 @@ from numpy.testing import assert_allclose
 from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
-from vto_pipeline.numerics import membrane, slider
-from vto_pipeline.numerics.bending import dihedral
-from vto_pipeline.numerics.plane_stress import inverse_compliance, plane_stress, scaled
-from vto_pipeline.numerics.tension import tensile, tension_pulls, thread_tension
+from vto_pipeline.numerics.mechanics import membrane, slider
+from vto_pipeline.numerics.mechanics.bending import dihedral
+from vto_pipeline.numerics.mechanics.plane_stress import inverse_compliance, plane_stress, scaled
+from vto_pipeline.numerics.mechanics.tension import tensile, tension_pulls, thread_tension
 
 SOFT = (2e-3, 5e-3, 1e-2, -4e-4)  # warp, weft, shear, warp-weft
 

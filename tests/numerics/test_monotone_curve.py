@@ -11,7 +11,7 @@ from scipy.integrate import quad
 from scipy.interpolate import PchipInterpolator
 
 from vto_pipeline.errors import InputError
-from vto_pipeline.numerics.monotone_curve import MonotoneCurve, curve_at, monotone_curve
+from vto_pipeline.numerics.mechanics.monotone_curve import MonotoneCurve, curve_at, monotone_curve
 
 # A knit's rise: soft, then stiff; knots of uneven width.
 STRAIN = np.array([0.0, 0.012, 0.03, 0.055, 0.06, 0.11, 0.2, 0.21])

@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from stiff_sheets import grid_edges, interpolation, level_matrix, levels_of
 
-from vto_pipeline.numerics.multigrid import cycle, invert, invert_dense, update
-from vto_pipeline.numerics.threads import limited_threads
+from vto_pipeline.numerics.cpu_threads import limited_threads
+from vto_pipeline.numerics.linear.multigrid import cycle, invert, invert_dense, update
 
 
 def applied(levels, count):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from vto_pipeline.numerics.product_tile import COLUMNS, subtract_six, subtract_three
+from vto_pipeline.numerics.linear.product_tile import COLUMNS, subtract_six, subtract_three
 
 
 @njit

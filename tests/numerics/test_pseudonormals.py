@@ -8,8 +8,8 @@ import pytest
 import trimesh
 from numpy.testing import assert_allclose, assert_array_equal
 
-from vto_pipeline.numerics import bvh
-from vto_pipeline.numerics.pseudonormals import feature_normal, pseudonormals
+from vto_pipeline.numerics.spatial import bvh
+from vto_pipeline.numerics.spatial.pseudonormals import feature_normal, pseudonormals
 
 
 def signs(vertices, faces, points):

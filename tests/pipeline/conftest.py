@@ -10,10 +10,10 @@ import pytest
 from toy_tables import CALLS, TOY
 
 from vto_pipeline.io.documents import load_yaml
-from vto_pipeline.pipeline.listener import Listener
+from vto_pipeline.pipeline.execution.listener import Listener
+from vto_pipeline.pipeline.execution.run import run
 from vto_pipeline.pipeline.plan import make_plan
 from vto_pipeline.pipeline.request import Request, read_request
-from vto_pipeline.pipeline.run import run
 
 
 @pytest.fixture

@@ -10,9 +10,9 @@ from toy_tables import TOY, AddConfig
 
 from vto_pipeline.errors import MissingDependencyError
 from vto_pipeline.model.settings import Config
-from vto_pipeline.pipeline import key as key_module
-from vto_pipeline.pipeline.digest import digest_path, digest_value
-from vto_pipeline.pipeline.key import result_key, versions
+from vto_pipeline.pipeline.execution import key as key_module
+from vto_pipeline.pipeline.execution.digest import digest_path, digest_value
+from vto_pipeline.pipeline.execution.key import result_key, versions
 from vto_pipeline.pipeline.plan import Step
 
 ADD = next(stage for stage in TOY.stages if stage.name == "add")

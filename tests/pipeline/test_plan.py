@@ -28,9 +28,9 @@ def test_only_what_is_needed_runs_in_order(ask):
     assert plan.steps[2].inputs == ("left_doubled", "right_doubled")
     assert plan.left_out == {
         "guess": "word not given",
-        "parity": "nothing wanted needs it",
-        "label": "nothing wanted needs it",
-        "page": "nothing wanted needs it",
+        "parity": "nothing wanted depends on it",
+        "label": "nothing wanted depends on it",
+        "page": "nothing wanted depends on it",
     }
 
 
@@ -46,7 +46,7 @@ def test_an_optional_input_that_the_settings_have_no_use_for_is_neither_made_nor
     alone = make_plan(ask(BOTH + "want: [total]"), tables)
     assert names(alone) == ["left.double", "add"]
     assert alone.steps[-1].inputs == ("left_doubled",)
-    assert alone.left_out["right.double"] == "nothing wanted needs it"
+    assert alone.left_out["right.double"] == "nothing wanted depends on it"
     both = make_plan(ask(BOTH + "want: [total]\nstages: {add: {offset: 1}}"), tables)
     assert names(both) == ["left.double", "right.double", "add"]
     assert both.steps[-1].inputs == ("left_doubled", "right_doubled")

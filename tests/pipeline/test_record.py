@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vto_pipeline.pipeline.measure import Meter, machine, thread_count
-from vto_pipeline.pipeline.record import plain
+from vto_pipeline.pipeline.execution.cost import Meter, machine, thread_count
+from vto_pipeline.pipeline.execution.record import plain
 
 
 def test_metrics_become_plain_json():

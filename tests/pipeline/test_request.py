@@ -13,8 +13,8 @@ HEAD = "schema: 1\ngiven:\n  left: {number: left.txt}\nwant: [total]\n"
 @pytest.mark.parametrize(
     ("text", "line", "problem", "hint"),
     [
-        ("given: {}\nwant: [total]", None, "schema is missing; wanted 1", ""),
-        ("schema: 2\ngiven: {}\nwant: [total]", 1, "schema is 2; wanted 1", ""),
+        ("given: {}\nwant: [total]", None, "schema is missing; expected 1", ""),
+        ("schema: 2\ngiven: {}\nwant: [total]", 1, "schema is 2; expected 1", ""),
         (HEAD + "stage: {}", 5, "stage: unknown key (got {})", "did you mean stages?"),
         (HEAD + "stages:\n  ad: {}", 6, "stages.ad: unknown key (got {})", "did you mean add?"),
         (
@@ -111,3 +111,16 @@ def test_what_is_given_is_read_once_and_told_once(ask):
     first, second = Job(), Job()
     assert given.read(first) == given.read(second) == 3
     assert (first.notes, second.notes) == (["left.txt: read as a decimal number"], [])
+
+
+def test_a_folder_where_a_file_is_wanted_is_refused_unread(ask, tmp_path):
+    """At once, however much the folder holds."""
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(InputError, match="folder is a folder; a file was wanted"):
+        ask(HEAD.replace("left.txt", "folder"))
+
+
+def test_a_link_to_itself_is_a_bad_input(ask, tmp_path):
+    (tmp_path / "loop.txt").symlink_to(tmp_path / "loop.txt")
+    with pytest.raises(InputError, match="not a path that can be opened|no such file"):
+        ask(HEAD.replace("left.txt", "loop.txt"))

@@ -13,8 +13,8 @@ import pytest
 from toy_tables import CALLS, TOY
 
 from vto_pipeline.errors import ComputationError, ConfigError, InputError
-from vto_pipeline.pipeline.final import make_finals_again
-from vto_pipeline.pipeline.folder import claimed
+from vto_pipeline.pipeline.execution.final import make_finals_again
+from vto_pipeline.pipeline.execution.folder import claimed
 
 HEAD = "schema: 1\ngiven: {left: {number: left.txt}, right: {number: right.txt}}\n"
 ALL = HEAD + "want: [squared, label, page]\n"
@@ -113,7 +113,7 @@ def test_an_unreadable_input_names_its_file(go, tmp_path):
 def test_folders_that_are_not_a_run_are_refused(go, tmp_path):
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "thesis.txt").write_text("do not touch")
-    with pytest.raises(ConfigError, match="the folder holds other things than a run"):
+    with pytest.raises(ConfigError, match="the folder is not empty and holds no run"):
         go(ALL)
     assert [path.name for path in (tmp_path / "run").iterdir()] == ["thesis.txt"]
 
@@ -171,13 +171,13 @@ def test_the_page_can_be_made_again_without_the_inputs(go, tmp_path):
 KILLED = """
 import os, signal, sys
 sys.path.insert(0, {tests!r})
-import vto_pipeline.pipeline.store as store
+import vto_pipeline.pipeline.execution.store as store
 from pathlib import Path
 from toy_tables import TOY
 from vto_pipeline.io.documents import load_yaml
 from vto_pipeline.pipeline.plan import make_plan
 from vto_pipeline.pipeline.request import read_request
-from vto_pipeline.pipeline.run import run
+from vto_pipeline.pipeline.execution.run import run
 
 calls = 0
 def dying(real):
@@ -230,11 +230,11 @@ def test_two_runs_in_one_folder_clash(go, tmp_path):
     other = subprocess.Popen([sys.executable, "-c", hold, lock], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     assert other.stdout is not None
     assert other.stdout.readline() == b"held\n"
-    with pytest.raises(ConfigError, match=f"another run works in this folder \\(process {other.pid}\\)"):
+    with pytest.raises(ConfigError, match=f"another run is using this folder \\(process {other.pid}\\)"):
         go(ALL)
     other.kill()
     other.communicate()
     go(ALL)  # a dead process holds nothing
     assert CALLS == ["page"]
-    with claimed(tmp_path / "run"), pytest.raises(ConfigError, match="another run works in this folder"):
+    with claimed(tmp_path / "run"), pytest.raises(ConfigError, match="another run is using this folder"):
         go(ALL)

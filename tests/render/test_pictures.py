@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.render.marks import mark_places
-from vto_pipeline.render.pictures import BACK, FRONT, LEFT, render_picture, render_views
+from vto_pipeline.render.pictures import BACK, FRONT, LEFT, render_picture
 from vto_pipeline.render.rasterise import rasterise
 from vto_pipeline.render.tint import tint
 
@@ -81,13 +81,6 @@ def test_both_sides_of_cloth_are_lit_the_inside_darker() -> None:
     outside = render_picture([card(0.0, RED)], azimuth_deg=FRONT, elevation_deg=0, size=(40, 40))[20, 20, 0]
     inside = render_picture([card(0.0, RED)], azimuth_deg=BACK, elevation_deg=0, size=(40, 40))[20, 20, 0]
     assert 60 < inside < outside
-
-
-def test_views_stand_side_by_side_at_one_scale() -> None:
-    picture = render_views([ball()], size=(120, 160))
-    assert picture.shape == (160, 360, 3)
-    columns = [(picture[:, k : k + 120] < 250).any(axis=(0, 2)).sum() for k in (0, 120, 240)]
-    assert max(columns) - min(columns) <= 1
 
 
 def test_same_bits_again() -> None:

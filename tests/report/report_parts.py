@@ -63,7 +63,7 @@ def all_parts() -> dict[str, Any]:
         "garment": garment,
         "avatar": body,
         "garment_surface": garment,
-        "labels": SurfaceLabels(half, half, np.ones(count)),
+        "labels": SurfaceLabels(half, np.ones(count)),
         "fit_maps": {"stretch": np.linspace(1, 1.2, count), "clearance_mm": np.linspace(0, 60, count)},
         "fit_report": {
             "verdict": "Chest good (+6.0 cm).",

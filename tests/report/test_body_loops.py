@@ -3,7 +3,7 @@
 import igl
 import numpy as np
 
-from vto_pipeline.avatar.template import template
+from vto_pipeline.avatar.template.template import template
 from vto_pipeline.geometry.topology import face_normals
 from vto_pipeline.report.body_loops import loop_ribbons
 from vto_pipeline.report.layers import list_layers

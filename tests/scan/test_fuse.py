@@ -1,16 +1,20 @@
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from PIL import Image
 from scan_scene import distances, render
 
 from vto_pipeline.errors import ScanError
-from vto_pipeline.model.camera import Intrinsics
-from vto_pipeline.model.frames import DepthMaps
+from vto_pipeline.model.camera import CameraSet, Intrinsics
+from vto_pipeline.model.frames import DepthMaps, PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.scan.canonical import canonical_mesh
-from vto_pipeline.scan.depth_mask import clean_depth
+from vto_pipeline.scan.depth.depth_mask import clean_depth
 from vto_pipeline.scan.fuse import FuseConfig, fuse_depth_frames, fuse_depth_maps
 
 COARSE = FuseConfig(voxel_mm=4)
@@ -22,9 +26,9 @@ def true_maps(scene, shot, true_cameras):
     return DepthMaps(true_cameras.names, true_cameras.intrinsics, shot[1], np.where(depth < 1.25, depth, 0))
 
 
-def test_fused_surface_lies_on_the_truth_and_keeps_both_ends_open(true_maps, shot, scene):
+def test_fused_surface_lies_on_the_truth_and_keeps_both_ends_open(true_maps, true_cameras, shot, scene):
     job = Job()
-    mesh = fuse_depth_maps(shot[0], true_maps, COARSE, job)
+    mesh = fuse_depth_maps(shot[0], true_cameras, true_maps, COARSE, job)
     tube = mesh.vertices[mesh.vertices[:, 1] > 0.06]
     error = distances(scene, tube)
     assert np.percentile(error, 50) < 4e-4
@@ -36,8 +40,8 @@ def test_fused_surface_lies_on_the_truth_and_keeps_both_ends_open(true_maps, sho
     assert np.ptp(mesh.colors[mesh.vertices[:, 1] > 0.2], axis=0).min() > 100  # the print came along
 
 
-def test_two_runs_give_the_same_bits(true_maps, shot):
-    first, second = (fuse_depth_maps(shot[0], true_maps, COARSE, Job()) for _ in range(2))
+def test_two_runs_give_the_same_bits(true_maps, true_cameras, shot):
+    first, second = (fuse_depth_maps(shot[0], true_cameras, true_maps, COARSE, Job()) for _ in range(2))
     assert first.vertices.tobytes() == second.vertices.tobytes()
     assert first.faces.tobytes() == second.faces.tobytes()
     assert first.colors.tobytes() == second.colors.tobytes()
@@ -51,29 +55,71 @@ def test_depth_frames_with_known_poses(walk, scene):
     assert np.percentile(error, 95) < 3e-3
 
 
-def test_empty_depth_is_refused(true_maps, shot):
+def test_empty_depth_is_refused(true_maps, true_cameras, shot):
     blank = DepthMaps(true_maps.names, true_maps.intrinsics, true_maps.world_from_cam, np.zeros_like(true_maps.depth))
     with pytest.raises(ScanError, match="none of 16"):
-        fuse_depth_maps(shot[0], blank, COARSE, Job())
+        fuse_depth_maps(shot[0], true_cameras, blank, COARSE, Job())
 
 
-def test_view_with_hardly_a_reading_is_left_out(true_maps, shot):
+def test_view_with_hardly_a_reading_is_left_out(true_maps, true_cameras, shot):
     """Open3D would abort: it looks at every fourth pixel, and finds none."""
     thin = true_maps.depth.copy()
     thin[3] = 0
     thin[3, 101:103, 101:103] = 0.9
     job = Job()
     maps = DepthMaps(true_maps.names, true_maps.intrinsics, true_maps.world_from_cam, thin)
-    assert len(fuse_depth_maps(shot[0], maps, COARSE, job).faces) > 10_000
+    assert len(fuse_depth_maps(shot[0], true_cameras, maps, COARSE, job).faces) > 10_000
     assert any("003.jpg: 4 readings" in text for text in job.notes)
 
 
-def test_views_that_never_meet_are_refused(true_maps, shot):
+def test_views_that_never_meet_are_refused(true_maps, true_cameras, shot):
     lonely = np.zeros_like(true_maps.depth)
     lonely[0] = true_maps.depth[0]
     single = DepthMaps(true_maps.names, true_maps.intrinsics, true_maps.world_from_cam, lonely)
     with pytest.raises(ScanError, match="2 of 16|supported"):
-        fuse_depth_maps(shot[0], single, COARSE, Job())
+        fuse_depth_maps(shot[0], true_cameras, single, COARSE, Job())
+
+
+WALL = Intrinsics(320, 240, 300.0, 300.0, 159.5, 119.5)
+
+
+def wall(folder: Path, k1: float = 0.0) -> tuple[PhotoSet, CameraSet, DepthMaps]:
+    """Two photos, 40 mm apart, of a wall 1 m away that grows lighter to the right and downwards."""
+    lens = replace(WALL, k1=k1)
+    v, u = np.mgrid[: WALL.height, : WALL.width].astype(float)
+    far_x, far_y = (u - WALL.cx) / WALL.fx, (v - WALL.cy) / WALL.fy
+    x, y = far_x, far_y
+    for _ in range(50):  # undo x_d = x (1 + k1 r²)
+        bend = 1 + k1 * (x * x + y * y)
+        x, y = far_x / bend, far_y / bend
+    names, poses = ("left.png", "right.png"), np.stack([np.eye(4)] * 2)
+    poses[1, 0, 3] = 0.04
+    for name, pose in zip(names, poses, strict=True):
+        shade = [128 + 150 * (x + pose[0, 3]), 128 + 150 * y, np.full_like(x, 90.0)]
+        Image.fromarray(np.round(np.stack(shade, axis=2)).astype(np.uint8)).save(folder / name)
+    photos = PhotoSet(tuple(folder / name for name in names), (None, None))
+    depth = np.ones((2, WALL.height, WALL.width), np.float32)
+    return photos, CameraSet(names, (lens, lens), poses), DepthMaps(names, (WALL, WALL), poses, depth)
+
+
+def test_as_many_views_as_are_wanted_are_enough(tmp_path):
+    """Two maps of one wall carry a surface that asks for two, and none that asks for three."""
+    scene = wall(tmp_path)
+    mesh = fuse_depth_maps(*scene, FuseConfig(voxel_mm=10, min_views=2), Job())
+    assert_allclose(mesh.vertices[:, 2], 1.0, rtol=0, atol=1e-4)  # the depth is exact
+    with pytest.raises(ScanError, match="3 of 2"):
+        fuse_depth_maps(*scene, FuseConfig(voxel_mm=10, min_views=3), Job())
+
+
+@pytest.mark.parametrize("k1", [0.0, -0.25, 0.2])
+def test_colours_are_undistorted_as_the_depths_are(tmp_path, k1):
+    mesh = fuse_depth_maps(*wall(tmp_path, k1), FuseConfig(voxel_mm=10), Job())
+    assert mesh.colors is not None
+    inner = (np.abs(mesh.vertices[:, 0] - 0.02) < 0.4) & (np.abs(mesh.vertices[:, 1]) < 0.3)
+    assert inner.sum() > 1000
+    true = 128 + 150 * mesh.vertices[inner, :2]
+    # a level of rounding, one of interpolation, and half a voxel, 0.75 levels; without undistortion up to 15
+    assert_allclose(mesh.colors[inner, :2], true, rtol=0, atol=2.75)
 
 
 def test_canonical_mesh_does_not_depend_on_the_order():

@@ -10,11 +10,11 @@ from scan_scene import depth_frames
 from scipy.spatial.transform import Rotation
 
 from vto_pipeline.errors import ScanError
-from vto_pipeline.io.depth import read_depth
-from vto_pipeline.io.images import read_image
+from vto_pipeline.io.captures.depth import read_depth
+from vto_pipeline.io.captures.images import read_image
 from vto_pipeline.model.job import Job
-from vto_pipeline.scan.odometry import OdometryConfig, estimate_trajectory
-from vto_pipeline.scan.rgbd_alignment import align_frames, prepare_frame
+from vto_pipeline.scan.depth.odometry import OdometryConfig, estimate_trajectory
+from vto_pipeline.scan.depth.rgbd_alignment import align_frames, prepare_frame
 
 
 @pytest.fixture(scope="module")

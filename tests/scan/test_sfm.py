@@ -13,9 +13,9 @@ from scan_scene import distances
 from vto_pipeline.errors import ScanError
 from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
-from vto_pipeline.scan.mapping import _copy
-from vto_pipeline.scan.scale import ScaleConfig, apply_board
-from vto_pipeline.scan.sfm import SfmConfig, estimate_cameras
+from vto_pipeline.scan.photos.mapping import _copy
+from vto_pipeline.scan.photos.scale import ScaleConfig, apply_board
+from vto_pipeline.scan.photos.sfm import SfmConfig, estimate_cameras
 from vto_pipeline.scan.similarity import fit_similarity
 
 
@@ -114,7 +114,7 @@ def test_photos_from_one_place_are_refused(shot, tmp_path, copies):
     for k in range(copies):
         paths.append(tmp_path / f"same{k}.jpg")
         paths[-1].write_bytes(picture)
-    with pytest.raises(ScanError, match="could be placed|sparse point"):
+    with pytest.raises(ScanError, match="fewer than 3 of .* photos could be placed|sparse point"):
         estimate_cameras(PhotoSet(tuple(paths), shot[0].intrinsics[:copies]), SfmConfig(), Job())
 
 

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from scan_scene import BOARD, charuco
 from scipy.spatial.transform import Rotation
 
-from vto_pipeline.scan.board import board_corners
+from vto_pipeline.scan.photos.board import board_corners
 from vto_pipeline.scan.similarity import fit_similarity
 from vto_pipeline.scan.upright import upright_from_scan
 

@@ -12,12 +12,12 @@ from vto_pipeline.errors import InputError, ScanError
 from vto_pipeline.model.camera import CameraSet, Intrinsics
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
-from vto_pipeline.scan.consistency import consensus
-from vto_pipeline.scan.disparity import _in_second
-from vto_pipeline.scan.neighbours import choose_pairs, visibility
-from vto_pipeline.scan.rectify import View, depth_in_view, rectify, warp
-from vto_pipeline.scan.stereo import StereoConfig, estimate_depth_maps
-from vto_pipeline.scan.subpixel import refine_disparity
+from vto_pipeline.scan.photos.consistency import consensus
+from vto_pipeline.scan.photos.disparity import _in_second
+from vto_pipeline.scan.photos.neighbours import choose_pairs, visibility
+from vto_pipeline.scan.photos.rectify import View, depth_in_view, rectify, warp
+from vto_pipeline.scan.photos.stereo import StereoConfig, estimate_depth_maps
+from vto_pipeline.scan.photos.subpixel import refine_disparity
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,7 @@ def test_plain_surface_is_refused(tmp_path, true_cameras, sparse):
     plain = make_scene(contrast=0.0)
     few = CameraSet(true_cameras.names[:4], true_cameras.intrinsics[:4], true_cameras.world_from_cam[:4])
     shots = photos(plain, tmp_path, few.world_from_cam, few.intrinsics[0], board=False)
-    with pytest.raises(ScanError, match="agreed on") as caught:
+    with pytest.raises(ScanError, match="no depth is confirmed") as caught:
         estimate_depth_maps(shots, few, sparse, StereoConfig(check_views=3), Job())
     assert "print" in caught.value.hint
 

@@ -71,7 +71,7 @@ def test_outliers_are_left_out(mesh):
     job = Job()
     found = reconstruct_cloud(PointCloud(points), SurfaceConfig(), job)
     assert np.percentile(np.abs(np.linalg.norm(found.vertices, axis=1) - 0.2), 99) < 2e-3
-    assert any("lonely" in text for text in job.notes)
+    assert any("isolated" in text for text in job.notes)
 
 
 def test_three_points_are_refused():

@@ -8,8 +8,8 @@ import pytest
 import vto_pipeline.cloth.drape as drape_module
 from vto_pipeline.cloth.drape import drape
 from vto_pipeline.errors import IntersectingError
-from vto_pipeline.io.artifacts import ARTIFACTS
 from vto_pipeline.io.fabrics import read_fabric
+from vto_pipeline.io.runs.artifacts import ARTIFACTS
 from vto_pipeline.model.mesh import TriangleMesh
 
 KINDS = {kind.name: kind for kind in ARTIFACTS}
@@ -28,7 +28,13 @@ def test_the_partial_result_of_a_failed_drape_can_be_written(tmp_path: Path, mon
     judge = drape_module.audit
     monkeypatch.setattr(drape_module, "audit", lambda *a, **k: {**judge(*a, **k), "body_intersections": 1})
     with pytest.raises(IntersectingError) as caught:
-        drape(TriangleMesh(sheet, faces), body, read_fabric("cotton_poplin"), {"settle_seconds": 0.1}, None)
+        drape(
+            TriangleMesh(sheet, faces),
+            body,
+            read_fabric("cotton_poplin"),
+            {"settle_seconds": 0.1, "place": "as_it_stands"},
+            None,
+        )
     assert set(caught.value.partial) >= {"draped", "audit"}
     for name, value in caught.value.partial.items():
         KINDS[name].write(tmp_path / KINDS[name].filename, value)

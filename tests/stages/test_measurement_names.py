@@ -2,8 +2,8 @@
 
 import pytest
 
-from vto_pipeline.avatar.definitions import DEFINITIONS, definition
-from vto_pipeline.io.bodies import MEASUREMENT_NAMES
+from vto_pipeline.avatar.measuring.definitions import DEFINITIONS, definition
+from vto_pipeline.io.bodies.measurements import MEASUREMENT_NAMES
 
 
 def test_everything_the_avatar_measures_can_be_written_and_read() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from vto_pipeline.cli.drape import drape_command
+from vto_pipeline.cli.commands.drape import drape_command
 from vto_pipeline.cli.work import planned
 from vto_pipeline.errors import ConfigError, PlanError
 from vto_pipeline.io.documents import load_yaml
@@ -91,8 +91,8 @@ def test_a_document_with_one_garment_stays_as_it_is(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "line", "problem"),
     [
-        (("    shirt:", "    Shirt!:"), 5, "given.garments: 'Shirt!' is no name for a garment"),
-        (("    shirt:", "    body:"), None, "given.garments: body_mesh would stand for two things"),
+        (("    shirt:", "    Shirt!:"), 5, "given.garments: 'Shirt!' is not a valid garment name"),
+        (("    shirt:", "    body:"), None, "given.garments: body_mesh would be ambiguous"),
         (("  fabric: jersey", "  garment: {mesh: shirt.ply}"), 3, "given.garment and given.garments: give one"),
         (("shirt.ply}", "shirt.ply, fabrik: jersey}"), 5, "given.garments.shirt.fabrik: unknown key (got 'jersey')"),
         (("shirt.ply}", "shirt.ply, fabric: jersy}"), 5, "'jersy' is neither a preset nor a file"),
@@ -113,7 +113,7 @@ def test_mistakes_are_located(tmp_path: Path, change: tuple[str, str], line: int
 @pytest.mark.parametrize("garments", ["[trousers.ply, shirt.ply]", "{}", "trousers.ply"])
 def test_garments_without_names_are_refused(tmp_path: Path, garments: str) -> None:
     text = HEAD + f"given:\n  garments: {garments}\n  body: {{mesh: body.ply}}\n" + WANT
-    with pytest.raises(ConfigError, match="wanted names of garments") as caught:
+    with pytest.raises(ConfigError, match="expected named garments") as caught:
         planned(written(tmp_path, text), (), CATALOGUE)
     assert "inner first" in caught.value.hint
 
@@ -172,7 +172,7 @@ def report(verdict: str) -> dict[str, object]:
 @pytest.mark.parametrize(
     ("arguments", "problem"),
     [
-        (["--garment", "a/shirt.ply", "--garment", "b/Shirt.obj"], "two garments are called shirt"),
+        (["--garment", "a/shirt.ply", "--garment", "b/Shirt.obj"], "two garments are named shirt"),
         (["--garment", "a.ply", "--fabric", "denim", "--fabric", "jersey"], "2 fabrics for 1 garments"),
     ],
 )

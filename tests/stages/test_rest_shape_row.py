@@ -2,7 +2,7 @@
 
 import pytest
 
-from vto_pipeline.cloth.rest_shape import RestShapeConfig
+from vto_pipeline.cloth.rest_shape.from_hanging import RestShapeConfig
 from vto_pipeline.stages import CATALOGUE
 
 ROW = next(stage for stage in CATALOGUE.stages if stage.name == "rest_shape")

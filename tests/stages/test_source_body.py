@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from vto_pipeline.avatar.pose import named_pose
-from vto_pipeline.avatar.template import template
+from vto_pipeline.avatar.model.pose import named_pose
+from vto_pipeline.avatar.template.template import template
 from vto_pipeline.io.documents import Document
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh

@@ -1,4 +1,4 @@
-"""How much wearing ease each kind of garment is cut with, as a table with sources."""
+"""Wearing ease of each kind of garment, as a table with sources."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def known_kinds() -> list[str]:
 
 
 def read_allowances(garment: str) -> dict[str, Allowance]:
-    """Return zone -> allowance for a kind of garment; rows for any garment fill what its own rows leave open.
+    """Return zone -> allowance for a kind of garment; rows for any garment fill the gaps.
 
     Raises:
         ConfigError: an unknown kind of garment.

@@ -1,15 +1,15 @@
-"""How far the cloth stands off the body."""
+"""Clearance between cloth and body."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from vto_pipeline.geometry.signed_distance import Nearest, SurfaceDistance
+from vto_pipeline.geometry.signed_distance import SurfaceDistance, SurfacePoints
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 
 
-def clearance(garment: TriangleMesh, body: TriangleMesh) -> Nearest:
+def clearance(garment: TriangleMesh, body: TriangleMesh) -> SurfacePoints:
     """Return for each garment vertex its nearest body point; the distance [m] is negative inside the body.
 
     Args:

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vto_pipeline.assess.section import Section, cut
-from vto_pipeline.assess.tape import Tape, lay_tape, plane_axes
+from vto_pipeline.geometry.hull import Hull, convex_hull, plane_axes
+from vto_pipeline.geometry.section import Section, cut
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 
 
 @dataclass(frozen=True)
 class Ease:
-    """What a tape says at one level.
+    """Ease at one level.
 
     Args:
         body_girth: [m].
@@ -52,7 +52,7 @@ def ease_at(
     garment_faces: NDArray[np.bool_] | None = None,
     body_faces: NDArray[np.bool_] | None = None,
 ) -> Ease | None:
-    """Measure the ease around the stoutest part of the body that a plane meets.
+    """Measure the ease around the largest part of the body that a plane cuts.
 
     Args:
         garment: Draped garment [m].
@@ -66,33 +66,33 @@ def ease_at(
     Returns:
         The measurement, or None where the plane misses the body or the garment does not surround it.
     """
-    inner = max(body_tapes(body, origin, normal, body_faces), key=lambda tape: tape.girth, default=None)
+    inner = max(body_hulls(body, origin, normal, body_faces), key=lambda hull: hull.perimeter, default=None)
     if inner is None:
         return None
     section = cut(garment, origin, normal, garment_faces)
-    around = [(tape, part) for tape, part in _tapes(section, origin, normal) if tape.encloses(inner.center)]
+    around = [(hull, part) for hull, part in _hulls(section, origin, normal) if hull.encloses(inner.center)]
     if not around:
         return None
-    outer, part = max(around, key=lambda found: found[0].girth)
+    outer, part = max(around, key=lambda found: found[0].perimeter)
     lengths = section.length(part, garment.vertices), section.length(part, rest)
-    return Ease(inner.girth, outer.girth, *lengths, section.is_closed(part))
+    return Ease(inner.perimeter, outer.perimeter, *lengths, section.is_closed(part))
 
 
-def body_tapes(
+def body_hulls(
     body: TriangleMesh, origin: FloatArray, normal: FloatArray, faces: NDArray[np.bool_] | None = None
-) -> list[Tape]:
-    """Return a tape around each part of the body that a plane meets: the trunk, an arm.
+) -> list[Hull]:
+    """Return the hull of each part of the body that a plane meets: the trunk, an arm.
 
     Args:
         body: The body [m].
-        origin: A point of the plane, and the origin of the tapes' plane coordinates [m], shape (3,).
+        origin: A point of the plane, and the origin of the hulls' plane coordinates [m], shape (3,).
         normal: Of the plane, shape (3,).
         faces: Only these, shape (F,).
     """
-    return [tape for tape, _ in _tapes(cut(body, origin, normal, faces), origin, normal)]
+    return [hull for hull, _ in _hulls(cut(body, origin, normal, faces), origin, normal)]
 
 
-def _tapes(section: Section, origin: FloatArray, normal: FloatArray) -> list[tuple[Tape, NDArray[np.intp]]]:
+def _hulls(section: Section, origin: FloatArray, normal: FloatArray) -> list[tuple[Hull, NDArray[np.intp]]]:
     flat = (section.points - origin) @ plane_axes(normal).T
-    laid = [(lay_tape(flat[part]), part) for part in section.parts()]
-    return [(tape, part) for tape, part in laid if tape is not None]
+    found = [(convex_hull(flat[part]), part) for part in section.parts()]
+    return [(hull, part) for hull, part in found if hull is not None]

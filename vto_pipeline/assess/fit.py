@@ -1,4 +1,4 @@
-"""The fit report: does this garment, as it is, fit this body, and where not."""
+"""The fit report: whether the garment fits the body, and where it does not."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from vto_pipeline.model.settings import Config
 class FitConfig(Config):
     """Settings of the fit report."""
 
-    garment: str = Field("shirt", description="Kind of garment, a row of assess/allowances.yaml.")
+    garment: str = Field("shirt", description="Kind of garment, a row of assess/allowances.yaml")
     allowances_cm: dict[str, tuple[float, float]] = Field(
-        default_factory=dict, description="Zone -> lowest and highest wearing ease [cm], in place of the table's."
+        default_factory=dict, description="Zone -> lowest and highest wearing ease [cm], in place of the table's"
     )
     stretch_limit: float = Field(
-        0.05, gt=0, le=1, description="Stretch beyond rest above which cloth counts as over-stretched [share]."
+        0.05, gt=0, le=1, description="Stretch beyond rest above which cloth counts as over-stretched [share]"
     )
-    contact_mm: float = Field(3.0, gt=0, le=50, description="Distance below which cloth counts as touching [mm].")
+    contact_mm: float = Field(3.0, gt=0, le=50, description="Distance below which cloth counts as touching [mm]")
 
 
 def assess_fit(
@@ -144,7 +144,7 @@ def _judge(measured: Ease, allowance: Allowance | None) -> str:
 
 
 def _verdict(zones: list[dict[str, Any]], stretch: Mapping[str, float], gap: Mapping[str, float]) -> str:
-    """One sentence for people."""
+    """Summarise the fit in one sentence."""
     parts = [
         f"{z['zone']} {z['verdict']} ({100 * z['ease_m']:+.1f} cm)"
         for z in zones
@@ -162,7 +162,7 @@ def _unobserved_note(observed_share: float | None) -> str:
     if observed_share is None or observed_share > 0.995:
         return ""
     share = 1 - observed_share
-    return f"{share:.0%} of the garment was not seen by the scanner and is filled in; numbers there are guesses."
+    return f"{share:.0%} of the garment was not seen by the scanner and was filled in; figures there are guesses."
 
 
 def _tell(report: Mapping[str, Any], job: Job) -> None:

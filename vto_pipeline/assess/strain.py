@@ -1,4 +1,4 @@
-"""How far the cloth is stretched against its rest shape."""
+"""Stretch of the cloth relative to its rest shape."""
 
 from __future__ import annotations
 

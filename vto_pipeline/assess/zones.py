@@ -1,4 +1,4 @@
-"""The places where fit is judged: heights of the trunk, and the garment's own openings."""
+"""Zones where fit is assessed: heights of the trunk, and the garment's openings."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from vto_pipeline.assess.ease import Ease, body_tapes, ease_at
-from vto_pipeline.assess.tape import lay_tape, plane_axes
+from vto_pipeline.assess.ease import Ease, body_hulls, ease_at
+from vto_pipeline.geometry.hull import convex_hull, plane_axes
 from vto_pipeline.geometry.topology import boundary_loops
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
@@ -57,15 +57,15 @@ def ease_at_openings(garment: TriangleMesh, rest: FloatArray, body: TriangleMesh
         points = garment.vertices[loop]
         center = points.mean(axis=0)
         normal = np.cross(points - center, np.roll(points, -1, axis=0) - center).sum(axis=0)  # Newell's
-        outer = lay_tape((points - center) @ plane_axes(normal).T) if normal.any() else None
+        outer = convex_hull((points - center) @ plane_axes(normal).T) if normal.any() else None
         if outer is None:
             continue
-        around = [tape for tape in body_tapes(body, center, normal) if tape.encloses(outer.center)]
+        around = [hull for hull in body_hulls(body, center, normal) if hull.encloses(outer.center)]
         if around:
-            inner = max(around, key=lambda tape: tape.girth)
+            inner = max(around, key=lambda hull: hull.perimeter)
             place = (center - 0.5 * (low + high)) / (0.5 * (high - low))
             name = _free_name(f"{_side(place)} opening", measured)
-            measured[name] = Ease(inner.girth, outer.girth, _around(points), _around(rest[loop]), closed=True)
+            measured[name] = Ease(inner.perimeter, outer.perimeter, _around(points), _around(rest[loop]), closed=True)
     return measured
 
 

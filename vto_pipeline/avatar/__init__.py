@@ -1,1 +1,10 @@
-"""The parametric body: template, shape, pose, measuring, and fitting it to what is known of a person."""
+"""The parametric body.
+
+from_measurements, from_scan, from_silhouettes: the three ways to an avatar
+measure: measure any body
+template/: fixed topology, and how it is built
+model/: shape and pose
+measuring/: what each measurement means, the tape that reads it, and the population
+scan/: registration to a scan, and how sure the result is
+silhouettes/: outlines in two photos
+"""

@@ -1,4 +1,4 @@
-"""A body from a tape: every given measurement met, the rest as the population has it."""
+"""A body from tape measurements: the given ones are met, the rest follow the population."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from vto_pipeline.avatar.definitions import DEFINITIONS, definition
-from vto_pipeline.avatar.population import Population, population
-from vto_pipeline.avatar.shape import SEX_SHARE, ShapeSpace, shape_space
-from vto_pipeline.avatar.tape import Reading, Tape
+from vto_pipeline.avatar.measuring.definitions import DEFINITIONS, definition
+from vto_pipeline.avatar.measuring.population import Population, population
+from vto_pipeline.avatar.measuring.tape import Reading, Tape
+from vto_pipeline.avatar.model.shape import SEX_SHARE, ShapeSpace, shape_space
 from vto_pipeline.errors import AvatarError
-from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.geometry.topology import face_area_vectors
+from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Avatar, Measurements
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.settings import Config
@@ -31,17 +32,17 @@ class MeasurementsConfig(Config):
     """Settings of the fit to measurements."""
 
     sex: Literal["female", "male", "neutral"] = Field(
-        default="neutral", description="whose body it is where the measurements do not say"
+        default="neutral", description="Sex, where the measurements do not say"
     )
-    iterations: int = Field(default=20, ge=1, le=100, description="Levenberg-Marquardt steps at most")
+    iterations: int = Field(default=20, ge=1, le=100, description="Levenberg-Marquardt steps, at most")
     tolerance_mm: float = Field(
-        default=2.0, gt=0, le=50, description="larger misses of a given measurement are reported [mm]"
+        default=2.0, gt=0, le=50, description="Larger misses of a given measurement are reported [mm]"
     )
     expected_weight: float = Field(
-        default=4.0, gt=0, le=100, description="how strongly the expected measurements hold, 1 as their spread"
+        default=4.0, gt=0, le=100, description="Weight of the expected measurements; 1 follows their spread"
     )
     unlikely_sigmas: float = Field(
-        default=4.0, gt=0, le=20, description="a given value this far from what the others say is reported"
+        default=4.0, gt=0, le=20, description="A value this far from what the others predict is reported"
     )
 
 
@@ -101,6 +102,16 @@ def solve_shape(
     job: Job,
     mean: FloatArray,
 ) -> FloatArray:
+    """Return the shape's parameters by Levenberg-Marquardt, shape (P,); see `fit_measurements`.
+
+    Args:
+        space: The shape space.
+        held: Measurements to be met [m, kg].
+        expected: The others.
+        config: Settings.
+        job: For progress.
+        mean: Parameters of the usual body, shape (P,).
+    """
     tape = Tape(space.base)
     free = [k for k, name in enumerate(expected.names) if name not in held]
     names = [*held, *(expected.names[k] for k in free)]
@@ -126,7 +137,7 @@ def solve_shape(
     parameters, damping = mean, _DAMPING
     wrong, readings = residual(parameters)
     for step in range(config.iterations):
-        slope = np.concatenate([weight @ [by_parameters(space, reading) for reading in readings], space.whitener])
+        slope = np.concatenate([weight @ [reading.by_parameters(space.fields) for reading in readings], space.whitener])
         normal, descent = slope.T @ slope, -slope.T @ wrong
         # a taut tape jumps from one bump to the next: a full step may overshoot
         for _ in range(_TRIES):
@@ -145,17 +156,13 @@ def solve_shape(
     return parameters
 
 
-def by_parameters(space: ShapeSpace, reading: Reading) -> FloatArray:
-    return np.einsum("nk,pnk->p", reading.gradient, space.fields[:, reading.vertices])
-
-
 def _report_unlikely(prior: Population, held: dict[str, float], config: MeasurementsConfig, job: Job) -> None:
     away = prior.distance(held, {})
     # of n unit normals, the length is close to the root of n
     if away > np.sqrt(len(held)) + config.unlikely_sigmas:
         job.warn(
-            f"nobody surveyed is like this ({away:.1f} standard deviations from the mean body): what is not measured "
-            "is a guess, see its uncertainty"
+            f"no surveyed person has such a body ({away:.1f} standard deviations from the mean). "
+            "Values that were not measured are guesses; see their uncertainties."
         )
     for name in held:
         if name not in prior.names:
@@ -167,13 +174,13 @@ def _report_unlikely(prior: Population, held: dict[str, float], config: Measurem
             unit, scale = ("kg", 1.0) if name == "mass" else ("cm", 100.0)
             job.warn(
                 f"{name} = {held[name] * scale:.1f} {unit} is {abs(away):.1f} standard deviations from the "
-                f"{others.mean[k] * scale:.1f} {unit} that the other measurements lead one to expect"
+                f"{others.mean[k] * scale:.1f} {unit} that the other measurements predict"
             )
 
 
 def _report_errors(body: Avatar, held: dict[str, float], config: MeasurementsConfig, job: Job) -> None:
     if not np.isfinite(body.vertices).all():
-        raise AvatarError("no body has these measurements: the fit diverged", hint="check units")
+        raise AvatarError("no body has these measurements: the fit diverged", hint="check the units")
     tape = Tape(body)
     worst = 0.0
     for name, value in held.items():
@@ -185,15 +192,15 @@ def _report_errors(body: Avatar, held: dict[str, float], config: MeasurementsCon
         worst = max(worst, abs(error) * 1e3)
         if abs(error) * 1e3 > config.tolerance_mm:
             job.warn(
-                f"{name}: asked {value * 100:.1f} cm, reached {(value + error) * 100:.1f} cm, "
-                f"{error * 100:+.1f} cm: it contradicts the others"
+                f"{name}: asked for {value * 100:.1f} cm, reached {(value + error) * 100:.1f} cm "
+                f"({error * 100:+.1f} cm): it contradicts the others"
             )
     job.measure(worst_error_mm=round(float(worst), 3))
 
 
 def _report_folds(space: ShapeSpace, body: Avatar, job: Job) -> None:
     """Say where the asked lengths leave no room for the body between them."""
-    turned = np.einsum("fi,fi->f", *(_normals(v, body.faces) for v in (space.base.vertices, body.vertices))) < 0
+    turned = (face_area_vectors(space.base.mesh) * face_area_vectors(body.mesh)).sum(axis=1) < 0
     if turned.any():
         middle = space.base.vertices[body.faces[turned]].mean(axis=(0, 1))
         near = {name: np.linalg.norm(space.base.vertices[at] - middle) for name, at in body.landmarks.items()}
@@ -201,8 +208,3 @@ def _report_folds(space: ShapeSpace, body: Avatar, job: Job) -> None:
             f"the surface folds over itself in {turned.sum()} faces near the {min(near, key=lambda n: near[n])}: "
             "the measurements contradict each other there"
         )
-
-
-def _normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    return np.cross(b - a, c - a)

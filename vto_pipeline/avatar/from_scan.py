@@ -9,23 +9,26 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from vto_pipeline.avatar.blur import level_sigmas, surface_sigmas
-from vto_pipeline.avatar.bust import toward_bust_points
-from vto_pipeline.avatar.clothed import undressed
-from vto_pipeline.avatar.correspondence import Pairs, Target, closest_points
-from vto_pipeline.avatar.displacement import displace
-from vto_pipeline.avatar.levels import find_levels, with_rows_at
-from vto_pipeline.avatar.measure import measure
-from vto_pipeline.avatar.pose import named_pose
-from vto_pipeline.avatar.registration import Fit, covariance, first_fit, model, refine
-from vto_pipeline.avatar.scan_report import CORE, check, check_build, ends, report
-from vto_pipeline.avatar.scan_start import Start, upright_starts
-from vto_pipeline.avatar.settle import part_thighs, settle
-from vto_pipeline.avatar.shape import SEX_SHARE, ShapeSpace, shape_space
-from vto_pipeline.avatar.slide import slide
-from vto_pipeline.avatar.stance import Stance, stance
-from vto_pipeline.avatar.unseen import unseen_sigmas
-from vto_pipeline.avatar.upright import in_metres
+from vto_pipeline.avatar.measuring.avatar_measurements import measure_avatar
+from vto_pipeline.avatar.measuring.measuring_levels import find_levels, with_rows_at
+from vto_pipeline.avatar.model.fit import Fit, model
+from vto_pipeline.avatar.model.pose import named_pose
+from vto_pipeline.avatar.model.shape import SEX_SHARE, ShapeSpace, shape_space
+from vto_pipeline.avatar.model.stance import Stance, stance
+from vto_pipeline.avatar.scan.bind_pose import separate_thighs, to_bind_pose
+from vto_pipeline.avatar.scan.bust_points import toward_bust_points
+from vto_pipeline.avatar.scan.clothed import fit_under_clothes
+from vto_pipeline.avatar.scan.correspondence import Pairs, Target
+from vto_pipeline.avatar.scan.displacement import displace
+from vto_pipeline.avatar.scan.initial_pose import InitialPose, upright_initial_poses
+from vto_pipeline.avatar.scan.observed_uncertainty import level_sigmas, surface_sigmas
+from vto_pipeline.avatar.scan.registration import covariance, initial_fit, refine
+from vto_pipeline.avatar.scan.report import CORE, check, check_build, extremity_weights, report
+from vto_pipeline.avatar.scan.tangential_slide import slide_along_surface
+from vto_pipeline.avatar.scan.unobserved_uncertainty import unseen_sigmas
+from vto_pipeline.avatar.scan.upright import in_metres
+from vto_pipeline.avatar.template.template import JOINT_KINDS
+from vto_pipeline.geometry.closest import closest_points
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Avatar
 from vto_pipeline.model.job import Job
@@ -41,23 +44,23 @@ _NOISE_SHARE = 0.2
 class ScanConfig(Config):
     """Settings of the registration."""
 
-    sex: Literal["female", "male", "neutral"] = Field(default="neutral", description="whose mean body to begin with")
-    probes: int = Field(default=10_000, ge=500, le=100_000, description="points of the scan that the body is fitted to")
+    sex: Literal["female", "male", "neutral"] = Field(
+        default="neutral", description="Sex of the mean body to start from"
+    )
+    probes: int = Field(default=10_000, ge=500, le=100_000, description="Points sampled on the scan for the fit")
     iterations: int = Field(default=20, ge=5, le=200, description="Gauss-Newton steps over pose and shape")
-    reach_mm: float = Field(
-        default=60.0, gt=0, le=300, description="distance at which a point begins to count little, at first [mm]"
-    )
-    final_reach_mm: float = Field(default=10.0, gt=0, le=100, description="the same at the end [mm]")
+    reach_mm: float = Field(default=60.0, gt=0, le=300, description="Distance of down-weighting at the start [mm]")
+    final_reach_mm: float = Field(default=10.0, gt=0, le=100, description="Distance of down-weighting at the end [mm]")
     stiffness: tuple[float, ...] = Field(
-        default=(100.0, 20.0, 4.0, 1.0, 0.3, 0.1), description="of the displacement, falling"
+        default=(100.0, 20.0, 4.0, 1.0, 0.3, 0.1), description="Stiffnesses of the displacement, decreasing"
     )
-    rounds: int = Field(default=3, ge=1, le=50, description="displacement solves at each stiffness")
+    rounds: int = Field(default=3, ge=1, le=50, description="Displacement solves at each stiffness")
     clothed: bool = Field(
         default=False,
-        description="the scan is of clothes on the body: the body is kept inside it, and flagged as an estimate",
+        description="The person is clothed: the body is kept inside the scan and flagged as an estimate",
     )
     max_mean_mm: float = Field(
-        default=15.0, gt=0, description="a larger mean distance means that this is not a body [mm]"
+        default=15.0, gt=0, description="A larger mean distance means that this is not a body [mm]"
     )
 
 
@@ -65,56 +68,56 @@ def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | No
     """Return our body registered to a scan, posed as the scan and in its frame: metres, its upward axis turned to +Y.
 
     Args:
-        scan: Body or dress form; unit, upward axis and facing are found out; head, hands, legs may be missing; floor
-            and crumbs are dropped.
+        scan: Body or dress form; unit, upward axis and facing are detected; head, hands, legs may be missing; floor
+            and small pieces are dropped.
         config: Settings.
         job: Receives mean, rms and p95 of the distance from scan to body [mm]: of all points, of the core (no head,
             hands, feet), and of the explained ones (nearer than 10 mm: no stand, floor or hair), and their share.
 
     Raises:
-        AvatarError: the scan is not a body, with what is missing; or it is bent, and how cannot be made out.
+        AvatarError: the scan is not a body, with what is missing; or it is bent and cannot be reconstructed.
     """
     config, job = config or ScanConfig(), job or Job()
-    job.progress(0.0, "find the body's facing and size")
-    kept, guesses = upright_starts(in_metres(scan, job), job)
+    job.progress(0.0, "finding the body's facing and size")
+    kept, guesses = upright_initial_poses(in_metres(scan, job), job)
     target = Target(kept, config.probes, job.seed)
     space = shape_space(SEX_SHARE[config.sex])
     tries = [_pose_and_shape(space, target, guess, config, job, steps=8) for guess in guesses[:2]]
     scores = [_score(space, target, fit) for fit in tries]
     fit = _pose_and_shape(space, target, tries[int(np.argmin(scores))], config, job, steps=config.iterations)
-    job.progress(0.6, "displace the body onto the scan")
-    posed = part_thighs(space, fit, model(space, fit))
+    job.progress(0.6, "fitting the surface to the scan")
+    posed = separate_thighs(space, fit, model(space, fit))
     vertices, softest = _displaced(space, fit, target, posed, config.stiffness, config.rounds)
     check(kept, space, vertices, config.max_mean_mm)
     stands = stance(space, fit)
     caveats = []
     if config.clothed:
-        job.progress(0.75, "find the body inside the clothes")
-        shell, _ = settle(space, fit, stands, posed, vertices)
-        fit, sigmas = undressed(space, fit, target, shell, job)
+        job.progress(0.75, "finding the body inside the clothes")
+        shell, _ = to_bind_pose(space, fit, stands, posed, vertices)
+        fit, sigmas = fit_under_clothes(space, fit, target, shell, job)
         # which posture is the body's own does not show
         stands = replace(stance(space, fit), joints=space.joints(fit.parameters), pose=fit.pose)
         stands = replace(stands, translation=fit.translation)
-        vertices = part_thighs(space, fit, model(space, fit))
+        vertices = separate_thighs(space, fit, model(space, fit))
         job.measure(estimated_under_clothing=True)
-        job.warn("the body is an estimate under clothing: do not choose a size by it without a tape")
+        job.warn("the body is an estimate under clothing: check with a tape before choosing a size by it")
         caveats.append("estimated under clothing")
     elif stands.stands:
-        job.progress(0.75, "find the body's own levels")
+        job.progress(0.75, "finding the body's measuring levels")
         space, risen = _levelled(space, fit, stands, kept, vertices)
         stands = stance(space, fit)
         vertices, _ = _displaced(space, fit, target, risen, (softest,), config.rounds)
     else:
         job.warn(
-            f"the body does not stand: a part of it leans {np.rad2deg(stands.lean):.0f} degrees; its "
+            f"the body is not upright: a part of it leans {np.rad2deg(stands.lean):.0f} degrees. Its "
             "measurements are those of the body brought upright, and less certain"
         )
         caveats.append("brought upright")
-    job.progress(0.9, "carry the body back to the bind pose")
-    posed = part_thighs(space, fit, model(space, fit))
-    body, bad = settle(space, fit, stands, posed, vertices)
+    job.progress(0.9, "returning the body to the bind pose")
+    posed = separate_thighs(space, fit, model(space, fit))
+    body, bad = to_bind_pose(space, fit, stands, posed, vertices)
     if not stands.stands:
-        check_build(measure(body), stands.lean)
+        check_build(measure_avatar(body), stands.lean)
     if not config.clothed:
         parts = (
             unseen_sigmas(space, _uncertainty(space, target, fit, config), target, posed, body, stands.stands),
@@ -140,23 +143,24 @@ def _levelled(
     if "chest" in found:
         seen = (scan.vertices - stands.translation) @ stands.yaw
         shift += toward_bust_points(upright + shift @ stands.yaw, seen, space.base) @ stands.yaw.T
-    return levelled, slide(vertices, space.base.faces, shift)
+    return levelled, slide_along_surface(vertices, space.base.faces, shift)
 
 
 def _displaced(
     space: ShapeSpace, fit: Fit, target: Target, start: FloatArray, stiffness: tuple[float, ...], rounds: int
 ) -> tuple[FloatArray, float]:
-    unlike = np.array([_UNLIKE.get(name.rpartition("_")[2], 0.0) for name in space.base.joint_names])
+    unlike = np.array([_UNLIKE.get(kind, 0.0) for kind in JOINT_KINDS])
     trust = 1 - space.base.weights @ unlike
-    vertices, softest = displace(target, start, space.base.faces, trust, ends(space) < CORE, stiffness, rounds)
-    return part_thighs(space, fit, vertices), softest
+    core = extremity_weights(space) < CORE
+    vertices, softest = displace(target, start, space.base.faces, trust, core, stiffness, rounds)
+    return separate_thighs(space, fit, vertices), softest
 
 
 def _pose_and_shape(
-    space: ShapeSpace, target: Target, begin: Start | Fit, config: ScanConfig, job: Job, steps: int
+    space: ShapeSpace, target: Target, begin: InitialPose | Fit, config: ScanConfig, job: Job, steps: int
 ) -> Fit:
-    if isinstance(begin, Start):
-        fit, reach = first_fit(space, begin, named_pose(space.base, begin.pose_name).pose), config.reach_mm
+    if isinstance(begin, InitialPose):
+        fit, reach = initial_fit(space, begin, named_pose(space.base, begin.pose_name).pose), config.reach_mm
     else:
         fit, reach = begin, config.reach_mm / 2
     fall = (config.final_reach_mm / reach) ** (1 / steps)
@@ -170,7 +174,7 @@ def _pose_and_shape(
 
 def _pairs(space: ShapeSpace, target: Target, fit: Fit, reach_mm: float) -> Pairs:
     # what the scan may lack must not reach out for the rest of it
-    chosen = np.flatnonzero(ends(space) < CORE)[::3]
+    chosen = np.flatnonzero(extremity_weights(space) < CORE)[::3]
     return target.pairs(model(space, fit), space.base.faces, chosen, reach_mm * 1e-3)
 
 

@@ -1,4 +1,4 @@
-"""A body from a front and a side photo: shape, poses and cameras that explain both outlines, and what that leaves open.
+"""A body from a front and a side photo: shape, poses and cameras that fit both outlines, with uncertainties.
 
 Two outlines do not determine girths: even perfect ones leave 13 to 21 mm of mean error at chest, waist and hip. So an
 interval is reported.
@@ -12,20 +12,20 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from vto_pipeline.avatar.backdrop import person
-from vto_pipeline.avatar.definitions import DEFINITIONS
-from vto_pipeline.avatar.levels import find_levels, with_rows_at
-from vto_pipeline.avatar.population import population
-from vto_pipeline.avatar.pose import pose_avatar
-from vto_pipeline.avatar.registration import Fit, model
-from vto_pipeline.avatar.scan_report import ends
-from vto_pipeline.avatar.settle import settle
-from vto_pipeline.avatar.shape import SEX_SHARE, ShapeSpace, shape_space
-from vto_pipeline.avatar.silhouette_fit import Evidence, Solution, advance
-from vto_pipeline.avatar.silhouette_start import mean_body, stand
-from vto_pipeline.avatar.slide import slide
-from vto_pipeline.avatar.stance import stance
-from vto_pipeline.avatar.tape import Tape
+from vto_pipeline.avatar.measuring.definitions import DEFINITIONS
+from vto_pipeline.avatar.measuring.measuring_levels import find_levels, with_rows_at
+from vto_pipeline.avatar.measuring.population import population
+from vto_pipeline.avatar.measuring.tape import Tape
+from vto_pipeline.avatar.model.fit import Fit, model
+from vto_pipeline.avatar.model.pose import pose_avatar
+from vto_pipeline.avatar.model.shape import SEX_SHARE, ShapeSpace, shape_space
+from vto_pipeline.avatar.model.stance import stance
+from vto_pipeline.avatar.scan.bind_pose import to_bind_pose
+from vto_pipeline.avatar.scan.report import extremity_weights
+from vto_pipeline.avatar.scan.tangential_slide import slide_along_surface
+from vto_pipeline.avatar.silhouettes.backdrop import person
+from vto_pipeline.avatar.silhouettes.fit import Evidence, Solution, advance
+from vto_pipeline.avatar.silhouettes.initial_pose import initial_views, mean_body
 from vto_pipeline.errors import AvatarError
 from vto_pipeline.model.arrays import ByteArray
 from vto_pipeline.model.body import Avatar
@@ -49,16 +49,16 @@ class SilhouettesConfig(Config):
     """Settings of the fit to two photos."""
 
     sex: Literal["female", "male", "neutral"] = Field(
-        default="neutral", description="whose statistics complete the body"
+        default="neutral", description="Sex whose statistics complete the body"
     )
-    distance_m: float = Field(default=2.5, gt=0.5, le=20, description="from the camera to the body, about [m]")
-    height_m: float = Field(default=1.2, gt=0, le=10, description="of the camera above the floor, about [m]")
+    distance_m: float = Field(default=2.5, gt=0.5, le=20, description="Approximate distance from camera to body [m]")
+    height_m: float = Field(default=1.2, gt=0, le=10, description="Approximate camera height above the floor [m]")
     outline_sigma_mm: float = Field(
-        default=4.0, gt=0, le=100, description="uncertainty of a point on the outline: picture, cloth, model [mm]"
+        default=4.0, gt=0, le=100, description="Uncertainty of a point on the outline: picture, cloth, model [mm]"
     )
     iterations: int = Field(default=20, ge=5, le=200, description="Gauss-Newton steps")
     max_wrong_mm: float = Field(
-        default=25.0, gt=0, description="a larger mean distance of the outlines means that this is no body [mm]"
+        default=25.0, gt=0, description="A larger mean distance of the outlines means that this is not a body [mm]"
     )
 
 
@@ -84,31 +84,31 @@ def fit_silhouettes(
     config, job = config or SilhouettesConfig(), job or Job()
     front, side = person(front_image, str(silhouettes.front)), person(side_image, str(silhouettes.side))
     noise = config.outline_sigma_mm * 1e-3
-    job.progress(0.0, "how the person stands")
+    job.progress(0.0, "finding the pose")
     space, evidence = shape_space(SEX_SHARE[config.sex]), _evidence(config.sex, silhouettes, config)
-    begin = stand(space, front, side, evidence, noise)
-    if sum(begin.wrong) > _POOR_M and sum(stand(space, side, front, evidence, noise).wrong) < _BETTER * sum(
-        begin.wrong
-    ):
-        raise AvatarError(
-            "the outlines fit a body better with front and side swapped",
-            where=f"{silhouettes.front}, {silhouettes.side}",
-            hint="the first picture is the one from the front",
-        )
-    job.progress(0.5, "shape, poses and cameras")
+    begin = initial_views(space, front, side, evidence, noise)
+    if sum(begin.outline_errors) > _POOR_M:
+        swapped = initial_views(space, side, front, evidence, noise)
+        if sum(swapped.outline_errors) < _BETTER * sum(begin.outline_errors):
+            raise AvatarError(
+                "the outlines fit a body better with front and side swapped",
+                where=f"{silhouettes.front}, {silhouettes.side}",
+                hint="the first picture must be the one from the front",
+            )
+    job.progress(0.5, "fitting shape, poses and cameras")
     sexes = ("female", "male") if config.sex == "neutral" else (config.sex,)
     found = [(sex, _fit(sex, begin, silhouettes, config)) for sex in sexes]
     sex, solution = min(found, key=lambda one: one[1].misfit)
     space = shape_space(SEX_SHARE[sex])
     if len(found) > 1:
-        job.note(f"whose body it is was not said: the outlines are rather a {sex} body's")
-    for name, wrong in zip(("front", "side"), solution.wrong, strict=True):
+        job.note(f"sex was not given; the outlines fit a {sex} body better")
+    for name, wrong in zip(("front", "side"), solution.outline_errors, strict=True):
         job.measure(**{f"{name}_outline_mm": round(wrong * 1e3, 2)})
         if wrong * 1e3 > config.max_wrong_mm:
             raise AvatarError(
                 f"the {name} outline lies {wrong * 1e3:.0f} mm from any body's (at most {config.max_wrong_mm:g})",
                 where=str(getattr(silhouettes, name)),
-                hint="tight clothes, arms held off the body, nothing else in the picture",
+                hint="wear tight clothes, hold the arms off the body, and keep all else out of the picture",
             )
     return _report(space, solution, job)
 
@@ -122,11 +122,11 @@ def _evidence(sex: str, silhouettes: Silhouettes, config: SilhouettesConfig) -> 
 def _fit(sex: str, begin: Solution, silhouettes: Silhouettes, config: SilhouettesConfig) -> Solution:
     """Fit the body of a sex; the stance is known, the shape begins at the mean."""
     space = shape_space(SEX_SHARE[sex])
-    mean = mean_body(space, silhouettes.stature, 0.0, begin.views[0].start)
+    mean = mean_body(space, silhouettes.stature, 0.0, begin.views[0].nominal)
     views = tuple(
         replace(view, fit=replace(view.fit, parameters=mean.parameters, expected=mean.expected)) for view in begin.views
     )
-    trust = 1 - (1 - _ENDS_SHARE) * ends(space)
+    trust = 1 - (1 - _ENDS_SHARE) * extremity_weights(space)
     evidence = _evidence(sex, silhouettes, config)
     return advance(space, views, evidence, trust, config.outline_sigma_mm * 1e-3, config.iterations)
 
@@ -136,14 +136,14 @@ def _report(space: ShapeSpace, solution: Solution, job: Job) -> Avatar:
     tape, sigmas = Tape(body), {}
     for name, definition in DEFINITIONS.items():
         reading = tape.read(definition, body.bind_vertices)
-        slope = np.einsum("nk,pnk->p", reading.gradient, space.fields[:, reading.vertices])
+        slope = reading.by_parameters(space.fields)
         open_part = _OPEN_SHARE.get(name, 0.0) * reading.value
         sigmas[name] = float(np.sqrt(slope @ solution.covariance @ slope + open_part**2))
         if name in _OPEN_SHARE:
             job.measure(
                 **{f"{name}_m": round(reading.value, 4), f"{name}_interval_mm": round(1.96e3 * sigmas[name], 1)}
             )
-    job.note("girths behind two outlines are intervals, not points; measure by tape where it matters")
+    job.note("girths from two outlines are uncertain; measure with a tape where it matters")
     return replace(body, sigmas=sigmas)
 
 
@@ -159,6 +159,6 @@ def _as_it_stands(space: ShapeSpace, fit: Fit) -> Avatar:
     standing = (posed - stands.translation) @ stands.yaw
     levelled = with_rows_at(space, fit.parameters, standing, find_levels(standing, space.base))
     shift = (levelled.base.bind_vertices - space.base.bind_vertices) @ stands.yaw.T
-    moved = slide(posed, space.base.faces, shift)
-    body, _ = settle(levelled, upright, stance(levelled, upright), model(levelled, upright), moved)
+    moved = slide_along_surface(posed, space.base.faces, shift)
+    body, _ = to_bind_pose(levelled, upright, stance(levelled, upright), model(levelled, upright), moved)
     return pose_avatar(body, np.zeros_like(pose), np.zeros(3))

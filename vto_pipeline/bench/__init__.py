@@ -1,4 +1,16 @@
-"""Sample data with truth, measuring against it, and the benches of `vto bench`."""
+"""Sample data with truth, measuring against it, and the benches of `vto bench`.
+
+bench, record, timing, machine, provenance: what a bench is, how it is carried out, and on what
+measures: what several benches read off a cloth
+cloth/, scaling/, physics/, stability/, collision/, drape/, body/, peers/: the benches
+samples/: the sample data and its truth
+demo: how far a run on the sample data is from the truth
+first_run: what `make demo` and `make test` cost from nothing
+docs/: README and docs from templates and results
+measures: what several benches read off a cloth
+plots/: pictures of their rows
+picture, body_gallery: pictures of the docs
+"""
 
 from __future__ import annotations
 
@@ -6,17 +18,21 @@ from collections.abc import Mapping
 from typing import Any
 
 from vto_pipeline.bench.bench import Bench
-from vto_pipeline.report.body_plot import draw_body
-from vto_pipeline.report.collision_plot import draw_collision
-from vto_pipeline.report.drape_plot import draw_drape
-from vto_pipeline.report.plots import Curves, draw_curves
-from vto_pipeline.report.scaling_plot import draw_scaling
-from vto_pipeline.report.verdict_table import draw_verdicts
+from vto_pipeline.bench.plots.body_plot import draw_body
+from vto_pipeline.bench.plots.collision_plot import draw_collision
+from vto_pipeline.bench.plots.drape_plot import draw_drape
+from vto_pipeline.bench.plots.lines import Curves, draw_curves
+from vto_pipeline.bench.plots.scaling_plot import draw_scaling
+from vto_pipeline.bench.plots.verdict_table import draw_verdicts
 
 
 def _draw_solvers(bench: Mapping[str, Any]) -> bytes:
     errors = Curves(figures=("rms_stretch", "distance_mm", "residual"))
     return draw_curves(bench, errors, Curves("iterations", "iterations", ("imbalance_mm", "from_solution_mm")))
+
+
+def _draw_peers(bench: Mapping[str, Any]) -> bytes:
+    return draw_curves(bench, Curves(figures=("rms_stretch", "mean_height_m")))
 
 
 def _draw_integrators(bench: Mapping[str, Any]) -> bytes:
@@ -39,14 +55,14 @@ def _draw_physics(bench: Mapping[str, Any]) -> bytes:
 BENCHES = {
     "solvers": Bench(
         "every method on hanging, falling and worn cloth: error against run time",
-        "vto_pipeline.bench.solvers",
+        "vto_pipeline.bench.cloth.solvers",
         _draw_solvers,
     ),
     "integrators": Bench(
-        "energy, phase and momentum against closed forms", "vto_pipeline.bench.integrators", _draw_integrators
+        "energy, phase and momentum against closed forms", "vto_pipeline.bench.cloth.integrators", _draw_integrators
     ),
     "stability": Bench(
-        "stiff, distorted and extreme cases, extreme fabrics worn: what survives",
+        "which methods survive stiff, distorted and extreme cases, and extreme fabrics when worn",
         "vto_pipeline.bench.stability.table",
         draw_verdicts,
     ),
@@ -54,22 +70,29 @@ BENCHES = {
         "elastica, buckling, drape: error against references", "vto_pipeline.bench.physics", _draw_physics
     ),
     "collision": Bench(
-        "queries, broad phase, self-contact, friction: what is missed, what is left, how long it takes",
+        "queries, broad phase, self-contact, friction: misses, remaining crossings and run time",
         "vto_pipeline.bench.collision",
         draw_collision,
     ),
     "drape": Bench(
-        "garments on bodies: error against run time, honesty, refinement, rest shapes",
+        "garments on bodies: error against run time, error prediction, refinement, rest shapes",
         "vto_pipeline.bench.drape",
         draw_drape,
     ),
     "body": Bench(
-        "bodies from scans, tape and outlines: error against run time, and the noise floor beside ISO 20685",
+        "bodies from scans, tape and outlines: error against run time, noise floor, ISO 20685 limits",
         "vto_pipeline.bench.body",
         draw_body,
     ),
+    "peers": Bench(
+        "MuJoCo, Blender and PositionBasedDynamics beside the default method: error against run time",
+        "vto_pipeline.bench.peers",
+        _draw_peers,
+    ),
     "scaling": Bench(
-        "run time at equal error from 1k vertices up, kernels, threads", "vto_pipeline.bench.scaling", draw_scaling
+        "run time at equal error from 1k vertices up, kernels, direct solvers, threads",
+        "vto_pipeline.bench.scaling.sizes",
+        draw_scaling,
     ),
 }
 """Name -> bench. To add one: its file, with `rows(quick, watch)`, and a line here."""

@@ -1,15 +1,17 @@
-"""What a bench is: a function from `quick` and a watch to rows, each one measured point of a scene and a method."""
+"""A bench: a function from `quick` and a watch to rows, each a measured point of a scene and a method."""
 
 from __future__ import annotations
 
 import json
 import math
+import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, fields
 from importlib import import_module
 from typing import Any
 
 from vto_pipeline.bench.timing import Timing, threads_now
+from vto_pipeline.errors import ComputationError
 
 Value = float | str | bool | None
 """A figure, or a word where there is none: "diverged"."""
@@ -79,13 +81,20 @@ class Watch:
     def row(
         self, scene: str, method: str, settings: Mapping[str, Value], vertices: int, measure: Callable[[], Measured]
     ) -> Row:
-        """Return the row of this point: as an earlier run measured it, or measured now."""
+        """Return the row of this point: as an earlier run measured it, or measured now.
+
+        A computation that fails is a row too: its "status" says why.
+        """
         wanted = Row(scene, method, settings, vertices, 0.0, {})
         kept = self._known.get(wanted.key)
         if kept is not None:
             return kept
         self(" ".join([scene, method, *(f"{name}={value}" for name, value in settings.items())]))
-        timing, errors = measure()
+        began = time.perf_counter()
+        try:
+            timing, errors = measure()
+        except ComputationError as failure:
+            timing, errors = Timing(time.perf_counter() - began), {"status": failure.problem}
         return Row(scene, method, settings, vertices, timing.seconds, errors, timing.runs, timing.compile_s)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image
 
 from vto_pipeline.avatar.from_measurements import fit_measurements
-from vto_pipeline.io.size_letters import chest_range
+from vto_pipeline.io.bodies.size_letters import chest_range
 from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.body import Measurements
 from vto_pipeline.render.pictures import BACK, FRONT, LEFT, render_picture

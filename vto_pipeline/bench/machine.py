@@ -1,4 +1,4 @@
-"""The machine a bench ran on, as far as it explains a figure."""
+"""The machine a bench ran on, as far as it explains the figures."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ import numpy as np
 
 import vto_pipeline
 from vto_pipeline.bench.timing import threads_now
-from vto_pipeline.pipeline.digest import code_identity
+from vto_pipeline.pipeline.execution.digest import code_identity
 
-_STATE = ("load_at_start",)  # how the machine happened to be, not what it is
+_STATE = ("load_at_start", "niceness")  # how the machine happened to be, not what it is
 
 
 def this_machine() -> dict[str, Any]:
-    """Return CPU, cores, threads in use, memory, system, versions, the digest of the code, and the load just now."""
+    """Return CPU, cores, threads in use, memory, system, versions, the digest of the code; load and niceness now."""
     return {
         "cpu": _cpu(),
         "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1,
@@ -33,6 +33,7 @@ def this_machine() -> dict[str, Any]:
         "vto_pipeline": vto_pipeline.__version__,
         "code": code_identity()[:16],
         "load_at_start": round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else None,
+        "niceness": os.nice(0) if hasattr(os, "nice") else None,
     }
 
 

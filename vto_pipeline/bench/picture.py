@@ -1,4 +1,4 @@
-"""The README's picture: what went in, what the scan made of it, what the customer sees."""
+"""The README's picture: the input, the scan, and the garment on the customer."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vto_pipeline.io.gltf import read_glb
-from vto_pipeline.io.images import read_image
+from vto_pipeline.io.captures.images import read_image
+from vto_pipeline.io.gltf.write import read_glb
 from vto_pipeline.io.meshes import read_own_mesh
 from vto_pipeline.model.arrays import ByteArray
 from vto_pipeline.render.pictures import render_picture

@@ -1,4 +1,4 @@
-"""Carrying out a bench: the journal that survives an interruption, the JSON document and the picture."""
+"""Execution of a bench: a journal that survives interruptions, the JSON document and the picture."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from vto_pipeline.bench.bench import Bench, Row, Watch
-from vto_pipeline.bench.comparison import compare, level_as_json
+from vto_pipeline.bench.cloth.comparison import compare, level_as_json
 from vto_pipeline.bench.machine import same_machine, this_machine
+from vto_pipeline.bench.provenance import provenance
 from vto_pipeline.io.documents import write_json
 from vto_pipeline.io.files import replacing
 
@@ -57,7 +58,8 @@ def carry_out(
         say: Takes one line of progress.
 
     Returns:
-        The document: {"bench", "quick", "machine", "rows"}; with peers also "peers" and "levels", see `comparison`.
+        The document: {"bench", "command", "commit", "date", "machine", "quick", "rows"}; with peers also "peers" and
+        "levels", see `comparison`.
     """
     files = Files.of(name, folder)
     machine = this_machine()
@@ -74,7 +76,8 @@ def carry_out(
             if row.key not in written:
                 _write_line(journal, row.as_json())
     measured = [row.as_json() for row in rows.values()]
-    document = {"bench": name, "quick": quick, "machine": machine, "rows": measured}
+    command = f"vto bench {name}{' --quick' if quick else ''}"
+    document = {"bench": name, "quick": quick, **provenance(command), "machine": machine, "rows": measured}
     if peers:
         document["peers"] = [row.as_json() for row in peers]
         document["levels"] = [level_as_json(level) for level in compare(rows.values(), peers)]

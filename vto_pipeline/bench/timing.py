@@ -1,4 +1,4 @@
-"""Run time as it is reported everywhere: after compilation, the median of at least three runs."""
+"""Run time as reported everywhere: after compilation, the median of at least three runs."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import statistics
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numba
 
@@ -45,11 +45,11 @@ def timed(
         runs: How often, if time allows.
         budget: Wall time after which no further run begins [s].
     """
-    compile_s = _clock(warm)[1] if warm is not None else 0.0
-    result, seconds = _clock(run)
+    compile_s = clocked(warm)[1] if warm is not None else 0.0
+    result, seconds = clocked(run)
     walls = [seconds]
     while len(walls) < runs and sum(walls) + walls[-1] <= runs * budget and walls[-1] <= budget:
-        result, seconds = _clock(run)
+        result, seconds = clocked(run)
         walls.append(seconds)
     return result, Timing(statistics.median(walls), len(walls), compile_s)
 
@@ -59,7 +59,8 @@ def threads_now() -> int:
     return int(numba.get_num_threads())
 
 
-def _clock(run: Callable[[], Result]) -> tuple[Result, float]:
+def clocked(run: Callable[..., Result], *arguments: Any) -> tuple[Result, float]:
+    """Return what a call returns, and its wall time [s]."""
     began = time.perf_counter()
-    result = run()
+    result = run(*arguments)
     return result, time.perf_counter() - began

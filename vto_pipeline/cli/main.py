@@ -1,4 +1,4 @@
-"""The command `vto`: one file per command, loaded when it is called, and the one place where errors become messages."""
+"""The command `vto`: one file per command, loaded when it is called, and the place where errors become messages."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
+from errno import EACCES, EDQUOT, EIO, ELOOP, ENAMETOOLONG, ENOSPC, EPERM, EROFS
 from importlib import import_module
 
 import click
@@ -14,23 +15,26 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy loads: its su
 
 from vto_pipeline import __version__
 from vto_pipeline.cli.session import Session
-from vto_pipeline.errors import ConfigError, MissingDependencyError, VtoError
+from vto_pipeline.errors import ConfigError, InputError, MissingDependencyError, VtoError
 
 COMMANDS = {
-    "scan": "Photos, depth frames, a cloud or a mesh: to a garment or a body surface.",
-    "fit": "A body scan, measurements, or two photos: to an avatar.",
-    "drape": "A garment and a body: to the garment on the body.",
+    "scan": "Reconstruct a garment or a body from photos, depth frames, a cloud or a mesh.",
+    "fit": "Fit an avatar to a body scan, measurements or two photos.",
+    "drape": "Drape a garment on a body.",
     "run": "Run a pipeline document.",
-    "plan": "Show what a document would run, and run nothing.",
-    "bench": "Measure error against run time, and draw it.",
-    "report": "Make the page of a run again.",
+    "plan": "Show what a document would run, without running it.",
+    "bench": "Measure error against run time and plot it.",
+    "report": "Rebuild the page of a run.",
     "stages": "List all stages.",
     "schema": "Print the JSON schema of a pipeline document.",
-    "doctor": "Say what is installed, what is missing, and the command that mends it.",
+    "doctor": "Check the installation and show how to fix it.",
 }
 """Name of a command and of its file -> one line of help; kept here so that `vto --help` loads none of them."""
 
 INTERRUPTED = 130
+
+REFUSED = frozenset({EACCES, EPERM, EROFS, ELOOP, ENAMETOOLONG, EIO, ENOSPC, EDQUOT})
+"""What an operating system answers when a file, a right or the disk is at fault, and not our own code."""
 
 
 class _LazyGroup(click.Group):
@@ -42,7 +46,7 @@ class _LazyGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
-        command: click.Command = getattr(import_module(f"vto_pipeline.cli.{cmd_name}"), f"{cmd_name}_command")
+        command: click.Command = getattr(import_module(f"vto_pipeline.cli.commands.{cmd_name}"), f"{cmd_name}_command")
         return command
 
     def resolve_command(
@@ -80,7 +84,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Returns:
         The exit code: 0 done, 2 bad usage, config or plan, 3 bad input, 4 failed computation, 5 missing dependency,
-        6 batch with failures, 130 interrupted. Our own bugs (1) are left to Python, with their traceback.
+        130 interrupted. Our own bugs (1) are left to Python, with their traceback.
     """
     session = Session()
     try:
@@ -92,8 +96,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         error.show(sys.stderr)
         session.answer_error(ConfigError(error.format_message()))
         return error.exit_code
+    except OSError as error:
+        if error.errno not in REFUSED:
+            raise
+        return session.fail(InputError(f"the system refuses: {error.strerror}", where=str(error.filename or "")))
     except (click.Abort, KeyboardInterrupt):
-        click.echo("interrupted; run the same command again to go on", err=True)
+        click.echo("interrupted; run the same command again to resume", err=True)
         return INTERRUPTED
     except ImportError as error:
         if (error.name or "").startswith("vto_pipeline"):

@@ -27,25 +27,25 @@ def _set_verbose(ctx: click.Context, _: click.Parameter, value: bool) -> None:
 
 
 json_option = click.option(
-    "--json", is_flag=True, expose_value=False, is_eager=True, callback=_set_json, help="One JSON document on stdout."
+    "--json", is_flag=True, expose_value=False, is_eager=True, callback=_set_json, help="Print one JSON document."
 )
 verbose_option = click.option(
-    "-v", "--verbose", is_flag=True, expose_value=False, is_eager=True, callback=_set_verbose, help="Say more."
+    "-v", "--verbose", is_flag=True, expose_value=False, is_eager=True, callback=_set_verbose, help="Print details."
 )
 set_option = click.option(
     "--set", "overrides", multiple=True, metavar="STAGE.KEY=VALUE", help="Change one setting; may be repeated."
 )
 output_option = click.option(
-    "-o", "--output", type=PATH, metavar="RUN", help="Folder of the run; made if need be. [default: runs/NAME]"
+    "-o", "--output", type=PATH, metavar="RUN", help="Run folder, created if missing. [default: runs/NAME]"
 )
-force_option = click.option("--force-all", is_flag=True, help="Leave no work out, for comparing.")
+force_option = click.option("--force-all", is_flag=True, help="Leave no work out, for comparison.")
 
 
 def speaking(function: Function) -> Function:
-    """--json and -v: what every command has."""
+    """Add --json and -v, which every command has."""
     return json_option(verbose_option(function))
 
 
 def running(function: Function) -> Function:
-    """Everything that a command which runs a pipeline has."""
+    """Add the options of every command that runs a pipeline."""
     return output_option(set_option(force_option(speaking(function))))

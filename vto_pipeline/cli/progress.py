@@ -1,4 +1,4 @@
-"""How a run is shown while it works: bars on a terminal, plain lines elsewhere; both on stderr."""
+"""Progress of a run on stderr: bars on a terminal, plain lines elsewhere."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from vto_pipeline.cli.session import Session
-from vto_pipeline.pipeline.listener import Listener
-from vto_pipeline.pipeline.record import StageRecord
+from vto_pipeline.pipeline.execution.listener import Listener
+from vto_pipeline.pipeline.execution.record import StageRecord
 from vto_pipeline.pipeline.stage import Stage
 
 _SILENCE = 5.0
@@ -21,7 +21,7 @@ _SILENCE = 5.0
 
 @contextmanager
 def show_progress(session: Session) -> Iterator[Listener]:
-    """The listener that suits stderr."""
+    """Yield the listener that suits stderr."""
     if not sys.stderr.isatty():
         yield Lines(session)
         return
@@ -93,15 +93,15 @@ class Bars(Lines):
 
 
 def head(number: int, count: int, name: str) -> str:
-    """Where in the plan a stage stands: "[ 3/12] garment.stereo"."""
+    """Return the position of a stage in the plan: "[ 3/12] garment.stereo"."""
     return f"[{number:>{len(str(count))}}/{count}] {name}"
 
 
 def end_of(record: StageRecord) -> str:
-    """How a stage ended."""
+    """Return how a stage ended."""
     return {
         "ran": f"done in {record.seconds:.1f} s",
-        "cached": f"from the cache (took {record.seconds:.1f} s when it was made)",
+        "cached": f"from the cache (originally took {record.seconds:.1f} s)",
         "left_out": f"left out: {record.reason}",
         "failed": f"FAILED after {record.seconds:.1f} s: {record.reason}",
     }.get(record.status, "stopped")

@@ -1,4 +1,4 @@
-"""How the command line speaks: data to stdout, everything else to stderr."""
+"""Output of the command line: data to stdout, everything else to stderr."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vto_pipeline.errors import VtoError
 
 @dataclass
 class Session:
-    """What the options every command has ask for.
+    """The values of the options that every command has.
 
     Args:
         json: One JSON document on stdout, and nothing else there.
@@ -25,7 +25,7 @@ class Session:
     verbose: bool = False
 
     def answer(self, data: Any, lines: Iterable[str]) -> None:
-        """Put the command's result on stdout: as JSON if that was asked for, else as lines for people."""
+        """Print the command's result to stdout, as JSON if requested, else as plain lines."""
         if self.json:
             click.echo(json.dumps(data, indent=1, ensure_ascii=False))
         else:
@@ -33,7 +33,7 @@ class Session:
                 click.echo(line)
 
     def say(self, text: str) -> None:
-        """Put a message on stderr."""
+        """Print a message to stderr."""
         click.echo(text, err=True)
 
     def fail(self, error: VtoError) -> int:
@@ -43,7 +43,7 @@ class Session:
         return error.exit_code
 
     def answer_error(self, error: VtoError) -> None:
-        """Put an error on stdout, if JSON was asked for."""
+        """Print an error to stdout, if JSON was requested."""
         if self.json:
             fields = {"kind": type(error).__name__, "problem": error.problem, "where": error.where, "hint": error.hint}
             self.answer({"error": fields, "exit_code": error.exit_code}, ())

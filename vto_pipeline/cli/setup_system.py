@@ -1,4 +1,4 @@
-"""What the system must hold before the package can be installed, and the commands that put it there.
+"""System packages needed before the installation, and the commands that install them.
 
 Runs as a plain file under any Python from 3.10, before anything is installed: standard library only.
 
@@ -42,7 +42,7 @@ def missing_packages() -> list[str]:
 
 
 def install_command(packages: list[str]) -> str:
-    """What a person would type."""
+    """Return the command that a user would type."""
     return f"sudo apt-get install -y --no-install-recommends {' '.join(packages)}"
 
 
@@ -50,7 +50,7 @@ def install(packages: list[str]) -> None:
     """Install system packages with apt-get, as root or through sudo; where it cannot, end the process and say so."""
     rights = _rights()
     if shutil.which("apt-get") is None or rights is None:
-        why = "there is no apt-get here" if shutil.which("apt-get") is None else "this needs root, and there is no sudo"
+        why = "apt-get is not available" if shutil.which("apt-get") is None else "this needs root, and there is no sudo"
         sys.exit(f"error: system packages are missing, and {why}\n  hint: {install_command(packages)}")
     _say(f"installing system packages: {' '.join(packages)}")
     quiet = [*rights, "env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "-qq"]
@@ -68,14 +68,14 @@ def make_environment(folder: Path) -> None:
         and subprocess.run([python, "-m", "pip", "--version"], capture_output=True, check=False).returncode == 0
     ):
         return
-    _say(f"making {folder} with Python {sys.version.split()[0]}")
+    _say(f"creating {folder} with Python {sys.version.split()[0]}")
     subprocess.run([sys.executable, "-m", "venv", "--clear", folder], check=True)
 
 
 def main() -> None:
     """Prepare the system and the virtual environment named on the command line."""
     if sys.version_info < OLDEST:
-        problem = f"Python {sys.version.split()[0]} is too old; wanted {'.'.join(map(str, OLDEST))} or later"
+        problem = f"Python {sys.version.split()[0]} is too old; this needs {'.'.join(map(str, OLDEST))} or later"
         sys.exit(f"error: {problem}\n  hint: make PYTHON=python3.11")
     packages = missing_packages()
     if packages:
@@ -92,7 +92,7 @@ def _loads(name: str) -> bool:
 
 
 def _rights() -> list[str] | None:
-    """What to put before a command that needs root; None when nothing helps."""
+    """Return the prefix for a command that needs root; None if root is out of reach."""
     if os.geteuid() == 0:
         return []
     if shutil.which("sudo") is None:

@@ -1,4 +1,4 @@
-"""Tables for people, at the width of the terminal or of 100 columns."""
+"""Plain-text tables, at the width of the terminal or of 100 columns."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vto_pipeline.pipeline.request import Request
 
 
 def table_lines(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
-    """A table as lines of plain text."""
+    """Return a table as lines of plain text."""
     table = Table(*headings, box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
     for row in rows:
         table.add_row(*row)
@@ -26,7 +26,7 @@ def table_lines(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> list[
 
 
 def plan_lines(request: Request, plan: Plan) -> list[str]:
-    """A plan: what is given and wanted, what runs, what is left out and why."""
+    """Return the lines of a plan: what is given and wanted, what runs, what is left out and why."""
     given = ", ".join(one.key for one in request.given.values())
     steps = [
         (str(number), step.stage.name, ", ".join(step.inputs), ", ".join(step.stage.makes))

@@ -1,4 +1,4 @@
-"""What run, scan, fit and drape do alike: check the document, plan, run, say what came out."""
+"""Common steps of run, scan, fit and drape: check the document, plan, run, print the outcome."""
 
 from __future__ import annotations
 
@@ -7,33 +7,34 @@ from pathlib import Path
 from typing import Any
 
 from vto_pipeline.cli.progress import show_progress
+from vto_pipeline.cli.results import result_lines
 from vto_pipeline.cli.session import Session
 from vto_pipeline.errors import ComputationError, InputError
 from vto_pipeline.io.documents import Document, load_yaml, read_json
 from vto_pipeline.io.sniff import find_kind
 from vto_pipeline.pipeline.catalogue import Catalogue
-from vto_pipeline.pipeline.folder import RECORD, existing_run
+from vto_pipeline.pipeline.execution.folder import RECORD, existing_run
+from vto_pipeline.pipeline.execution.run import run
 from vto_pipeline.pipeline.plan import Plan, make_plan
 from vto_pipeline.pipeline.request import Request, read_request
-from vto_pipeline.pipeline.run import run
 
 
 def catalogue() -> Catalogue:
-    """The project's tables."""
+    """Return the project's tables."""
     from vto_pipeline.stages import CATALOGUE  # loads every domain: not for `vto --help`
 
     return CATALOGUE
 
 
 def planned(path: Path, overrides: Sequence[str], tables: Catalogue) -> tuple[Request, Plan]:
-    """A document's request and plan."""
+    """Return the request and the plan of a document."""
     document, tables = _for_its_garments(load_yaml(path), tables)
     request = read_request(document, path.resolve().parent, tables, overrides)
     return request, make_plan(request, tables)
 
 
 def _for_its_garments(document: Document, tables: Catalogue) -> tuple[Document, Catalogue]:
-    """The document spelt out, and the tables with a row for each of its garments, where it has several."""
+    """Return document and tables with a row for each garment, if there are several."""
     from vto_pipeline.stages.outfit import garment_names, outfit_tables, spelt_out
 
     names = garment_names(document)
@@ -41,7 +42,7 @@ def _for_its_garments(document: Document, tables: Catalogue) -> tuple[Document, 
 
 
 def run_tables(folder: Path, tables: Catalogue) -> Catalogue:
-    """The tables that a run was made with.
+    """Return the tables that a run was made with.
 
     Raises:
         InputError: it is not the folder of a run.
@@ -52,7 +53,7 @@ def run_tables(folder: Path, tables: Catalogue) -> Catalogue:
 
 
 def captured_kind(path: Path, session: Session) -> str:
-    """What a capture is: "photos", "depth", "cloud" or "surface"; says why.
+    """Return the kind of a capture, "photos", "depth", "cloud" or "surface", and print why.
 
     Raises:
         InputError: it is none of these.
@@ -60,14 +61,14 @@ def captured_kind(path: Path, session: Session) -> str:
     kind, reason = find_kind(path)
     if kind not in ("photos", "depth", "cloud", "surface"):
         raise InputError(
-            f"this looks like {kind} ({reason}); wanted photos, depth frames, a cloud or a mesh", where=str(path)
+            f"this looks like {kind} ({reason}); expected photos, depth frames, a cloud or a mesh", where=str(path)
         )
     session.say(f"{path}: {kind}, because {reason}")
     return kind
 
 
 def typed_document(command: str, given: Mapping[str, Any], want: Sequence[str], stages: Mapping[str, Any]) -> Document:
-    """The document that a command line stands for; what was not given is dropped.
+    """Return the document equivalent to a command line, without the inputs that were not given.
 
     Args:
         command: Stands where a file's name stands in messages.
@@ -97,7 +98,7 @@ def carry_out(
     session: Session,
     tables: Catalogue,
 ) -> None:
-    """Run a document and put the outcome on stdout.
+    """Run a document and print the outcome to stdout.
 
     Raises:
         VtoError: of whatever kind; a failed computation is recorded in run.json and its partial result named.
@@ -111,14 +112,16 @@ def carry_out(
         except ComputationError as error:
             if error.partial:
                 error.hint = "; ".join(
-                    filter(None, [error.hint, f"what was reached is in {output / 'out' / 'partial'}"])
+                    filter(None, [error.hint, f"the partial result is in {output / 'out' / 'partial'}"])
                 )
             raise
     session.answer({**record, "run": str(output)}, _outcome(record, output, tables))
+    for line in result_lines(record["wanted"], output / "out", tables):
+        session.say(line)
 
 
 def _outcome(record: Mapping[str, Any], output: Path, tables: Catalogue) -> Iterator[str]:
-    """The end of a run, for people."""
+    """Yield the outcome of a run as plain lines."""
     counts = dict.fromkeys(("ran", "cached", "left_out"), 0)
     for stage in record["stages"]:
         counts[stage["status"]] += 1
@@ -132,4 +135,4 @@ def _outcome(record: Mapping[str, Any], output: Path, tables: Catalogue) -> Iter
         yield f"  {artifact:<{width}}  {path if path.is_file() else 'as given'}"
     warnings = [(stage["name"], text) for stage in record["stages"] for text in stage["warnings"]]
     for name, text in warnings:
-        yield f"  warning from {name}: {text}"
+        yield f"  warning from {name.replace('_', ' ')}: {text}"

@@ -7,18 +7,18 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from vto_pipeline.cloth.audit import audit
-from vto_pipeline.cloth.balance import elastic_energy
 from vto_pipeline.cloth.drape_config import DrapeConfig
-from vto_pipeline.cloth.judge.balance import knows
-from vto_pipeline.cloth.levels import come_to_rest
-from vto_pipeline.cloth.pace import covered_way
-from vto_pipeline.cloth.place import put
-from vto_pipeline.cloth.reshape import reshape
-from vto_pipeline.cloth.settings import checked
-from vto_pipeline.cloth.tight import warn_if_too_small
-from vto_pipeline.cloth.warm_up import warm_up
-from vto_pipeline.errors import DivergedError, IntersectingError
+from vto_pipeline.cloth.dynamics.body_motion import covered_way
+from vto_pipeline.cloth.dynamics.residual import elastic_energy
+from vto_pipeline.cloth.dynamics.warm_up import warm_up
+from vto_pipeline.cloth.judge.audit import audit
+from vto_pipeline.cloth.judge.residual import knows
+from vto_pipeline.cloth.judge.too_small import warn_if_too_small
+from vto_pipeline.cloth.model.settings import checked
+from vto_pipeline.cloth.placement.place import put
+from vto_pipeline.cloth.placement.transfer import reshape
+from vto_pipeline.cloth.rest.multiresolution import come_to_rest
+from vto_pipeline.errors import DivergedError, FallenError, IntersectingError
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.cloth import Draped
 from vto_pipeline.model.fabric import Fabric
@@ -59,23 +59,25 @@ def drape(
         ConfigError: an unknown setting or a value out of range.
         InputError: the garment is none for a body of this size, in whatever unit, or the fabric no material.
         IntersectingError: triangles still cross; `partial` holds the mesh as "draped", "audit" and "trace".
-        DivergedError: positions are no longer finite; `partial` holds the mesh as it began, as "draped".
+        DivergedError, FallenError: positions are no longer finite, or it fell off the body; `partial` holds the mesh as
+            it began, as "draped".
     """
     config, job = checked(DrapeConfig, settings), job or Job()
     if isinstance(garment, TriangleMesh):
         garment = Garment(garment, RestShape(garment.vertices))
     if isinstance(body, TriangleMesh):
         body = MovingBody(body.vertices[None], body.faces)
-    job.progress(0.0, "compiling the kernels")
-    job.measure(compile_s=warm_up(), mode=garment.rest.worn_as)
     began = time.perf_counter()
+    garment, body = _begin(garment, body, config, job)  # a garment that is refused need not wait for the compiler
+    job.progress(0.0, "compiling the kernels")
+    compile_s = warm_up()
+    job.measure(compile_s=compile_s, mode=garment.rest.worn_as)
+    began += compile_s
     deadline = np.inf if config.time_budget_s is None else began + config.time_budget_s
-
-    garment, body = _begin(garment, body, config, job)
     mesh = garment.mesh
     try:
         reached = come_to_rest(garment, body, fabric, config, job, deadline)
-    except DivergedError as error:
+    except (DivergedError, FallenError) as error:
         error.partial["draped"] = mesh
         raise
     model, stepper, settling = reached.model, reached.stepper, reached.settling
@@ -96,35 +98,30 @@ def drape(
         ),
         **warn_if_too_small(draped, garment.rest, config.stretch_limit, job),
     }
-    error_mm = 1e3 * settling.error if np.isfinite(settling.error) else None
     reached.phases.account(reached.before)
-    job.measure(seconds=time.perf_counter() - began, steps=stepper.steps, error_mm=error_mm, **findings)
+    job.measure(seconds=time.perf_counter() - began, steps=stepper.steps, error_mm=settling.error_mm, **findings)
     if not settling.settled:
-        job.warn(
-            f"not at rest: {error_mm:.1f} mm still to come" if error_mm else "not at rest, and too early to say how far"
-        )
+        job.warn(settling.unrest)
     refuse_crossings(findings, {"draped": draped, "audit": findings, "trace": tuple(settling.trace)})
     return Draped(draped, state.velocities, None, tuple(settling.trace), findings)
 
 
 def _begin(garment: Garment, body: MovingBody, config: DrapeConfig, job: Job) -> tuple[Garment, MovingBody]:
-    """Return garment and body as the simulation takes them up."""
+    """Return garment and body as the simulation starts."""
     start = TriangleMesh(body.keyframes[0], body.faces)
     if len(body.keyframes) == 1:
         return put(garment, start, config, job), body
     way = 1e3 * covered_way(body, garment.mesh)
     if way <= config.ride_up_to_mm:
-        job.note(f"the body under the garment changes by up to {way:.0f} mm: the garment rides along")
+        job.note(f"the body under the garment changes by up to {way:.0f} mm; the garment moves along with it")
         return garment, body
-    job.note(
-        f"the body under the garment changes by up to {way:.0f} mm: the garment starts reshaped on the body as it ends"
-    )
+    job.note(f"the body under the garment changes by up to {way:.0f} mm; the garment starts reshaped on the final body")
     reshaped = TriangleMesh(reshape(garment.mesh, start, body.final), garment.mesh.faces, garment.mesh.colors)
     return Garment(reshaped, garment.rest), MovingBody(body.keyframes[-1:], body.faces)
 
 
 def refuse_crossings(findings: Mapping[str, object], partial: Mapping[str, object]) -> None:
-    """Fail where anything still crosses, and say where.
+    """Raise an error if anything still crosses, with the places.
 
     Args:
         findings: Of an audit: pairs and places of each kind of crossing.
@@ -143,13 +140,13 @@ def refuse_crossings(findings: Mapping[str, object], partial: Mapping[str, objec
     if crossing:
         raise IntersectingError(
             "; ".join(crossing),
-            hint="is the garment the right way up, and large enough? a larger skin_mm or more clear_rounds may help",
+            hint="check that the garment is the right way up and large enough; or raise skin_mm or clear_rounds",
             partial=partial,
         )
 
 
 def named(places: object) -> str:
-    """Name some places [m] of those that the judge lists."""
+    """Return some of the places [m] of an audit as text."""
     assert isinstance(places, list)
     chosen = [places[k] for k in np.unique(np.linspace(0, len(places) - 1, _SHOWN).astype(int))] if places else []
     return ", ".join(f"({x:.2f}, {y:.2f}, {z:.2f})" for x, y, z in chosen)

@@ -1,4 +1,4 @@
-"""Cloth among simple colliders, from Python: what benches and outside checks call."""
+"""Simulation of cloth among simple colliders, for Python users and benches."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 
-from vto_pipeline.cloth.balance import elastic_energy
-from vto_pipeline.cloth.build import at_rest, build
-from vto_pipeline.cloth.collision.body import BodyCollider
+from vto_pipeline.cloth.collision.body.contacts import BodyCollider
 from vto_pipeline.cloth.collision.contacts import Collider
-from vto_pipeline.cloth.collision.moving import Moving
-from vto_pipeline.cloth.collision.shapes import Box, Capsule, Ellipsoid, MeshCollider, Plane, Sphere
-from vto_pipeline.cloth.materials import Materials
-from vto_pipeline.cloth.refine import refine
-from vto_pipeline.cloth.settings import checked
-from vto_pipeline.cloth.settle import SettleLimits, settle
-from vto_pipeline.cloth.start import free_start
-from vto_pipeline.cloth.stepper import Pins, StepConfig, Stepper
-from vto_pipeline.cloth.untie import untie
-from vto_pipeline.errors import InputError
+from vto_pipeline.cloth.collision.shapes.colliders import Box, Capsule, Ellipsoid, MeshCollider, Plane, Sphere
+from vto_pipeline.cloth.collision.shapes.moving import Moving
+from vto_pipeline.cloth.dynamics.residual import elastic_energy
+from vto_pipeline.cloth.dynamics.step_refinement import refine
+from vto_pipeline.cloth.dynamics.stepper import Pins, StepConfig, Stepper
+from vto_pipeline.cloth.model.build import at_rest, build
+from vto_pipeline.cloth.model.materials import Materials
+from vto_pipeline.cloth.model.settings import checked
+from vto_pipeline.cloth.placement.collapsed_start import untie
+from vto_pipeline.cloth.placement.collision_free_start import free_start
+from vto_pipeline.cloth.rest.convergence import SettleLimits, settle
+from vto_pipeline.errors import ConfigError, InputError
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.cloth import TraceRow
@@ -31,7 +31,7 @@ from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
-from vto_pipeline.numerics.threads import limited_threads
+from vto_pipeline.numerics.cpu_threads import limited_threads
 from vto_pipeline.units import GRAVITY
 
 _REST_MM = 0.1  # error at rest that is asked for when nobody says
@@ -44,26 +44,29 @@ class SimulateConfig(StepConfig, Materials):
     """Settings of `simulate`."""
 
     until: str = Field(
-        "time", pattern="^(time|rest)$", description='"time": run all `seconds`; "rest": stop at equilibrium'
+        "time", pattern="^(time|rest)$", description='"time" runs all `seconds`; "rest" stops at equilibrium'
     )
     target_error_mm: float | None = Field(
         None,
         gt=0,
         le=100,
-        description="Error to reach, rms [mm]: with rest the motion still to come, by default 0.1; with time the "
-        "change when steps are halved, by default not asked for",
+        description="Rms error to reach [mm]. Until rest: the predicted motion, by default 0.1. Until time: the "
+        "change when steps are halved, by default not checked",
     )
     time_budget_s: float | None = Field(
-        None, gt=0, description="Wall time to use [s]: steps are halved as long as it lasts; none by default"
+        None, gt=0, description="Wall time within which steps are halved [s]; none by default"
     )
     threads: int | None = Field(None, ge=1, le=1024, description="Threads; all cores by default")
-    finest: int = Field(320, ge=1, le=100000, description="Steps per 1/60 s that are not refined further")
-    damping: float = Field(0.0, ge=0, le=1000, description="Rate at which velocities fade [1/s]")
-    skin_mm: float | None = Field(
-        None, gt=0, le=100, description="Distance kept from colliders [mm]; by default a quarter edge, 1 to 3 mm"
+    finest: int = Field(320, ge=1, le=100000, description="Most steps per 1/60 s that refinement may reach")
+    pin_compliance: float | None = Field(
+        None, gt=0, le=1, description="How far a pin gives way under a force [m/N]; pins are rigid by default"
     )
-    force_all: bool = Field(False, description="Leave nothing out that this scene does not need: to compare")
-    gravity: tuple[float, float, float] = Field((0.0, -GRAVITY, 0.0), description="[m/s²]")
+    damping: float = Field(0.0, ge=0, le=1000, description="Decay rate of velocities [1/s]")
+    skin_mm: float | None = Field(
+        None, gt=0, le=100, description="Distance kept from colliders [mm]; by default a quarter of an edge, 1 to 3 mm"
+    )
+    force_all: bool = Field(False, description="Leave no work out, for comparison")
+    gravity: tuple[float, float, float] = Field((0.0, -GRAVITY, 0.0), description="Gravity [m/s²]")
 
 
 @dataclass(frozen=True)
@@ -104,21 +107,32 @@ def simulate(
         fabric: What it is made of.
         rest: Rest positions [m], shape (V, 3); the start when None. Flat rest angles.
         pinned: Vertices held where they are, or led.
-        pin_path: Where those are at a time [s], in their order: [m], shape (P, 3). Where they start when None.
+        pin_path: Where those are at a time [s], in their order: [m], shape (P, 3). Where they start when None. Not for
+            pins that give way.
         colliders: What it may lie on.
         seconds: Simulated time; with until "rest" the limit [s].
         settings: Keys of `SimulateConfig`.
 
     Raises:
-        ConfigError: an unknown setting or a value out of range.
+        ConfigError: an unknown setting, a value out of range, or settings that do not go together.
         InputError: sizes that do not match, an impossible fabric, or no length of time.
         DivergedError: positions are no longer finite.
     """
     config = checked(SimulateConfig, settings)
     if not 0.0 <= seconds < np.inf:
-        raise InputError(f"seconds is {seconds}; wanted a time of zero or more")
+        raise InputError(f"seconds is {seconds}; expected a time of zero or more")
     shape = RestShape(mesh.vertices if rest is None else np.asarray(rest, dtype=np.float64))
-    model = build(mesh, shape, fabric, pinned=tuple(pinned), gravity=config.gravity, materials=config)
+    if config.pin_compliance is not None and pin_path is not None:
+        raise ConfigError("pin_compliance is set, and pins on a path do not give way", hint="leave out one of them")
+    model = build(
+        mesh,
+        shape,
+        fabric,
+        pinned=tuple(pinned),
+        pin_compliance=config.pin_compliance,
+        gravity=config.gravity,
+        materials=config,
+    )
     skin = default_skin(model.edge_length) if config.skin_mm is None else 1e-3 * config.skin_mm
     job = Job(force_all=config.force_all)
     shapes = [_collider(one, job) for one in colliders]
@@ -179,7 +193,7 @@ def simulate(
     if stepper.self_contact is not None:
         tally = stepper.self_contact.tally
         if tally.uncut:
-            job.warn(f"{tally.uncut} pairs were met by what moves where nothing could give way")
+            job.warn(f"{tally.uncut} contact pairs remain where nothing could give way")
         report.update(self_contact=tally.as_report())
     report.update(warnings=tuple(job.warnings))
     return Trajectory(state.positions, state.velocities, report, trace)

@@ -1,1 +1,8 @@
-"""From a scanned surface to a garment: alignment, subtraction, openings, simulation mesh."""
+"""From a scanned surface to a garment.
+
+coarse_align, robust_icp, align: the scan in the frame of its mannequin
+color_model, graph_cut, subtract: the mannequin taken away
+loop_evidence, notches, rims, openings: real openings kept, scan holes filled
+simulation_mesh: the mesh that is simulated
+wearable: whether a surface can be a garment at all
+"""

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.coarse_align import PlacementSearch, tilted_rotations, upright_rotations
-from vto_pipeline.garment.robust_icp import Placed, refine
+from vto_pipeline.garment.robust_icp import Alignment, refine
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import face_area_vectors, face_normals
@@ -31,14 +31,14 @@ SPACING = 0.01
 class AlignConfig(Config):
     """How the scan is brought onto the mannequin."""
 
-    samples: int = Field(8000, ge=1000, le=100_000, description="scan points used")
-    yaw_starts: int = Field(24, ge=4, le=180, description="directions tried about the vertical")
-    candidates: int = Field(6, ge=1, le=50, description="placements refined")
-    widest_band_mm: float = Field(3.0, ge=0.2, le=20, description="beyond this a point is never bare mannequin [mm]")
-    enough_bare: float = Field(0.03, ge=0, le=1, description="least share of the scan that must lie on bare mannequin")
-    upright_bare: float = Field(0.08, ge=0, le=1, description="with less than this share, other up axes are tried too")
-    most_inside: float = Field(0.02, ge=0, le=1, description="largest share of the scan inside the mannequin")
-    worst_sigma_mm: float = Field(1.0, ge=0.01, le=50, description="largest placement uncertainty accepted [mm]")
+    samples: int = Field(8000, ge=1000, le=100_000, description="Scan points used")
+    yaw_starts: int = Field(24, ge=4, le=180, description="Directions tried about the vertical")
+    candidates: int = Field(6, ge=1, le=50, description="Placements refined")
+    widest_band_mm: float = Field(3.0, ge=0.2, le=20, description="Farther out, a point is never bare mannequin [mm]")
+    enough_bare: float = Field(0.03, ge=0, le=1, description="Least share of the scan that must lie on bare mannequin")
+    upright_bare: float = Field(0.08, ge=0, le=1, description="Below this share, other up axes are tried too")
+    most_inside: float = Field(0.02, ge=0, le=1, description="Largest share of the scan inside the mannequin")
+    worst_sigma_mm: float = Field(1.0, ge=0.01, le=50, description="Largest placement uncertainty accepted [mm]")
 
 
 def align_to_mannequin(surface: TriangleMesh, mannequin: TriangleMesh, config: AlignConfig, job: Job) -> FloatArray:
@@ -58,7 +58,7 @@ def align_to_mannequin(surface: TriangleMesh, mannequin: TriangleMesh, config: A
     few = slice(None, None, max(config.samples // 2000, 1))
     search = PlacementSearch(points, mannequin, distance, COARSE_CELL)
 
-    def best_of(rotations: list[FloatArray]) -> Placed:
+    def best_of(rotations: list[FloatArray]) -> Alignment:
         scored = sorted((search.best(rotation) for rotation in rotations), key=lambda found: -found[0])
         starts = [placement for _, placement in scored[: config.candidates]]
         rough = [refine(points[few], normals[few], distance, normals_there, start, COARSE_BANDS) for start in starts]
@@ -83,17 +83,17 @@ def align_to_mannequin(surface: TriangleMesh, mannequin: TriangleMesh, config: A
     return _accept(placed, surface, config, job)
 
 
-def _accept(placed: Placed, surface: TriangleMesh, config: AlignConfig, job: Job) -> FloatArray:
+def _accept(placed: Alignment, surface: TriangleMesh, config: AlignConfig, job: Job) -> FloatArray:
     """Measure the placement, and refuse one that the bare parts do not determine."""
     share = float(placed.bare.mean())
     if share < config.enough_bare:
         raise GarmentError(
-            f"only {share:.1%} of the scan lies on bare mannequin, at least {config.enough_bare:.0%} is needed",
-            hint="is it the right mannequin, in metres? let neck, arms or stand show in the scan",
+            f"only {share:.1%} of the scan lies on bare mannequin; at least {config.enough_bare:.0%} is needed",
+            hint="is it the right mannequin, in metres? the scan should show the neck, arms or stand",
         )
     if placed.inside > config.most_inside:
         raise GarmentError(
-            f"{placed.inside:.1%} of the scan lies inside the mannequin, at most {config.most_inside:.0%} may",
+            f"{placed.inside:.1%} of the scan lies inside the mannequin; at most {config.most_inside:.0%} is allowed",
             hint="is it the right mannequin, in metres, in the same pose?",
         )
     sigma = _uncertainty(placed, surface, config.samples)
@@ -102,14 +102,14 @@ def _accept(placed: Placed, surface: TriangleMesh, config: AlignConfig, job: Job
     )
     if sigma > config.worst_sigma_mm * 1e-3:
         raise GarmentError(
-            f"what shows of the mannequin leaves its placement uncertain by {sigma * 1e3:.1f} mm, "
+            f"the visible part of the mannequin leaves its placement uncertain by {sigma * 1e3:.1f} mm; "
             f"at most {config.worst_sigma_mm:g} mm is allowed",
-            hint="let more of the mannequin show, on several sides",
+            hint="leave more of the mannequin uncovered, on several sides",
         )
     return placed.mannequin_from_surface
 
 
-def _uncertainty(placed: Placed, surface: TriangleMesh, samples: int) -> float:
+def _uncertainty(placed: Alignment, surface: TriangleMesh, samples: int) -> float:
     """Return the standard deviation of the least determined motion, as a displacement half the scan's size out [m]."""
     lever = 0.5 * float(np.ptp(surface.vertices, axis=0).max())
     scale = np.array([1.0 / lever] * 3 + [1.0] * 3)

@@ -1,4 +1,4 @@
-"""Where a scan might stand on its mannequin: all positions of many rotations, scored at once.
+"""Coarse placement of a scan on its mannequin: all translations of many rotations, scored by FFT.
 
 The score of a placement is the sum over scan points of a field around the mannequin: positive at its surface, nothing
 far outside (garment folds, floor and board cost nothing), negative inside (nothing can be there). For a given
@@ -43,7 +43,7 @@ class PlacementSearch:
 
     Args:
         points: Scan points [m], shape (N, 3).
-        mannequin: What the garment was on.
+        mannequin: The mannequin under the garment.
         distance: Its distance queries.
         cell: Wanted cell size of the score field [m].
     """

@@ -1,4 +1,4 @@
-"""Which of two materials a colour speaks for, learnt from places where the material is sure."""
+"""Colour evidence for one of two materials, learnt where the material is certain."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from vto_pipeline.model.arrays import ByteArray, FloatArray
+from vto_pipeline.numerics.srgb import decode_srgb
 
 BINS = 24
 BLUR = 1.0
@@ -45,9 +46,7 @@ def color_evidence(colors: ByteArray, pure: NDArray[np.bool_], mixed: NDArray[np
 
 def cielab(colors: ByteArray) -> FloatArray:
     """Return CIELAB (D65) of sRGB bytes, shape (N, 3). IEC 61966-2-1 and CIE 15."""
-    encoded = colors / 255.0
-    linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
-    xyz = linear @ np.array([[0.4124, 0.2126, 0.0193], [0.3576, 0.7152, 0.1192], [0.1805, 0.0722, 0.9505]])
+    xyz = decode_srgb(colors) @ np.array([[0.4124, 0.2126, 0.0193], [0.3576, 0.7152, 0.1192], [0.1805, 0.0722, 0.9505]])
     ratio = xyz / np.array([0.9505, 1.0, 1.089])
     f = np.where(ratio > (6 / 29) ** 3, np.cbrt(ratio), ratio / (3 * (6 / 29) ** 2) + 4 / 29)
     return np.column_stack([116 * f[:, 1] - 16, 500 * (f[:, 0] - f[:, 1]), 200 * (f[:, 1] - f[:, 2])])

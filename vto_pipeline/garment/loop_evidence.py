@@ -1,4 +1,4 @@
-"""Is a boundary loop a real opening of the garment, or a hole in the scan?"""
+"""Evidence whether a boundary loop is an opening of the garment or a hole in the scan."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ RINGS = np.arange(0.5, 10.0) / 10.0
 
 @dataclass(frozen=True)
 class LoopShape:
-    """A boundary loop measured.
+    """Measurements of a boundary loop.
 
     Args:
         walk: Boundary half-edges in order, shape (L,).

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from vto_pipeline.garment.loop_evidence import encloses
 from vto_pipeline.garment.rims import smooth_curve
-from vto_pipeline.geometry.holes import fill_bay
+from vto_pipeline.geometry.remeshing.holes import fill_bay
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import boundary_walks, half_edges
 from vto_pipeline.model.arrays import FloatArray, IntArray
@@ -48,8 +48,8 @@ def close_notches(
     for _ in range(ROUNDS):
         rims = [walk for walk in boundary_walks(mesh) if _length(mesh, walk) > least_perimeter]
         bays = [bay for walk in rims if (bay := _worst_bay(mesh, walk, distance, least_perimeter, reach)) is not None]
-        for shore, directions in bays:
-            mesh = _bridge(mesh, shore, directions)
+        for around, directions in bays:
+            mesh = _bridge(mesh, around, directions)
         if not bays:
             break
         closed += len(bays)
@@ -78,8 +78,8 @@ def _worst_bay(
         if encloses(np.vstack([points[left], mouth]), distance, reach):
             before = points[start] - points[_further(along, start, -TANGENT)]
             after = points[_further(along, end, TANGENT)] - points[end]
-            shore = np.roll(walk, -start)[: (end - start) % len(walk)]
-            return shore, np.stack([before, after]) / np.linalg.norm([before, after], axis=1, keepdims=True)
+            bay = np.roll(walk, -start)[: (end - start) % len(walk)]
+            return bay, np.stack([before, after]) / np.linalg.norm([before, after], axis=1, keepdims=True)
     return None
 
 
@@ -135,22 +135,22 @@ def _further(along: FloatArray, place: int, by: float) -> int:
     return int(np.searchsorted(along[:-1], np.mod(along[place] + by, along[-1])) % (len(along) - 1))
 
 
-def _bridge(mesh: TriangleMesh, shore: IntArray, directions: FloatArray) -> TriangleMesh:
+def _bridge(mesh: TriangleMesh, bay: IntArray, directions: FloatArray) -> TriangleMesh:
     """Fill a bay up to the cubic that goes on as the rim does on both sides of it.
 
     The tangents of the Hermite cubic are as long as those that make it a circle's arc, were the turn between them one.
     """
     halves = half_edges(mesh)
-    first, last = halves[shore[0], 0], halves[shore[-1], 1]
+    first, last = halves[bay[0], 0], halves[bay[-1], 1]
     start, end = mesh.vertices[first], mesh.vertices[last]
     chord = float(np.linalg.norm(end - start))
     turn = np.arccos(np.clip(directions[0] @ directions[1], -0.5, 1.0))
     pull = directions * chord / np.cos(turn / 4.0) ** 2
-    edge = np.linalg.norm(mesh.vertices[halves[shore, 1]] - mesh.vertices[halves[shore, 0]], axis=1).mean()
+    edge = np.linalg.norm(mesh.vertices[halves[bay, 1]] - mesh.vertices[halves[bay, 0]], axis=1).mean()
     t = np.linspace(0.0, 1.0, int(np.ceil(1.1 * chord / edge)) + 1)[1:-1, None]
     mouth = (2 * t**3 - 3 * t**2 + 1) * start + (t**3 - 2 * t**2 + t) * pull[0]
     mouth += (3 * t**2 - 2 * t**3) * end + (t**3 - t**2) * pull[1]
-    return fill_bay(mesh, shore, mouth)
+    return fill_bay(mesh, bay, mouth)
 
 
 def _outside(start: FloatArray, end: FloatArray, distance: SurfaceDistance) -> NDArray[np.bool_]:

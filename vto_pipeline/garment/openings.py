@@ -1,4 +1,4 @@
-"""Tell real openings from holes in the scan; fill these, clean the rims of those."""
+"""Tell openings of the garment from holes in the scan; fill the holes, clean the rims of the openings."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from pydantic import Field
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.loop_evidence import LoopShape, encloses, measure_loops
 from vto_pipeline.garment.notches import close_notches
-from vto_pipeline.garment.rims import drop_crumbs, fair_rims, largest_piece, trim_ledges
-from vto_pipeline.geometry.decimate import decimate, faces_at
-from vto_pipeline.geometry.holes import fill_holes
-from vto_pipeline.geometry.remesh import edge_lengths
-from vto_pipeline.geometry.repair import RepairConfig, repair
+from vto_pipeline.garment.rims import drop_flaps, fair_rims, largest_piece, trim_ledges
+from vto_pipeline.garment.wearable import LEAST_PERIMETER_MM, check_wearable
+from vto_pipeline.geometry.remeshing.decimate import decimate, faces_at
+from vto_pipeline.geometry.remeshing.holes import fill_holes
+from vto_pipeline.geometry.remeshing.remesh import edge_lengths
+from vto_pipeline.geometry.remeshing.repair import RepairConfig, repair
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import face_area_vectors, face_components
 from vto_pipeline.model.garment import Opening
@@ -25,42 +26,45 @@ from vto_pipeline.model.settings import Config
 class OpeningsConfig(Config):
     """What counts as an opening, and how far its rim is cleaned."""
 
-    edge_mm: float = Field(4.0, ge=0.5, le=50, description="finer scans are thinned to about this edge length [mm]")
-    expected: int | None = Field(None, ge=0, le=50, description="openings the garment has; another count is an error")
-    ledge_mm: float = Field(40.0, ge=0, le=200, description="widest ledge between cloth and mannequin looked for [mm]")
-    crumb_edges: float = Field(4.0, ge=0, le=50, description="what hangs on by less is dropped [edge lengths]")
-    fair_mm: float = Field(40.0, ge=0, le=200, description="zigzag shorter than this is taken out of rims [mm]")
-    reach_mm: float = Field(60.0, ge=0, le=300, description="how far inside an opening the mannequin may end [mm]")
-    clearance_mm: float = Field(1.0, ge=0, le=20, description="fillings lie at least so far off the mannequin [mm]")
-    least_perimeter_mm: float = Field(120.0, ge=0, le=5000, description="smaller loops are never openings [mm]")
-    tubular: float = Field(0.4, ge=0, le=1, description="without mannequin: how much the cloth runs across an opening")
+    edge_mm: float = Field(4.0, ge=0.5, le=50, description="Finer scans are thinned to about this edge length [mm]")
+    expected: int | None = Field(None, ge=0, le=50, description="Number of openings; any other count is an error")
+    ledge_mm: float = Field(40.0, ge=0, le=200, description="Widest ledge sought between cloth and mannequin [mm]")
+    flap_edges: float = Field(4.0, ge=0, le=50, description="Parts that hang on by less are dropped [edge lengths]")
+    fair_mm: float = Field(40.0, ge=0, le=200, description="Zigzags shorter than this are smoothed out of rims [mm]")
+    reach_mm: float = Field(60.0, ge=0, le=300, description="How far inside an opening the mannequin may end [mm]")
+    clearance_mm: float = Field(1.0, ge=0, le=20, description="Least distance of fillings from the mannequin [mm]")
+    least_perimeter_mm: float = Field(
+        LEAST_PERIMETER_MM, ge=0, le=5000, description="Smaller loops are never openings [mm]"
+    )
+    tubular: float = Field(0.4, ge=0, le=1, description="Without a mannequin, how tube-like an opening must be")
 
 
 def close_scan_holes(
     shell: TriangleMesh, mannequin: TriangleMesh | None, config: OpeningsConfig, job: Job
 ) -> tuple[TriangleMesh, list[Opening], NDArray[np.bool_]]:
-    """Fill what the scanner missed and keep what the tailor left open.
+    """Fill the scan holes and keep the garment's own openings.
 
-    With a mannequin a loop is an opening when the body passes through it. Without one, when it is long and the cloth
-    runs across its plane like the end of a tube; that is a guess, and said so.
+    With a mannequin a loop is an opening when the body passes through it. Without one, or where the cloth hangs beyond
+    it, when the loop is long and the cloth runs across its plane like the end of a tube; that is a guess, and said so.
 
     Args:
         shell: The garment cut out of the scan, oriented outward.
         mannequin: In the same frame, or None.
         config: Settings.
-        job: Is told counts and perimeters.
+        job: Receives counts and perimeters.
 
     Returns:
         The garment in one piece; its openings, highest first; which of its vertices were observed, shape (V,).
 
     Raises:
         GarmentError: another number of openings than expected, or a hole that cannot be filled.
+        InputError: no opening is left that a body could get through.
     """
     job.progress(0.0, "cleaning rims")
     thinned = _thinned(shell, config.edge_mm * 1e-3, job)
     trimmed = thinned if mannequin is None else trim_ledges(thinned, mannequin, config.ledge_mm * 1e-3)
     edge = float(np.median(edge_lengths(trimmed)))
-    clean = repair(drop_crumbs(trimmed, config.crumb_edges * edge), RepairConfig(weld_mm=0.0), job)
+    clean = repair(drop_flaps(trimmed, config.flap_edges * edge), RepairConfig(weld_mm=0.0), job)
     distance = None if mannequin is None else SurfaceDistance(mannequin)
     bridged, notches = clean, 0
     if distance is not None:
@@ -69,7 +73,7 @@ def close_scan_holes(
     is_opening = _classify(bridged, shapes, distance, config, job)
     count = sum(is_opening)
     if config.expected is not None and count != config.expected:
-        raise GarmentError(f"{count} openings found, {config.expected} expected: {_listing(shapes, is_opening)}")
+        raise GarmentError(f"{count} openings found, expected {config.expected}: {_listing(shapes, is_opening)}")
     job.progress(0.5, f"filling {len(shapes) - count} scan holes")
     if count == len(shapes):
         job.leave_out("hole filling", "every boundary loop is a real opening")
@@ -79,8 +83,9 @@ def close_scan_holes(
         filled = _pushed_out(filled, ~observed, distance, config.clearance_mm * 1e-3)
     final = fair_rims(filled, config.fair_mm * 1e-3)
     if face_components(final)[0] != 1:
-        raise GarmentError(f"the garment fell into {face_components(final)[0]} pieces")
+        raise GarmentError(f"the garment fell apart into {face_components(final)[0]} pieces")
     found = list_openings(final)
+    check_wearable(final, found)
     job.measure(
         openings=len(found),
         filled_holes=len(shapes) - count,
@@ -99,10 +104,10 @@ def list_openings(garment: TriangleMesh) -> list[Opening]:
 
 
 def _thinned(shell: TriangleMesh, edge: float, job: Job) -> TriangleMesh:
-    """Return the shell without triangles much smaller than wanted; what the thinning breaks is mended."""
+    """Return the shell without triangles much smaller than wanted; what the thinning breaks is repaired."""
     faces = faces_at(shell, edge)
     if len(shell.faces) <= faces:
-        job.leave_out("thinning", f"{len(shell.faces)} faces, {faces} are wanted")
+        job.leave_out("thinning", f"{len(shell.faces)} faces; the target is {faces}")
         return shell
     job.note(f"thinned {len(shell.faces)} faces to {faces}")
     return largest_piece(repair(decimate(shell, faces, aggressiveness=3.0), RepairConfig(weld_mm=0.0), job))
@@ -130,10 +135,15 @@ def _classify(
             job.warn(f"no mannequin to tell openings from scan holes: {_listing(shapes, real)}")
         return real
     reach = config.reach_mm * 1e-3
-    return [
-        ok and encloses(mesh.vertices[shape.loop], distance, reach)
-        for ok, shape in zip(long_enough, shapes, strict=True)
-    ]
+    real = []
+    for ok, shape in zip(long_enough, shapes, strict=True):
+        rim = mesh.vertices[shape.loop]
+        around = ok and encloses(rim, distance, reach)
+        hangs = ok and not around and shape.tubular >= config.tubular and distance.signed(rim).distance.min() > reach
+        if hangs:
+            job.note(f"beyond the mannequin, by its shape alone: {_listing([shape], [True])}")
+        real.append(around or hangs)
+    return real
 
 
 def _listing(shapes: list[LoopShape], real: list[bool]) -> str:

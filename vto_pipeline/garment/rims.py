@@ -1,4 +1,4 @@
-"""Clean edges for the openings of a scanned garment: no ledges to the body, no crumbs, no zigzag."""
+"""Clean edges for the openings of a scanned garment: no ledges to the body, no flaps, no zigzag."""
 
 from __future__ import annotations
 
@@ -8,15 +8,14 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from vto_pipeline.geometry.cut import keep_positive
 from vto_pipeline.geometry.geodesic import distance_from
 from vto_pipeline.geometry.laplace import extend
+from vto_pipeline.geometry.remeshing.cut import keep_positive
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import (
     boundary_loops,
+    component_areas,
     edge_faces,
-    face_area_vectors,
-    face_components,
     face_normals,
     submesh,
 )
@@ -34,8 +33,8 @@ BAND = 4.0
 def trim_ledges(shell: TriangleMesh, mannequin: TriangleMesh, widest: float) -> TriangleMesh:
     """Return the shell without the faces that lead from a rim down to the mannequin.
 
-    A fused scan closes the gap under a hem or in a collar by a ledge. It hangs together with the rim, stands across
-    the mannequin's surface, and is no wider than the gap.
+    A fused scan closes the gap under a hem or in a collar by a ledge. It is connected to the rim, stands across
+    the mannequin's surface, and is no wider than the gap. Cloth that hangs beyond the mannequin has none.
 
     Args:
         shell: The cut-out garment.
@@ -50,14 +49,14 @@ def trim_ledges(shell: TriangleMesh, mannequin: TriangleMesh, widest: float) -> 
     facing = np.einsum("fd,fd->f", face_normals(shell), face_normals(mannequin)[nearest.face])
     rim = np.concatenate(loops)
     to_rim, _ = cKDTree(shell.vertices[rim]).query(middle, distance_upper_bound=widest)
-    steep = (facing < LEDGE_COSINE) & np.isfinite(to_rim)
+    steep = (facing < LEDGE_COSINE) & np.isfinite(to_rim) & (nearest.distance < widest)
     on_rim = np.zeros(len(shell.vertices), dtype=bool)
     on_rim[rim] = True
     ledge = _reached(shell, steep, steep & (on_rim[shell.faces].sum(axis=1) >= 2))
     return largest_piece(submesh(shell, ~ledge)[0]) if ledge.any() else shell
 
 
-def drop_crumbs(shell: TriangleMesh, width: float) -> TriangleMesh:
+def drop_flaps(shell: TriangleMesh, width: float) -> TriangleMesh:
     """Return the shell without what hangs on it by less than `width` [m]: erode by half of it, keep the largest piece,
     grow back."""
     loops = boundary_loops(shell)
@@ -123,8 +122,7 @@ def largest_piece(mesh: TriangleMesh) -> TriangleMesh:
 
 
 def _largest_mask(mesh: TriangleMesh) -> NDArray[np.bool_]:
-    count, piece = face_components(mesh)
-    area = np.bincount(piece, np.linalg.norm(face_area_vectors(mesh), axis=1), count)
+    piece, area = component_areas(mesh)
     return piece == int(np.argmax(area))
 
 

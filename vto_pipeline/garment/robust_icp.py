@@ -1,4 +1,4 @@
-"""Rigid registration of a dressed scan to the bare mannequin: cloth may stand off outwards, nothing may be inside.
+"""Rigid registration of a dressed scan to the bare mannequin: cloth may stand off outwards; nothing may be inside.
 
 Iteratively reweighted Gauss-Newton on point-to-plane distances (Chen and Medioni 1992). A point outside counts by
 Tukey's biweight within a band, which shrinks; a point inside counts fully however deep, so that the scan is pushed out.
@@ -22,7 +22,7 @@ DEEPEST = 3.0
 
 
 @dataclass(frozen=True)
-class Placed:
+class Alignment:
     """A placement and how well it explains the scan.
 
     Args:
@@ -64,8 +64,7 @@ def refine(
     mannequin_normals: FloatArray,
     start: FloatArray,
     bands: FloatArray,
-    prior: FloatArray | None = None,
-) -> Placed:
+) -> Alignment:
     """Refine one placement.
 
     Args:
@@ -75,12 +74,11 @@ def refine(
         mannequin_normals: Of its faces, shape (F, 3).
         start: mannequin_from_surface, shape (4, 4).
         bands: Band of each iteration [m], shrinking.
-        prior: How sure each point is no garment, 0 to 1, shape (N,); 1 when absent.
     """
     placement = start
     for band in bands:
         moved, away, plane, facing = _compare(points, normals, distance, mannequin_normals, placement)
-        weight = _weights(away, facing, band, prior)
+        weight = _weights(away, facing, band)
         middle = moved.mean(axis=0)
         jacobian = np.hstack([np.cross(moved - middle, plane), plane])
         matrix = jacobian.T @ (weight[:, None] * jacobian)
@@ -88,7 +86,7 @@ def refine(
         step = -np.linalg.solve(matrix + damping * np.eye(6), jacobian.T @ (weight * away))
         placement = _moved_by(step, middle) @ placement
     moved, away, plane, facing = _compare(points, normals, distance, mannequin_normals, placement)
-    return _judge(moved, away, plane, facing, placement, float(bands[-1]), prior)
+    return _evaluate(moved, away, plane, facing, placement, float(bands[-1]))
 
 
 def _compare(
@@ -101,9 +99,9 @@ def _compare(
     return moved, nearest.distance, plane, np.einsum("nd,nd->n", normals @ at[:3, :3].T, plane)
 
 
-def _weights(away: FloatArray, facing: FloatArray, band: float, prior: FloatArray | None) -> FloatArray:
+def _weights(away: FloatArray, facing: FloatArray, band: float) -> FloatArray:
     tukey = np.square(1.0 - np.square(np.minimum(np.abs(away) / band, 1.0)))
-    bare = np.where(facing > FACING, tukey, 0.0) * (1.0 if prior is None else prior)
+    bare = np.where(facing > FACING, tukey, 0.0)
     deep = np.minimum(DEEPEST * band / np.maximum(-away, band), 1.0)
     return np.where(away < -band / 2.0, np.maximum(deep, bare), bare)
 
@@ -116,22 +114,14 @@ def _moved_by(step: FloatArray, middle: FloatArray) -> FloatArray:
     return motion
 
 
-def _judge(
-    moved: FloatArray,
-    away: FloatArray,
-    plane: FloatArray,
-    facing: FloatArray,
-    placement: FloatArray,
-    band: float,
-    prior: FloatArray | None,
-) -> Placed:
+def _evaluate(
+    moved: FloatArray, away: FloatArray, plane: FloatArray, facing: FloatArray, placement: FloatArray, band: float
+) -> Alignment:
     over = np.clip(away / band, -DEEPEST, 1.0)
     bare = (np.abs(away) < band) & (facing > FACING)
-    if prior is not None:
-        bare &= prior > 0.5
     on = moved[bare]
     jacobian = np.hstack([np.cross(on - on.mean(axis=0), plane[bare]), plane[bare]]) if len(on) else np.zeros((0, 6))
     rms = float(np.sqrt(np.mean(np.square(away[bare])))) if len(on) else np.inf
     noise = scan_noise(away[facing > FACING], DEEPEST * band)
     inside = float(np.mean(away < -max(band, 4.0 * noise)))
-    return Placed(placement, float(np.mean(np.square(over))), bare, inside, rms, noise, jacobian.T @ jacobian)
+    return Alignment(placement, float(np.mean(np.square(over))), bare, inside, rms, noise, jacobian.T @ jacobian)

@@ -1,4 +1,4 @@
-"""From any garment mesh to the mesh that is simulated: sound, in even triangles, each piece for itself."""
+"""From any garment mesh to the simulation mesh: repaired, in even triangles, each piece separately."""
 
 from __future__ import annotations
 
@@ -9,9 +9,16 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from vto_pipeline.errors import GarmentError
-from vto_pipeline.geometry.remesh import RemeshConfig, edge_lengths, perimeter, remesh
-from vto_pipeline.geometry.repair import RepairConfig, is_manifold, repair
-from vto_pipeline.geometry.topology import boundary_loops, face_area_vectors, face_components, submesh
+from vto_pipeline.geometry.remeshing.remesh import RemeshConfig, edge_lengths, perimeter, remesh
+from vto_pipeline.geometry.remeshing.repair import RepairConfig, is_manifold, repair
+from vto_pipeline.geometry.topology import (
+    boundary_loops,
+    component_areas,
+    concatenate,
+    face_area_vectors,
+    face_components,
+    submesh,
+)
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
@@ -24,13 +31,13 @@ _LEAST_EDGE_MM = 1.0  # the remesher's
 class SimulationMeshConfig(Config):
     """How fine the simulation mesh is."""
 
-    edge_mm: float = Field(10.0, ge=2, le=100, description="wanted edge length [mm]")
+    edge_mm: float = Field(10.0, ge=2, le=100, description="Target edge length [mm]")
     tolerance: float = Field(
-        0.2, ge=0, le=1, description="a piece whose median edge is off by less may be used as it is"
+        0.2, ge=0, le=1, description="A piece whose median edge differs by less may be used as it is"
     )
-    least_angle_deg: float = Field(20.0, ge=0, le=60, description="a piece with sharper triangles is remeshed [degree]")
+    least_angle_deg: float = Field(20.0, ge=0, le=60, description="A piece with sharper triangles is remeshed [degree]")
     least_piece: float = Field(
-        4.0, ge=0, le=1000, description="smaller pieces, such as buttons, are dropped [squares of the wanted edge]"
+        4.0, ge=0, le=1000, description="Smaller pieces, such as buttons, are dropped [squares of the target edge]"
     )
 
 
@@ -38,7 +45,7 @@ def remesh_for_simulation(garment: TriangleMesh, config: SimulationMeshConfig, j
     """Return the garment in near-equilateral triangles of the wanted size, its pieces and their openings kept.
 
     A piece that is good enough is used as it is, one too narrow for such triangles is given finer ones, and one that
-    no size suits stays as it was. Pieces too small to be cloth are dropped. All of it is told.
+    no size suits stays as it was. Pieces too small to be cloth are dropped. All of it is reported.
 
     Raises:
         InputError: no face has an area.
@@ -51,7 +58,7 @@ def remesh_for_simulation(garment: TriangleMesh, config: SimulationMeshConfig, j
         made.append(_even(piece, config, job))
     if all(one is piece for one, piece in zip(made, pieces, strict=True)) and len(pieces) == face_components(sound)[0]:
         return sound
-    whole = _joined(made)
+    whole = concatenate(made)
     length = 1e3 * edge_lengths(whole)
     job.measure(
         pieces=len(made),
@@ -88,16 +95,15 @@ def least_angles(mesh: TriangleMesh) -> NDArray[np.float64]:
 
 def _pieces(mesh: TriangleMesh, config: SimulationMeshConfig, job: Job) -> Iterator[TriangleMesh]:
     """Yield the pieces that are cloth, in the order of their first faces; the largest always is."""
-    count, piece = face_components(mesh)
-    if count == 1:
+    piece, area = component_areas(mesh)
+    if len(area) == 1:
         yield mesh
         return
-    area = np.bincount(piece, np.linalg.norm(face_area_vectors(mesh), axis=1), count)
     small = area < min(config.least_piece * (1e-3 * config.edge_mm) ** 2, float(area.max()))
     if small.any():
         lost = f"{1e4 * float(area[small].sum()):.1f} cm² in all"
-        least = f"{config.least_piece:g} squares of the wanted edge"
-        job.note(f"dropped {int(small.sum())} of {count} pieces, which are smaller than {least}: {lost}")
+        least = f"{config.least_piece:g} squares of the target edge"
+        job.note(f"dropped {int(small.sum())} of {len(area)} pieces smaller than {least}: {lost}")
     for k in np.flatnonzero(~small):
         yield submesh(mesh, piece == k)[0]
 
@@ -135,10 +141,3 @@ def _figure(job: Job, name: str) -> float:
     value = job.metrics.get(name, 0.0)
     assert isinstance(value, float)
     return value
-
-
-def _joined(pieces: list[TriangleMesh]) -> TriangleMesh:
-    """Return the pieces as one mesh."""
-    first = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
-    faces = [piece.faces + np.int32(start) for piece, start in zip(pieces, first, strict=False)]
-    return TriangleMesh(np.vstack([piece.vertices for piece in pieces]), np.vstack(faces))

@@ -1,22 +1,23 @@
-"""Take the mannequin away: which part of the scan is the garment, and its open shell."""
+"""Subtract the mannequin: label the garment in the scan and extract its open shell."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.color_model import cielab, color_evidence
 from vto_pipeline.garment.graph_cut import cut
 from vto_pipeline.garment.robust_icp import scan_noise
-from vto_pipeline.geometry.cut import keep_positive
-from vto_pipeline.geometry.repair import RepairConfig, repair
+from vto_pipeline.geometry.floor import floor_height
+from vto_pipeline.geometry.remeshing.cut import keep_positive
+from vto_pipeline.geometry.remeshing.repair import RepairConfig, repair
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.smooth import smooth_values
 from vto_pipeline.geometry.topology import (
+    component_areas,
     edges,
-    face_area_vectors,
-    face_components,
     face_normals,
     submesh,
     vertex_normals,
@@ -34,29 +35,31 @@ TIGHT = 0.007
 LEAST_SIGMA = 1e-4
 """Scans claim to be better than this only by accident [m]."""
 MOST_SIGMA = 5e-3
+FLOOR_REACH = 0.01
+"""A board on the floor may lie so much higher than the lowest point of the mannequin [m]."""
 
 
 class SubtractConfig(Config):
-    """What tells the garment from the mannequin."""
+    """Settings that separate the garment from the mannequin."""
 
-    thickness_mm: float = Field(0.5, ge=0, le=20, description="of the cloth: it lies at least so far out [mm]")
-    smoothness: float = Field(2.0, ge=0, le=100, description="price of a label boundary, per edge of mean length")
+    thickness_mm: float = Field(0.5, ge=0, le=20, description="Cloth thickness: cloth lies at least this far out [mm]")
+    smoothness: float = Field(2.0, ge=0, le=100, description="Cost of a label boundary, per edge of mean length")
     color_step: float = Field(15.0, gt=0, le=200, description="CIELAB difference at which a boundary costs 1/e")
-    smallest_piece_cm2: float = Field(20.0, ge=0, le=10_000, description="smaller garment pieces are dropped [cm²]")
+    smallest_piece_cm2: float = Field(20.0, ge=0, le=10_000, description="Smaller garment pieces are dropped [cm²]")
 
 
 def label_garment(surface: TriangleMesh, mannequin: TriangleMesh, config: SubtractConfig, job: Job) -> SurfaceLabels:
     """Divide the scan into garment and the rest by an exact graph cut.
 
     Evidence per vertex: the signed distance against the noise measured on the bare parts, the colour, and whether the
-    normal agrees with the mannequin's. A boundary is cheap where the colour changes. What lies under the mannequin's
-    lowest point is floor, board or stand.
+    normal agrees with the mannequin's. A boundary is cheap where the colour changes. The level surface that the scan
+    stands on is floor or board; cloth that hangs below the mannequin is cloth.
 
     Args:
         surface: The scan in the mannequin's frame.
-        mannequin: What the garment was on.
+        mannequin: The mannequin under the garment.
         config: Settings.
-        job: Is told the noise and the shares.
+        job: Receives the noise and the shares.
 
     Raises:
         GarmentError: nothing of the scan stands off from the mannequin.
@@ -64,7 +67,7 @@ def label_garment(surface: TriangleMesh, mannequin: TriangleMesh, config: Subtra
     near = SurfaceDistance(mannequin).signed(surface.vertices)
     facing = np.einsum("vd,vd->v", vertex_normals(surface), face_normals(mannequin)[near.face])
     sigma = float(np.clip(scan_noise(near.distance, 4.0 * MOST_SIGMA), LEAST_SIGMA, MOST_SIGMA))
-    floor = surface.vertices[:, 1] < mannequin.vertices[:, 1].min() + 3.0 * sigma
+    floor = _on_floor(surface, mannequin, sigma, job)
     thickness = config.thickness_mm * 1e-3
     sure_garment = (near.distance > thickness + 3.0 * sigma) & ~floor
     sure_bare = (np.abs(near.distance) < 2.0 * sigma) & (facing > 0.7) & ~floor
@@ -86,7 +89,7 @@ def label_garment(surface: TriangleMesh, mannequin: TriangleMesh, config: Subtra
     garment = cut(evidence, edges(surface), _boundary_price(surface, config))
     job.measure(noise_mm=sigma * 1e3, garment_share=float(garment.mean()))
     confidence = 1.0 / (1.0 + np.exp(-np.where(garment, evidence, -evidence)))
-    return SurfaceLabels(garment, np.ones(len(garment), dtype=bool), confidence)
+    return SurfaceLabels(garment, confidence)
 
 
 def extract_garment(surface: TriangleMesh, labels: SurfaceLabels, config: SubtractConfig, job: Job) -> TriangleMesh:
@@ -100,14 +103,23 @@ def extract_garment(surface: TriangleMesh, labels: SurfaceLabels, config: Subtra
     side = smooth_values(surface, np.where(labels.garment, 1.0, -1.0), rounds=10)
     shell = keep_positive(surface, side)
     shell = repair(shell, RepairConfig(weld_mm=0.001), job)
-    count, piece = face_components(shell)
-    area = np.bincount(piece, np.linalg.norm(face_area_vectors(shell), axis=1), count)
+    piece, area = component_areas(shell)
     if area.max() < config.smallest_piece_cm2 * 1e-4:
-        raise GarmentError(f"the largest piece of garment has {area.max() * 1e4:.1f} cm²")
-    if count > 1:
-        job.note(f"dropped {count - 1} smaller pieces of {(area.sum() - area.max()) * 1e4:.1f} cm² in all")
-    job.measure(area_cm2=float(area.max() * 1e4), dropped_pieces=count - 1)
+        raise GarmentError(f"the largest piece of garment has only {area.max() * 1e4:.1f} cm²")
+    if len(area) > 1:
+        job.note(f"dropped {len(area) - 1} smaller pieces of {(area.sum() - area.max()) * 1e4:.1f} cm² in all")
+    job.measure(area_cm2=float(area.max() * 1e4), dropped_pieces=len(area) - 1)
     return submesh(shell, piece == int(np.argmax(area)))[0]
+
+
+def _on_floor(surface: TriangleMesh, mannequin: TriangleMesh, sigma: float, job: Job) -> NDArray[np.bool_]:
+    """Return which vertices lie on or under the floor, shape (V,); none where the scan shows no floor."""
+    floor = floor_height(surface, float(mannequin.vertices[:, 1].min()) + FLOOR_REACH)
+    if floor is None:
+        job.leave_out("floor", "no level surface lies under the mannequin")
+        return np.zeros(len(surface.vertices), dtype=bool)
+    job.measure(floor_mm=floor * 1e3)
+    return surface.vertices[:, 1] < floor + 3.0 * sigma
 
 
 def _distance_evidence(distance: FloatArray, sigma: float, thickness: float) -> FloatArray:

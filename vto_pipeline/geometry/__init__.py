@@ -1,3 +1,13 @@
-"""Meshes as shapes: topology, distances, repair, remeshing. The home of libigl, gpytoolbox and pyfqmr."""
+"""Mesh processing, with libigl, gpytoolbox and pyfqmr.
+
+topology: edges, hinges, boundary loops, pieces, normals
+predicates, intersections: exact signs; triangles that pass through each other
+signed_distance, closest, geodesic, sampling, laplace, smooth: distances and functions on a surface
+section, hull: where a plane cuts; the path of a taut tape
+binding: one mesh rides on another
+rigid: moving a mesh as a whole
+floor: the floor under a scan
+remeshing/: other triangles for the same surface
+"""
 
 import vto_pipeline.numerics  # noqa: F401  # loads Numba's thread pool before the first parallel loop asks for one

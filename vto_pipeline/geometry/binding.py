@@ -1,4 +1,4 @@
-"""One mesh rides on another: a render mesh on a simulation mesh, a fine simulation mesh on a coarse one.
+"""Bind one mesh to another: a render mesh to a simulation mesh, a fine simulation mesh to a coarse one.
 
 A vertex is bound to the nearest triangle that faces the same way, at barycentric coordinates, and at a height along the
 interpolated vertex normal. What that leaves over (at the rim, where the projection falls outside) is kept in the

@@ -1,4 +1,4 @@
-"""Distances along a surface, as far as its edges tell."""
+"""Distances along the edges of a surface."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which triangles of two surfaces, or of one with itself, pass through each other.
+"""Intersecting triangles of two surfaces, or of one surface with itself.
 
 Two triangles meet exactly when an edge of one meets the other; the test is exact in sign (`predicates`) and closed, so
 touching counts. An edge is never held against a triangle with which it shares a vertex: two faces that share one vertex
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from vto_pipeline.geometry.predicates import orient2d, orient3d
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
-from vto_pipeline.numerics import bvh, bvh_pairs
+from vto_pipeline.numerics.spatial import bvh, bvh_pairs
 
 
 def intersecting_faces(one: TriangleMesh, other: TriangleMesh) -> IntArray:
@@ -34,7 +34,7 @@ def self_intersections(mesh: TriangleMesh) -> IntArray:
 
 
 def meeting_vertices(pairs: IntArray, faces: IntArray, count: int) -> NDArray[np.bool_]:
-    """Return which of so many vertices belong to faces in these pairs, shape (count,)."""
+    """Return which of this many vertices belong to faces in these pairs, shape (count,)."""
     found = np.zeros(count, np.bool_)
     found[faces[pairs.reshape(-1)]] = True
     return found

@@ -1,4 +1,4 @@
-"""Smooth functions on a surface: the cotangent Laplacian, and what is harmonic or biharmonic where it is not held."""
+"""Smooth functions on a surface: the cotangent Laplacian, and harmonic or biharmonic extension of fixed values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Signs of determinants that are right in floating point: filtered first, exact only where the filter cannot tell.
+"""Exact signs of determinants: filtered first, exact arithmetic only where the filter cannot decide.
 
 The exact part multiplies out the determinant and sums its terms without error (Shewchuk 1997, "Adaptive precision
 floating-point arithmetic and fast robust geometric predicates": two-sum, two-product, grow-expansion).

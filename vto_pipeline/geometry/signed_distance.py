@@ -12,7 +12,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 
 @dataclass(frozen=True)
-class Nearest:
+class SurfacePoints:
     """The nearest surface point of each query.
 
     Args:
@@ -46,15 +46,15 @@ class SurfaceDistance:
         self._winding = igl.FastWindingNumberBVH()
         self._winding.init(self._vertices, self._faces)
 
-    def nearest(self, points: FloatArray) -> Nearest:
+    def nearest(self, points: FloatArray) -> SurfacePoints:
         """Return the nearest surface points; distances are not negative."""
         squared, face, point = self._tree.squared_distance(self._vertices, self._faces, np.ascontiguousarray(points))
-        return Nearest(np.sqrt(squared), face.astype(np.int32), point)
+        return SurfacePoints(np.sqrt(squared), face.astype(np.int32), point)
 
-    def signed(self, points: FloatArray) -> Nearest:
+    def signed(self, points: FloatArray) -> SurfacePoints:
         """Return the nearest surface points; distances are negative inside."""
         found = self.nearest(points)
-        return Nearest(np.where(self.inside(points), -found.distance, found.distance), found.face, found.point)
+        return SurfacePoints(np.where(self.inside(points), -found.distance, found.distance), found.face, found.point)
 
     def inside(self, points: FloatArray, above: float = 0.5) -> NDArray[np.bool_]:
         """Return whether points are inside, shape (N,): where the winding number is above this."""

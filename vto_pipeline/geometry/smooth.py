@@ -1,4 +1,4 @@
-"""Values on vertices, evened out along the surface."""
+"""Smoothing of vertex values along the surface."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def neighbour_mean(mesh: TriangleMesh) -> csr_matrix:
 
 
 def smooth_values(mesh: TriangleMesh, values: FloatArray, rounds: int) -> FloatArray:
-    """Return values (V,) or (V, D) after so many rounds of moving each half way to the mean of its neighbours."""
+    """Return values (V,) or (V, D) after this many rounds of moving each half way to the mean of its neighbours."""
     mean = neighbour_mean(mesh)
     for _ in range(rounds):
         values = 0.5 * (values + mean @ values)

@@ -1,9 +1,11 @@
-"""Who is next to whom in a triangle mesh: edges, hinges, boundary loops, components, pieces, normals.
+"""Adjacency in a triangle mesh: edges, hinges, boundary loops, components, pieces, normals.
 
 A half-edge 3f+k runs from corner k to corner k+1 of face f. Results never depend on hash order.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numba import njit
@@ -109,7 +111,7 @@ def hinges(mesh: TriangleMesh) -> IntArray:
 
 
 def face_components(mesh: TriangleMesh) -> tuple[int, IntArray]:
-    """Return how many pieces hang together through edges, and the piece of each face, shape (F,)."""
+    """Return the number of components connected through edges, and the component of each face, shape (F,)."""
     found, edge_of_half = _unique_edges(mesh)
     face = np.repeat(np.arange(len(mesh.faces)), 3)
     incidence = coo_matrix((np.ones(len(face), np.int8), (face, edge_of_half)), (len(mesh.faces), len(found))).tocsr()
@@ -131,6 +133,20 @@ def submesh(mesh: TriangleMesh, keep: NDArray[np.bool_]) -> tuple[TriangleMesh, 
     source, flat = np.unique(faces, return_inverse=True)
     colors = None if mesh.colors is None else mesh.colors[source]
     return TriangleMesh(mesh.vertices[source], flat.reshape(-1, 3).astype(np.int32), colors), source.astype(np.int32)
+
+
+def concatenate(meshes: Sequence[TriangleMesh]) -> TriangleMesh:
+    """Return meshes as one, in their order, not welded and without colours."""
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
+    faces = [mesh.faces + np.int32(start) for mesh, start in zip(meshes, starts, strict=True)]
+    return TriangleMesh(np.vstack([mesh.vertices for mesh in meshes]), np.vstack(faces))
+
+
+def component_areas(mesh: TriangleMesh) -> tuple[IntArray, FloatArray]:
+    """Return the piece of each face, as `face_components`, shape (F,), and the area of each piece [m²], shape (P,)."""
+    count, piece = face_components(mesh)
+    area = np.linalg.norm(face_area_vectors(mesh), axis=1)
+    return piece, np.asarray(np.bincount(piece, area, count), dtype=np.float64)
 
 
 def face_area_vectors(mesh: TriangleMesh) -> FloatArray:

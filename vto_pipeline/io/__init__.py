@@ -1,1 +1,11 @@
-"""Files to model and back; the only place that touches formats and untrusted bytes."""
+"""Reading and writing files: the only place that touches formats and untrusted bytes.
+
+meshes, clouds, fabrics: read any format
+formats/, gltf/, fabric_formats/: one file a format; fabric_presets/: one YAML file a fabric
+captures/, bodies/: what cameras deliver; what is known of a body
+runs/: the artifacts of a run
+sniff: what a path holds
+sandbox: untrusted bytes are parsed in a limited child process
+files, arrays, documents, text_numbers: what readers and writers share
+lengths: the unit of a file without one
+"""

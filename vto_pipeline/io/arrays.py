@@ -1,4 +1,4 @@
-"""NumPy archives (.npz) without pickles, whose bytes depend on nothing but the arrays."""
+"""NumPy archives (.npz) without pickles; equal arrays give equal bytes."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def write_arrays(path: Path, arrays: Mapping[str, Any], *, compress: bool = Fals
 
 
 def read_arrays(path: Path, required: Collection[str] = (), only: Collection[str] | None = None) -> Arrays:
-    """Read arrays of an .npz file.
+    """Read the arrays of an .npz file.
 
     Args:
         path: The file.

@@ -1,4 +1,4 @@
-"""Point clouds from files of any origin."""
+"""Point clouds from foreign files."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import numpy as np
 from vto_pipeline.errors import FormatError
 from vto_pipeline.io.arrays import Arrays
 from vto_pipeline.io.files import check_file
+from vto_pipeline.io.formats.clean_up import check_sound
+from vto_pipeline.io.formats.pcd import parse_pcd
+from vto_pipeline.io.formats.ply import parse_ply
+from vto_pipeline.io.formats.xyz import parse_xyz
 from vto_pipeline.io.lengths import to_metres
-from vto_pipeline.io.pcd import parse_pcd
-from vto_pipeline.io.ply import parse_ply
 from vto_pipeline.io.sandbox import run_limited
-from vto_pipeline.io.tidy import check_sound
-from vto_pipeline.io.xyz import parse_xyz
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
 
@@ -31,12 +31,12 @@ _LIMIT_BYTES = 2_000_000_000
 
 
 def read_cloud(path: Path, *, unit: str | None = None, job: Job | None = None) -> PointCloud:
-    """Read a cloud made by anyone: parsed in a limited child process, checked, scaled to metres.
+    """Read a foreign cloud: parsed in a limited child process, checked, scaled to metres.
 
     Args:
         path: PLY, XYZ or PCD.
         unit: Unit of length in the file, a key of `units.LENGTH_M`; None: guessed from the size.
-        job: Told of the guessed unit and of every change.
+        job: Notified of the guessed unit and of every change.
 
     Returns:
         The cloud [m]; the axes are the file's; normals of unit length, or None where the file has none that are usable.
@@ -50,14 +50,14 @@ def read_cloud(path: Path, *, unit: str | None = None, job: Job | None = None) -
     if not len(arrays["vertices"]):
         raise FormatError("there are no points", where=str(path))
     if len(arrays.pop("faces", ())):
-        notes.append("left out the faces: a cloud was wanted")
+        notes.append("ignored the faces, as a cloud was expected")
     check_sound(arrays, path)
     normals = arrays.get("normals")
     if normals is not None:
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
         usable = bool(np.isfinite(lengths).all() and (lengths > 1e-6).all())
         if not usable:
-            notes.append("left out the normals: some are zero or not finite")
+            notes.append("ignored the normals, as some are zero or not finite")
         normals = normals / lengths if usable else None
     points = to_metres(arrays["vertices"], unit, path, job)
     if job is not None:

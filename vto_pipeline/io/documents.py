@@ -1,4 +1,4 @@
-"""YAML and JSON documents: read safely, with the line of every key; written so that one value has one form."""
+"""YAML and JSON documents: read safely, with the line of every key; written in one canonical form."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _Loader.add_implicit_resolver("tag:yaml.org,2002:float", _FLOAT, list("-+0123456
 
 @dataclass(frozen=True)
 class Document:
-    """A YAML document that remembers where it came from.
+    """A YAML document with the lines of its keys.
 
     Args:
         data: Plain dicts, lists and scalars.

@@ -1,4 +1,4 @@
-"""Fabrics: the presets, and files of measured figures in the trade's units, converted to SI at the door.
+"""Fabrics: the presets, and files of measured values in textile units, converted to SI on reading.
 
 Which kind of file it is shows in its content: `instrument` heads a sheet of KES-FB or FAST, `schema` with `material` or
 `raw_data` a U3M file, and all else is a fabric file of this package.
@@ -12,12 +12,12 @@ from typing import Any
 
 from vto_pipeline.errors import ConfigError, InputError
 from vto_pipeline.io.documents import Document, load_yaml, suggest
-from vto_pipeline.io.fabric_assumed import Figures, complete
-from vto_pipeline.io.fabric_document import read_document
-from vto_pipeline.io.fabric_fast import read_fast
-from vto_pipeline.io.fabric_kes import read_kes
-from vto_pipeline.io.fabric_sheets import load_csv
-from vto_pipeline.io.fabric_u3m import is_u3m, load_u3m, read_u3m
+from vto_pipeline.io.fabric_formats.assumed import Figures, complete
+from vto_pipeline.io.fabric_formats.document import read_document
+from vto_pipeline.io.fabric_formats.fast import read_fast
+from vto_pipeline.io.fabric_formats.kes import read_kes
+from vto_pipeline.io.fabric_formats.sheets import load_csv
+from vto_pipeline.io.fabric_formats.u3m import is_u3m, load_u3m, read_u3m
 from vto_pipeline.model.fabric import Fabric
 
 _PRESETS = Path(__file__).parent / "fabric_presets"
@@ -26,7 +26,7 @@ _INSTRUMENTS: dict[str, Callable[[Document], Figures]] = {"KES-FB": read_kes, "F
 
 
 def _load_json(path: Path) -> Document:
-    """A U3M file, large and written by machines, or a fabric file, small and worth its line numbers."""
+    """Load a U3M file, or a fabric file with the line numbers of its keys."""
     document = load_u3m(path)
     return document if is_u3m(document.data) else load_yaml(path)
 
@@ -58,7 +58,7 @@ def read_fabric(fabric: str | Path | Mapping[str, Any]) -> Fabric:
     path = Path(fabric)
     suffix = path.suffix.lower()
     if suffix == ".u3ma":
-        raise InputError("archives are not read", where=str(path), hint="unpack it and give the .u3m file inside")
+        raise InputError("archives are not supported", where=str(path), hint="unpack it and give the .u3m file inside")
     if suffix not in _LOADERS:
         names = preset_names()
         if str(fabric) not in names:
@@ -82,5 +82,5 @@ def _read(document: Document) -> Figures:
     instrument = str(data["instrument"])
     if instrument not in _INSTRUMENTS:
         where, hint = document.where(("instrument",)), suggest(instrument, _INSTRUMENTS)
-        raise InputError(f"instrument: {instrument!r} is not known", where=where, hint=hint)
+        raise InputError(f"instrument: {instrument!r} is not supported", where=where, hint=hint)
     return _INSTRUMENTS[instrument](document)

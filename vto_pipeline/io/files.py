@@ -1,4 +1,4 @@
-"""What every reader asks of a path before opening it, and how every writer replaces a file whole."""
+"""Checks before a file is read, and atomic replacement when one is written."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
 
-from vto_pipeline.errors import InputError, VtoError
+from vto_pipeline.errors import FormatError, InputError, VtoError
 
 
 def check_file(path: Path, suffixes: Collection[str], limit_bytes: int, *, error: type[VtoError] = InputError) -> Path:
@@ -27,10 +27,10 @@ def check_file(path: Path, suffixes: Collection[str], limit_bytes: int, *, error
     if not path.exists():
         raise error("no such file", where=str(path), hint=_neighbour(path))
     if not path.is_file():
-        raise error("a file was wanted, this is not one", where=str(path))
+        raise error("expected a file, found something else", where=str(path))
     if path.suffix.lower() not in suffixes:
         allowed = ", ".join(sorted(suffixes))
-        raise error(f"files of type {path.suffix or '(none)'} are not read here; wanted {allowed}", where=str(path))
+        raise error(f"files of type {path.suffix or '(none)'} are not supported; expected {allowed}", where=str(path))
     size = path.stat().st_size
     if size == 0:
         raise error("the file is empty (0 bytes)", where=str(path))
@@ -47,9 +47,21 @@ def check_folder(path: Path) -> Path:
     """
     path = Path(path)
     if not path.is_dir():
-        problem = "a folder was wanted, this is a file" if path.exists() else "no such folder"
+        problem = "expected a folder, found a file" if path.exists() else "no such folder"
         raise InputError(problem, where=str(path), hint=_neighbour(path))
     return path
+
+
+def resolved(path: Path) -> Path:
+    """Return the absolute path behind all links.
+
+    Raises:
+        InputError: links lead back to themselves, or the name is none that a file can have.
+    """
+    try:
+        return Path(path).resolve()
+    except (RuntimeError, ValueError) as e:
+        raise InputError(f"not a path that can be opened: {e}", where=ascii(str(path))) from None
 
 
 def listed(folder: Path, suffixes: Collection[str]) -> tuple[Path, ...]:
@@ -60,7 +72,7 @@ def listed(folder: Path, suffixes: Collection[str]) -> tuple[Path, ...]:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Give a path beside `path` to write to, and rename it into place when the block ends well: never half a file."""
+    """Yield a temporary path, renamed to `path` when the block succeeds: never half a file."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     beside = path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")
@@ -69,6 +81,17 @@ def replacing(path: Path) -> Iterator[Path]:
         os.replace(beside, path)
     finally:
         beside.unlink(missing_ok=True)
+
+
+@contextmanager
+def as_format_error(path: Path) -> Iterator[None]:
+    """Turn whatever a library raises on a file into a FormatError."""
+    try:
+        yield
+    except VtoError:
+        raise
+    except Exception as e:
+        raise FormatError(f"{type(e).__name__}: {e}"[:200], where=str(path)) from e
 
 
 def _neighbour(path: Path) -> str:

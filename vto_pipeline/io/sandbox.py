@@ -88,7 +88,7 @@ def run_limited(
 
 
 def _obituary(code: int, last_words: list[str], seconds: float, memory_bytes: int) -> str:
-    """Why the child ended without an answer."""
+    """Return why the child ended without an answer."""
     if code == _OUT_OF_MEMORY:
         return f"reading it needs more than {memory_bytes // 1024**2} MB of memory"
     if code in (-signal.SIGXCPU, -signal.SIGALRM):
@@ -99,7 +99,7 @@ def _obituary(code: int, last_words: list[str], seconds: float, memory_bytes: in
 
 
 def _environment() -> dict[str, str]:
-    """The parent's import path and nothing else; one thread, because every BLAS thread reserves address space."""
+    """Return the parent's import path and one thread, as every BLAS thread reserves address space."""
     return {
         "PATH": os.environ.get("PATH", ""),
         "PYTHONPATH": os.pathsep.join(p for p in sys.path if p),

@@ -1,4 +1,4 @@
-"""Find out what a path holds: which way into the pipeline it is."""
+"""Detect what a path holds, and so where it enters the pipeline."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ import zipfile
 from pathlib import Path
 
 from vto_pipeline.errors import InputError
-from vto_pipeline.io import clouds, images, makehuman, meshes
+from vto_pipeline.io import clouds, meshes
+from vto_pipeline.io.bodies import makehuman
+from vto_pipeline.io.captures import images
 from vto_pipeline.io.documents import load_yaml
 from vto_pipeline.io.files import listed
-from vto_pipeline.io.ply_header import read_header
+from vto_pipeline.io.formats.ply_header import read_header
 
 _WANTED = (
     "a folder of photos, of depth frames, of front and side pictures, or of MakeHuman; a point cloud, a mesh, a body "
@@ -18,7 +20,7 @@ _WANTED = (
 
 
 def find_kind(path: Path) -> tuple[str, str]:
-    """What a path holds, from its name, its header, and for a folder its contents.
+    """Return what a path holds, by its name, its header, and for a folder its contents.
 
     Args:
         path: File or folder.
@@ -32,9 +34,11 @@ def find_kind(path: Path) -> tuple[str, str]:
     path = Path(path)
     if not path.exists():
         raise InputError("no such file or folder", where=str(path))
+    if not path.is_dir() and not path.is_file():
+        raise InputError("neither a file nor a folder", where=str(path))
     found = _folder(path) if path.is_dir() else _file(path)
     if found is None:
-        raise InputError("it is not clear what this is", where=str(path), hint=f"wanted {_WANTED}")
+        raise InputError("cannot tell what this is", where=str(path), hint=f"expected {_WANTED}")
     return found
 
 

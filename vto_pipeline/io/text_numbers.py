@@ -1,4 +1,4 @@
-"""Numbers in text files, with the line of the first token that is none."""
+"""Numbers in text files, with the line of the first token that is not a number."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def read_lines(path: Path) -> list[str]:
     """
     data = path.read_bytes()
     if b"\0" in data:
-        raise FormatError(f"byte {data.index(0)} is zero: this is no text file", where=str(path))
+        raise FormatError(f"byte {data.index(0)} is zero: this is not a text file", where=str(path))
     return data.decode("utf-8", errors="replace").splitlines()
 
 
@@ -50,7 +50,7 @@ def parse_numbers(lines: Sequence[str], line_numbers: Sequence[int], path: Path)
 
 
 def parse_rows(lines: Sequence[str], line_numbers: Sequence[int], path: Path) -> FloatArray:
-    """The numbers of lines that must all hold equally many.
+    """Return the numbers of lines that must all have the same count.
 
     Returns:
         Shape (len(lines), columns).
@@ -63,7 +63,7 @@ def parse_rows(lines: Sequence[str], line_numbers: Sequence[int], path: Path) ->
     for count, number in zip(counts, line_numbers, strict=True):
         if count != counts[0]:
             problem = f"{count} numbers in this line, {counts[0]} in the lines before"
-            raise FormatError(problem, where=f"{path}, line {number}", hint="is the file cut off?")
+            raise FormatError(problem, where=f"{path}, line {number}", hint="is the file truncated?")
     return values.reshape(len(lines), -1)
 
 

@@ -1,1 +1,7 @@
-"""The nouns: frozen dataclasses of arrays, checked once when made. No algorithms."""
+"""The data model: frozen dataclasses of arrays, validated on construction. No algorithms.
+
+mesh, camera, frames: surfaces, clouds and captures
+body, garment, outfit, fabric, cloth: what is fitted and draped
+render: what is drawn
+artifact, job, settings, arrays: how nouns are kept; long work; the base of settings; checks
+"""

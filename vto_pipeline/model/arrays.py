@@ -32,7 +32,7 @@ def freeze(name: str, values: Any, shape: tuple[int | None, ...], dtype: Any, *,
         array = array.copy()
     if array.ndim != len(shape) or any(n is not None and n != m for n, m in zip(shape, array.shape, strict=True)):
         wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
-        raise InputError(f"{name}: shape {array.shape}, wanted {wanted}")
+        raise InputError(f"{name}: shape {array.shape}; expected {wanted}")
     if finite and array.dtype.kind == "f" and not np.isfinite(array).all():
         bad = int(array.size - np.isfinite(array).sum())
         raise InputError(f"{name}: {bad} of {array.size} values are not finite (NaN or infinity)")

@@ -1,4 +1,4 @@
-"""A kind of artifact: how one noun is kept in a file."""
+"""A kind of artifact, and how it is stored in a file."""
 
 from __future__ import annotations
 
@@ -24,6 +24,8 @@ class ArtifactKind:
             path will do. Paths inside a mapping arrive resolved, as Path.
         receive: (Path the user gave, Job) -> value, for kinds that are read otherwise when they come from outside: in a
             limited child process, with the unit guessed and every change told to the job. None: `read` serves both.
+        in_folder: Folder -> whether it holds one; None where only a file will do. Asked before the folder is read, so
+            that a wrong one is refused at once, however much it holds.
         previews: Further files written beside it for other programs, never read back: (file name, writer).
     """
 
@@ -34,4 +36,5 @@ class ArtifactKind:
     write: Callable[[Path, Any], None]
     inline: Callable[[Any], Any] | None = None
     receive: Callable[[Path, Job], Any] | None = None
+    in_folder: Callable[[Path], bool] | None = None
     previews: tuple[tuple[str, Callable[[Path, Any], None]], ...] = ()

@@ -28,10 +28,10 @@ class Measurements:
 
     def __post_init__(self) -> None:
         if self.sex not in ("female", "male", "neutral"):
-            raise InputError(f"sex is {self.sex!r}; wanted female, male or neutral")
+            raise InputError(f"sex is {self.sex!r}; expected female, male or neutral")
         for name, value in self.values.items():
             if not 0 < value < 1000:
-                raise InputError(f"measurement {name} is {value}; wanted a positive number")
+                raise InputError(f"measurement {name} is {value}; expected a positive number")
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class Avatar:
 
 @dataclass(frozen=True)
 class SkinnedBody:
-    """A body of somebody else's topology with its skeleton, as its maker left it; register ours to its mesh to use it.
+    """A skinned body of foreign topology, at rest; register the template to its mesh to use it.
 
     Args:
         vertices: At rest [m], shape (V, 3).
@@ -135,7 +135,7 @@ class SkinnedBody:
 
 @dataclass(frozen=True)
 class MovingBody:
-    """A body that changes shape or pose: the collider of a drape.
+    """A body that changes shape or pose, as the collider of a drape.
 
     Args:
         keyframes: Positions [m], shape (K, V, 3), K >= 1, evenly spaced over the motion; linear in between.
@@ -153,5 +153,5 @@ class MovingBody:
 
     @property
     def final(self) -> TriangleMesh:
-        """Where the motion ends."""
+        """The body at the end of its motion."""
         return TriangleMesh(self.keyframes[-1], self.faces)

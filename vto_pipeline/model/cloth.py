@@ -1,4 +1,4 @@
-"""What a drape returns."""
+"""The result of a drape."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class TraceRow:
         seconds: Wall time since the drape began [s].
         step: Steps taken on this mesh.
         error_mm: Predicted distance to the state of rest of this mesh [mm].
-        residual: Out-of-balance force, rms over vertices, as a share of a vertex's weight.
+        residual: Residual force, rms over vertices, as a share of a vertex's weight.
         level: 0 on the garment's own mesh, 1 on the next coarser one, and so on.
         contacts: That pushed in the last step, where the method counts them.
     """

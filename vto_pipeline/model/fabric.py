@@ -24,7 +24,7 @@ class StretchCurve:
     def __post_init__(self) -> None:
         if len(self.strain) != len(self.tension) or len(self.strain) < 2:
             found = f"{len(self.strain)} strains and {len(self.tension)} tensions"
-            raise InputError(f"stretch curve: {found}; wanted as many of each, two at least")
+            raise InputError(f"stretch curve: {found}; expected as many of each, two at least")
         for name, values in (("strain", self.strain), ("tension", self.tension)):
             if values[0] != 0.0 or not all(low < high for low, high in pairwise(values)) or not isfinite(values[-1]):
                 raise InputError(f"stretch curve: {name} must increase from 0, each value above the last")
@@ -78,10 +78,10 @@ class Fabric:
     def __post_init__(self) -> None:
         for name in ("areal_density", "thickness", "stretch_warp", "stretch_weft", "shear"):
             if not 0 < getattr(self, name) < 1e9:
-                raise InputError(f"fabric {self.name}: {name} is {getattr(self, name)}; wanted a positive number")
+                raise InputError(f"fabric {self.name}: {name} is {getattr(self, name)}; expected a positive number")
         losses = ("bending_hysteresis", "stretch_hysteresis", "shear_hysteresis", "damping", "friction")
         for name in ("bending_warp", "bending_weft", *losses):
             if not 0 <= getattr(self, name) < 1e9:
-                raise InputError(f"fabric {self.name}: {name} is {getattr(self, name)}; wanted zero or more")
+                raise InputError(f"fabric {self.name}: {name} is {getattr(self, name)}; expected zero or more")
         if not -0.99 < self.poisson < 0.99:
-            raise InputError(f"fabric {self.name}: poisson is {self.poisson}; wanted -0.99 to 0.99")
+            raise InputError(f"fabric {self.name}: poisson is {self.poisson}; expected -0.99 to 0.99")

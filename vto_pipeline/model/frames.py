@@ -1,4 +1,4 @@
-"""What comes out of a camera: lists of files and what is known about them. Pixels are read one by one, by `io`."""
+"""Camera captures: lists of files and their metadata. `io` reads the pixels, picture by picture."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class DepthFrameSet:
         if self.color_paths and len(self.color_paths) != count:
             raise InputError(f"{count} depth frames but {len(self.color_paths)} colour frames")
         if not self.depth_scale > 0:
-            raise InputError(f"depth_scale is {self.depth_scale}; wanted units per metre, e.g. 1000")
+            raise InputError(f"depth_scale is {self.depth_scale}; expected units per metre, e.g. 1000")
         if self.world_from_cam is not None:
             poses = freeze("world_from_cam", self.world_from_cam, (count, 4, 4), "f8")
             object.__setattr__(self, "world_from_cam", poses)
@@ -109,7 +109,7 @@ class DepthMaps:
         object.__setattr__(self, "world_from_cam", freeze("world_from_cam", self.world_from_cam, (count, 4, 4), "f8"))
         object.__setattr__(self, "depth", freeze("depth maps", self.depth, (count, None, None), "f4"))
         if (self.depth < 0).any():
-            raise InputError("depth maps: negative depth; 0 stands for none")
+            raise InputError("depth maps: negative depth; 0 means no reading")
 
 
 @dataclass(frozen=True)
@@ -127,4 +127,4 @@ class Silhouettes:
 
     def __post_init__(self) -> None:
         if not 0.5 < self.stature < 2.6:
-            raise InputError(f"stature is {self.stature} m; wanted 0.5 to 2.6 m", hint="is it in centimetres?")
+            raise InputError(f"stature is {self.stature} m; expected 0.5 to 2.6 m", hint="is it in centimetres?")

@@ -1,4 +1,4 @@
-"""Garments as they leave the scan."""
+"""Garments from a scan."""
 
 from __future__ import annotations
 
@@ -13,22 +13,19 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 @dataclass(frozen=True)
 class SurfaceLabels:
-    """What each vertex of a scanned surface belongs to.
+    """Labels of the vertices of a scanned surface.
 
     Args:
         garment: Part of the garment, shape (V,), bool.
-        observed: Seen by a sensor, as against filled in, shape (V,), bool.
         confidence: Of `garment`, 0 to 1, shape (V,).
     """
 
     garment: NDArray[np.bool_]
-    observed: NDArray[np.bool_]
     confidence: FloatArray
 
     def __post_init__(self) -> None:
         count = len(self.garment)
         object.__setattr__(self, "garment", freeze("labels garment", self.garment, (count,), "?"))
-        object.__setattr__(self, "observed", freeze("labels observed", self.observed, (count,), "?"))
         object.__setattr__(self, "confidence", freeze("labels confidence", self.confidence, (count,), "f8"))
 
 
@@ -51,7 +48,7 @@ class Opening:
 
 @dataclass(frozen=True)
 class RestShape:
-    """What the cloth would be without forces.
+    """The shape of the cloth without forces.
 
     Args:
         positions: Rest positions of the simulation mesh [m], shape (V, 3). Edge lengths and areas are taken from them.
@@ -68,7 +65,7 @@ class RestShape:
 
     @property
     def worn_as(self) -> str:
-        """What a drape of it answers: "same_garment" (does it fit) or "regraded" (how would it look)."""
+        """The question a drape answers: "same_garment" (does it fit) or "regraded" (how would it look)."""
         return "regraded" if self.regraded else "same_garment"
 
     def __post_init__(self) -> None:

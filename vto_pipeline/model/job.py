@@ -1,4 +1,4 @@
-"""What a long computation may say while it works, without knowing who listens."""
+"""Progress and findings of a long computation, independent of how they are shown."""
 
 from __future__ import annotations
 

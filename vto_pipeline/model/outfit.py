@@ -1,4 +1,4 @@
-"""Several garments worn one over the other."""
+"""Several garments worn in layers."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Layer:
 
 @dataclass(frozen=True)
 class DrapedOutfit:
-    """Garments on a body, one over the other.
+    """Garments on a body, in layers.
 
     Args:
         meshes: Name -> the garment's simulation mesh at its end [m]; inner first.

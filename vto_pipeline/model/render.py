@@ -1,4 +1,4 @@
-"""What is drawn: parts with materials."""
+"""Mesh parts with materials, for rendering."""
 
 from __future__ import annotations
 
@@ -45,4 +45,4 @@ class GlbPart:
                 raise InputError(f"{self.name} has a texture but no texture coordinates")
             object.__setattr__(self, "texture", freeze(f"{self.name} texture", self.texture, (None, None, 3), "u1"))
         if not all(0 <= value <= 1 for value in (*self.base_color, self.roughness, self.metallic)):
-            raise InputError(f"{self.name}: colour, roughness and metallic must lie in 0 to 1")
+            raise InputError(f"{self.name}: colour, roughness and metallic must lie between 0 and 1")

@@ -6,7 +6,7 @@ from pydantic import BaseModel, ConfigDict
 
 
 class Config(BaseModel):
-    """Settings: frozen, unknown keys and numbers that are not finite refused.
+    """Base of all settings: frozen; unknown keys and numbers that are not finite are refused.
 
     Every field has a default, a range, and its unit in the description.
     """

@@ -1,9 +1,19 @@
-"""Kernels that read like the paper: arrays in, arrays out."""
+"""Numerical kernels that follow the papers: arrays in, arrays out.
+
+vector, planar, distance: three-vectors, plane points, nearest points
+ccd, separation: continuous collision detection
+line_search: how much of a descent step to take
+solids, volume: signed distance to solids with a formula; what a surface encloses
+srgb: bytes of pictures and linear light
+linear/, spatial/, mechanics/: linear algebra, what is near what, formulas of one stencil
+cpu_threads, kernel_cache: threads of the processor; where compiled kernels are kept
+"""
 
 from __future__ import annotations
 
-from vto_pipeline.numerics.kernel_cache import use_kernel_cache
-from vto_pipeline.numerics.threads import load_tbb
+from vto_pipeline.numerics.cpu_threads import load_tbb
+from vto_pipeline.numerics.kernel_cache import save_in_turn, use_kernel_cache
 
 use_kernel_cache()
+save_in_turn()
 load_tbb()

@@ -1,4 +1,4 @@
-"""Continuous collision detection: when do a vertex and a face, or two edges, first touch? Never late, not by rounding.
+"""Continuous collision detection of vertex-face and edge-edge pairs: never late, despite rounding.
 
 Both are one question. The differences between the points of the one and of the other fill a triangle (face less vertex)
 or a parallelogram (edge less edge), and they touch when that figure holds the origin. Differences leave out what
@@ -14,7 +14,7 @@ late. Contacts on the rim that turn in their own plane take the most rounds.
 
 At the time of a hit the features are still apart: by 1e-13 of the size as a rule, by 1e-8 where they are nearly
 parallel or without area; where rounds run out (one of fifty coplanar motions at the rim) by over 1e-6, at worst by
-4e-3 of those tried. Misses by 1e-12 of the size are told from hits.
+4e-3 of those tried. Misses by 1e-12 of the size are distinguished from hits.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Where on a triangle is the point nearest to a given one, and where on two segments are the nearest two."""
+"""Nearest points: of a triangle to a point, and of two segments to each other."""
 
 from __future__ import annotations
 

@@ -1,17 +1,24 @@
-"""Where compiled kernels are kept, so that none is ever older than its source.
+"""The cache of compiled kernels, never older than their sources.
 
 Numba keeps each kernel beside its file and compiles it again when that file changes, but not when a kernel changes that
 it calls from another file: stale code would run, or the cache fail to load after an upgrade. So the folder carries a
 digest of all kernels' sources.
+
+Nor does Numba keep two processes from choosing the same file for two kernels that they compile at the same time. Either
+could later load the other's machine code. So one process saves at a time.
 """
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import shutil
+from functools import wraps
 from pathlib import Path
+from typing import Any
 
 import numba
+from numba.core.caching import IndexDataCacheFile
 
 
 def use_kernel_cache() -> None:
@@ -30,3 +37,16 @@ def use_kernel_cache() -> None:
     for old in home.glob("kernels-*"):
         if old != folder:
             shutil.rmtree(old, ignore_errors=True)
+
+
+def save_in_turn() -> None:
+    """Let one process at a time look for the name of a free file and take it. Once."""
+    save = IndexDataCacheFile.save
+
+    @wraps(save)
+    def alone(self: IndexDataCacheFile, key: Any, data: Any) -> None:
+        with open(f"{self._index_path}.lock", "w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            save(self, key, data)
+
+    IndexDataCacheFile.save = alone  # type: ignore[method-assign]

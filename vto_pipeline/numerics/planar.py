@@ -1,4 +1,4 @@
-"""Points of a plane, rows of an (N, 2) array, and ways that change evenly in a step: a + s da, s from -1/2 to 1/2."""
+"""Points of a plane, rows of an (N, 2) array, and linear motions in a step: a + s da, s from -1/2 to 1/2."""
 
 from __future__ import annotations
 

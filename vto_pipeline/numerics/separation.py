@@ -1,4 +1,4 @@
-"""How long a plane keeps the origin apart from a moving triangle or parallelogram.
+"""Time until which a plane separates the origin from a moving triangle or parallelogram.
 
 The figure has corner x and sides u and v, each moving in a straight line over the time [0, 1]; the parallelogram has a
 fourth corner x + u + v. Two planes are tried, and both stay true for a stretch of time that is found in closed form:

@@ -1,4 +1,4 @@
-"""Signed distance to solids with a formula, each about the origin along the axes: half-space, rounded box, ellipsoid.
+"""Signed distance to analytic solids, centred and axis-aligned: half-space, rounded box, ellipsoid.
 
 Each gives the distance, negative inside, the nearest point of the surface, and the unit normal there. A box rounded by
 r about half sizes h is a ball for h = 0, and a rod with round ends where only one of h is not zero. All three are
@@ -39,8 +39,8 @@ def first_touch(kind, size, p, move):
 
     Where the way meets the solid, that is just before it enters; else where it is nearest. In both cases the plane
     through the point along the normal has the solid behind it and p before it: a vertex kept before the plane cannot
-    come through, however thin the solid. Where the way misses the solid, all of it is before the plane, which so
-    hinders nobody. The distance is that of p from the plane.
+    come through, however thin the solid. Where the way misses the solid, all of it is before the plane, so the
+    plane is no obstacle. The distance is that of p from the plane.
     """
     share = _nearest_share(kind, size, p, move)
     if _along(kind, size, p, move, share) <= 0.0:

@@ -1,4 +1,4 @@
-"""Three-vectors as tuples of floats: inside a Numba kernel they live in registers and cost no allocation."""
+"""Three-vectors as tuples of floats, which live in registers inside a Numba kernel."""
 
 from __future__ import annotations
 

@@ -1,1 +1,7 @@
-"""The engine: plans, runs, caches. Knows nothing of garments."""
+"""The engine: plans, runs, caches. It knows nothing of garments.
+
+stage, catalogue: a row of the table; the tables an engine works on
+given, request, schema: from a document to a checked request
+plan, lacking: walking backwards from what is wanted to what is given
+execution/: running a plan
+"""

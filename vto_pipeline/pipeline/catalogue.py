@@ -1,10 +1,11 @@
-"""The tables an engine works on: stages, kinds of artifact, and what may be given."""
+"""The tables of the engine: stages, kinds of artifact, and keys that may be given."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from vto_pipeline.errors import InputError
 from vto_pipeline.model.artifact import ArtifactKind
 from vto_pipeline.model.settings import Config
 from vto_pipeline.pipeline.stage import Stage
@@ -12,7 +13,7 @@ from vto_pipeline.pipeline.stage import Stage
 
 @dataclass(frozen=True)
 class Catalogue:
-    """What can be made, how, and from what. Both ends of every cross-reference are checked when it is built.
+    """Stages, artifacts and inputs. Every cross-reference is checked when it is built.
 
     Args:
         stages: In the order in which people think of them; the order of a plan where its needs leave a choice.
@@ -52,7 +53,10 @@ class Catalogue:
 
     def kind(self, artifact: str) -> ArtifactKind:
         """The kind of an artifact that exists."""
-        return next(kind for kind in self.kinds if kind.name == artifact)
+        for kind in self.kinds:
+            if kind.name == artifact:
+                return kind
+        raise InputError(f"no such artifact: {artifact}", hint="run the document again with this version")
 
     def makers(self, artifact: str) -> list[Stage]:
         """Stages that make an artifact."""

@@ -1,4 +1,4 @@
-"""What a user gives: files, folders, and small values written in the document itself."""
+"""Inputs from the user: files, folders, and small values in the document itself."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any
 
 from vto_pipeline.errors import ConfigError, InputError, VtoError
 from vto_pipeline.io.documents import Document
+from vto_pipeline.io.files import resolved
 from vto_pipeline.model.artifact import ArtifactKind
 from vto_pipeline.model.job import Job
 from vto_pipeline.pipeline.catalogue import Catalogue
@@ -25,7 +26,7 @@ class Given:
     Args:
         key: As written in the document, such as "garment.photos".
         source: A path, or the value written in the document: a word or a mapping whose paths are resolved.
-        read: Job -> value; reads the source once, and tells the first job what it had to guess or mend.
+        read: Job -> value; reads the source once, and tells the first job what it had to guess or repair.
     """
 
     key: str
@@ -64,19 +65,22 @@ def find_given(data: Mapping[str, Any], document: Document, base: Path, catalogu
             continue
         where = document.where(("given", *parts))
         if artifact in found:
-            raise ConfigError(f"given.{key} and given.{found[artifact].key} are the same thing", where=where)
+            raise ConfigError(f"given.{key} and given.{found[artifact].key} are the same; keep one", where=where)
         found[artifact] = resolve(key, value, base, catalogue.kind(artifact), where)
     return found
 
 
 def resolve(key: str, value: Any, base: Path, kind: ArtifactKind, where: str) -> Given:
-    """What one key of `given` stands for.
+    """Resolve one key of `given`.
 
     Raises:
         ConfigError, InputError: as `find_given`.
     """
     if isinstance(value, str):
-        path = (base / Path(value).expanduser()).resolve()
+        path = resolved(base / Path(value).expanduser())
+        if path.is_dir() and not (kind.in_folder and kind.in_folder(path)):
+            wanted = "a file was wanted" if kind.in_folder is None else f"it does not hold {kind.about}"
+            raise InputError(f"given.{key}: {path} is a folder; {wanted}", where=where)
         if path.exists():
             return Given(key, path, _once(lambda job: kind.receive(path, job) if kind.receive else kind.read(path)))
         if kind.inline is None or _FILE.fullmatch(value):
@@ -102,7 +106,7 @@ def _parse(kind: ArtifactKind, source: Any, where: str) -> Any:
 
 
 def _once(read: Callable[[Job], Any]) -> Callable[[Job], Any]:
-    """The reader, remembering what it read."""
+    """Return the reader with its result cached."""
     kept: list[Any] = []
 
     def remembering(job: Job) -> Any:
@@ -114,13 +118,13 @@ def _once(read: Callable[[Job], Any]) -> Callable[[Job], Any]:
 
 
 def _resolve_inside(key: str, value: Any, base: Path, where: str) -> Any:
-    """The value with every string that names a file made a path."""
+    """Return the value with every string that names a file turned into a path."""
     if isinstance(value, Mapping):
         return {name: _resolve_inside(f"{key}.{name}", item, base, where) for name, item in value.items()}
     if isinstance(value, str):
         path = base / Path(value).expanduser()
         if path.is_file():
-            return path.resolve()
+            return resolved(path)
         if _FILE.fullmatch(value):
             raise _missing(key, path, where)
     return value

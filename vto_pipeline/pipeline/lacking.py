@@ -1,4 +1,4 @@
-"""What can be made from what is given, and what would have to be given as well."""
+"""Which artifacts can be made from the inputs, and which inputs are missing."""
 
 from __future__ import annotations
 

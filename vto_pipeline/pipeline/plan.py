@@ -1,4 +1,4 @@
-"""Walking backwards from what is wanted to what is given."""
+"""Planning backwards from the wanted artifacts to the given ones."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vto_pipeline.pipeline.stage import Stage
 
 @dataclass(frozen=True)
 class Step:
-    """A stage with everything decided.
+    """A stage with all choices made.
 
     Args:
         stage: The row of the table.
@@ -44,7 +44,7 @@ class Plan:
 
 
 def make_plan(request: Request, catalogue: Catalogue) -> Plan:
-    """Find the stages that lead from what is given to what is wanted.
+    """Find the stages that lead from the given artifacts to the wanted ones.
 
     Raises:
         PlanError: something wanted cannot be made, and the missing leaf is named; or two stages could make an artifact
@@ -111,13 +111,13 @@ class _Walk:
             raise PlanError(
                 f"{artifact} can be made in {len(names)} ways: by {' or '.join(names)}",
                 where=self.request.places.get("given", ""),
-                hint=f"add to the document   choose: {{{artifact}: {names[0]}}}   or give less",
+                hint=f"add to the document   choose: {{{artifact}: {names[0]}}}   or give fewer inputs",
             )
         return able[0]
 
 
 def _cannot(artifact: str, request: Request, catalogue: Catalogue, stage: str | None = None) -> PlanError:
-    """What is missing, by the names a user would write."""
+    """Return the error for missing inputs, by the keys a user would write."""
     groups = lacking(artifact, request.given, catalogue, only=stage)
     sections = [" or ".join(dict.fromkeys(key.partition(".")[0] for key in group)) for group in groups]
     choices = [f"one of {', '.join(group)}" if len(group) > 1 else group[0] for group in groups]
@@ -136,7 +136,7 @@ def _in_order(taken: list[Stage], makers: dict[str, Stage]) -> Iterable[Stage]:
         late = {stage.name for stage in waiting}
         ready = [s for s in waiting if not any(a in makers and makers[a].name in late for a in (*s.needs, *s.optional))]
         if not ready:
-            raise PlanError(f"stages wait for each other: {', '.join(sorted(late))}")
+            raise PlanError(f"stages depend on each other in a loop: {', '.join(sorted(late))}")
         waiting.remove(ready[0])
         yield ready[0]
     yield from (stage for stage in taken if stage.final)
@@ -154,4 +154,4 @@ def _reason(stage: Stage, makers: dict[str, Stage], request: Request, catalogue:
     rival = next((makers[artifact].name for artifact in stage.makes if artifact in makers), None)
     if rival is not None:
         return f"not chosen: {rival} makes it"
-    return "nothing wanted needs it"
+    return "nothing wanted depends on it"

@@ -85,12 +85,12 @@ def _check_version(document: Document) -> dict[str, Any]:
     version = data.pop("schema", None)
     if version != VERSION:
         seen = "is missing" if version is None else f"is {version!r}"
-        raise ConfigError(f"schema {seen}; wanted {VERSION}", where=document.where(("schema",)))
+        raise ConfigError(f"schema {seen}; expected {VERSION}", where=document.where(("schema",)))
     return data
 
 
 def _override(data: dict[str, Any], text: str, catalogue: Catalogue) -> dict[str, Any]:
-    """The document's data with one setting changed; the change is checked alone first, so that errors name it."""
+    """Return the document's data with one setting changed; it is validated alone first, so that errors name it."""
     match = re.fullmatch(r"(\w+)\.(\w+)=(.*)", text, re.DOTALL)
     if match is None:
         raise ConfigError(f"--set takes stage.key=value (got {text!r})", hint="as in --set drape.target_error_mm=0.5")
@@ -108,7 +108,7 @@ def _override(data: dict[str, Any], text: str, catalogue: Catalogue) -> dict[str
 
 
 def _number_or_word(text: str) -> Any:
-    """JSON where it is JSON, else the word itself; the settings class has the last say."""
+    """Parse a value as JSON, else keep it as a string; the settings class validates it."""
     try:
         return json.loads(text)
     except ValueError:

@@ -1,4 +1,4 @@
-"""The shape of a pipeline document, derived from the tables: nothing about it is written down twice."""
+"""The schema of a pipeline document, derived from the tables."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ def document_model(catalogue: Catalogue) -> type[BaseModel]:
     return create_model(
         "Document",
         __config__=_STRICT,
-        given=(given, Field(description="What there is: paths relative to the document's own folder.")),
-        want=(list[str], Field(min_length=1, description="Artifacts to make.")),
-        stages=(stages, Field(default=stages(), description="Settings that differ from the defaults.")),
-        choose=(dict[str, str], Field(default={}, description="Artifact -> stage, where several could make it.")),
-        seed=(int, Field(default=0, ge=0, lt=2**32, description="For everything random.")),
+        given=(given, Field(description="Inputs; paths are relative to the document's own folder")),
+        want=(list[str], Field(min_length=1, description="Artifacts to make")),
+        stages=(stages, Field(default=stages(), description="Settings that differ from the defaults")),
+        choose=(dict[str, str], Field(default={}, description="Artifact -> stage that makes it, where several could")),
+        seed=(int, Field(default=0, ge=0, lt=2**32, description="Seed of all random numbers")),
     )
 
 

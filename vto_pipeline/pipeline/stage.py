@@ -1,4 +1,4 @@
-"""A stage is a row of a table: what it needs, what it makes, and the function in between."""
+"""A stage is a row of a table: what it needs, what it makes, and its function."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Stage:
             raise ValueError(f"stage {self.name}: passes may only name what it needs, {self.needs}")
 
     def extras(self, settings: Config) -> tuple[str, ...]:
-        """Return the optional artifacts that it takes under these settings, if they can be had."""
+        """Return the optional artifacts that it uses under these settings, if available."""
         idle = self.idle(settings)
         return tuple(artifact for artifact in self.optional if artifact not in idle)
 

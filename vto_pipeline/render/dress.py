@@ -1,10 +1,10 @@
-"""The render mesh: the garment in full detail, where the drape has taken it."""
+"""The render mesh: the garment in full detail, after the drape."""
 
 from __future__ import annotations
 
 from pydantic import Field
 
-from vto_pipeline.geometry.decimate import decimate
+from vto_pipeline.geometry.remeshing.decimate import decimate
 from vto_pipeline.geometry.topology import vertex_normals
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -17,7 +17,7 @@ class DressConfig(Config):
     """Settings of the render mesh."""
 
     max_triangles: int = Field(
-        130_000, ge=1_000, le=5_000_000, description="As many as web viewers take; a finer scan is thinned out."
+        130_000, ge=1_000, le=5_000_000, description="Most triangles, for web viewers; a finer scan is thinned out"
     )
 
 

@@ -1,4 +1,4 @@
-"""Marks in a picture: here it intersects."""
+"""Marks of intersections in a picture."""
 
 from __future__ import annotations
 

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vto_pipeline.geometry.topology import vertex_normals
+from vto_pipeline.geometry.topology import concatenate, vertex_normals
 from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.render.rasterise import rasterise
 from vto_pipeline.render.shading import crevices, light
 
-FRONT, LEFT, BACK, RIGHT = 0.0, 90.0, 180.0, 270.0
-"""Where the viewer stands [deg]: before the person, at the person's left, behind, at the person's right."""
+FRONT, LEFT, BACK = 0.0, 90.0, 180.0
+"""Where the viewer stands [deg]: before the person, at the person's left, behind."""
 
 _SAMPLES = 2  # per pixel and direction
 _CLOTH = np.array([205, 206, 203], dtype=np.uint8)
@@ -47,15 +47,13 @@ def render_picture(
     low, high = box or _bounds(meshes)
     half = 0.5 * np.abs(view[:2]) @ (high - low)
     pixels_per_metre = (1 - 2 * margin) * min(0.5 * width / half[0], 0.5 * height / half[1])
-    starts = np.cumsum([0, *(len(m.vertices) for m in meshes)])
-    vertices = np.vstack([m.vertices for m in meshes])
+    whole = concatenate(meshes)
     normals = np.vstack([vertex_normals(m) for m in meshes]) @ view.T
-    faces = np.vstack([m.faces + start for m, start in zip(meshes, starts[:-1], strict=True)])
     colors = np.vstack([np.broadcast_to(_CLOTH, m.vertices.shape) if m.colors is None else m.colors for m in meshes])
 
     to_image = pixels_per_metre * np.array([1.0, -1.0, -1.0])  # rows run down, depth runs away
     middle = np.array([0.5 * (width - 1), 0.5 * (height - 1), 0.0])
-    corners = (((vertices - 0.5 * (low + high)) @ view.T) * to_image + middle)[faces]
+    corners = (((whole.vertices - 0.5 * (low + high)) @ view.T) * to_image + middle)[whole.faces]
     face, weight, depth = rasterise(corners, width, height)
 
     seen = face >= 0
@@ -63,31 +61,12 @@ def render_picture(
     share = np.column_stack([1 - weight[seen].sum(axis=1), weight[seen]])[:, None, :]
     u, v = corners[shown, 1, :2] - corners[shown, 0, :2], corners[shown, 2, :2] - corners[shown, 0, :2]
     far_side = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] > 0  # rows run down, so outer sides run clockwise
-    normal, color = ((share @ values[faces[shown]])[:, 0] for values in (normals, colors.astype(np.float64)))
+    normal, color = ((share @ values[whole.faces[shown]])[:, 0] for values in (normals, colors.astype(np.float64)))
     brightness = light(normal, far_side) * crevices(depth / pixels_per_metre)[seen]
     picture = np.full((height, width, 3), _PAPER)
     picture[seen] = color * brightness[:, None]
     averaged = picture.reshape(size[1], _SAMPLES, size[0], _SAMPLES, 3).mean(axis=(1, 3))
     return np.rint(averaged).astype(np.uint8)
-
-
-def render_views(
-    meshes: Sequence[TriangleMesh],
-    azimuths_deg: Sequence[float] = (FRONT, LEFT, BACK),
-    size: tuple[int, int] = (500, 800),
-) -> ByteArray:
-    """Draw the same meshes from several sides, side by side at one scale, shape (height, views * width, 3).
-
-    Args:
-        meshes: What to draw.
-        azimuths_deg: Where the viewer stands for each view [deg].
-        size: Of one view [px].
-    """
-    low, high = _bounds(meshes)
-    reach = np.array([0.5, 0.0, 0.5]) * (high - low)[[0, 2]].max()
-    center, half = 0.5 * (low + high), np.maximum(0.5 * (high - low), reach)  # one frame for every side
-    box = (center - half, center + half)
-    return np.hstack([render_picture(meshes, azimuth_deg=a, size=size, box=box) for a in azimuths_deg])
 
 
 def _view_axes(azimuth_deg: float, elevation_deg: float) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Which triangle is seen through each pixel."""
+"""Rasterisation: the visible triangle of each pixel."""
 
 from __future__ import annotations
 

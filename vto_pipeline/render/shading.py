@@ -1,4 +1,4 @@
-"""Light and shade of a picture."""
+"""Shading of a picture."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def light(normal: FloatArray, far_side: NDArray[np.bool_]) -> FloatArray:
 
 
 def crevices(depth: FloatArray) -> FloatArray:
-    """Return a factor on brightness that darkens what lies behind its surroundings, as folds do, shape (H, W).
+    """Return a brightness factor that darkens crevices such as folds, shape (H, W).
 
     Unsharp masking of the depth buffer (Luft, Colditz, Deussen 2006).
 

@@ -1,4 +1,4 @@
-"""The render mesh rides on the simulation mesh."""
+"""Binding of the render mesh to the simulation mesh."""
 
 from __future__ import annotations
 

@@ -1,1 +1,5 @@
-"""What a person reads at the end: one page with a 3D view, and plots of error against run time."""
+"""The report: one page with a 3D view.
+
+page, tables, wording, verdicts, chart: the page and its parts
+scene, layers, packing, scales, render_colors, body_loops: its 3D view
+"""

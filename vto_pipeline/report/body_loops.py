@@ -1,4 +1,4 @@
-"""Where the tape lay: an avatar's measuring loops as ribbons on its skin."""
+"""An avatar's measuring loops as ribbons on its skin."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A line chart as SVG that lives inside the page and takes its colours from it."""
+"""A line chart as SVG inside the page, in the page's colours."""
 
 from __future__ import annotations
 

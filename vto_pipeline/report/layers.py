@@ -1,4 +1,4 @@
-"""Which things the page's 3D view can show, from the artifacts of a run."""
+"""Layers of the page's 3D view, from the artifacts of a run."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 
 from vto_pipeline.model.arrays import ByteArray
 from vto_pipeline.model.body import Avatar
-from vto_pipeline.model.garment import SurfaceLabels
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.render import GlbPart
 from vto_pipeline.report.body_loops import loop_ribbons
@@ -51,7 +50,7 @@ class Layer:
 
 
 def list_layers(parts: Mapping[str, Any]) -> list[Layer]:
-    """Return what can be shown; of each group, what is best to show first comes first.
+    """Return the layers that can be shown; the best of each group comes first.
 
     Args:
         parts: Artifact -> value; those that have no shape serve as colours or not at all.
@@ -70,7 +69,7 @@ def list_layers(parts: Mapping[str, Any]) -> list[Layer]:
         layers.append(Layer("Clearance", draped, "garment", CLEARANCE.paint(maps["clearance_mm"]), CLEARANCE))
     if "garment_surface" in parts and "labels" in parts:
         surface = parts["garment_surface"]
-        layers.append(Layer("Labels", surface, "scan", SCAN.paint(_kinds(parts["labels"])), SCAN))
+        layers.append(Layer("Labels", surface, "scan", SCAN.paint(np.where(parts["labels"].garment, 0, 1)), SCAN))
     return sorted(layers, key=lambda layer: _GROUPS.index(layer.group))
 
 
@@ -78,8 +77,3 @@ def _surface(value: TriangleMesh | Avatar | Sequence[GlbPart]) -> TriangleMesh:
     if isinstance(value, TriangleMesh):
         return value
     return value.mesh if isinstance(value, Avatar) else join_parts(value)
-
-
-def _kinds(labels: SurfaceLabels) -> np.ndarray:
-    """Index into SCAN for each vertex of the scanned surface."""
-    return np.where(labels.observed, np.where(labels.garment, 0, 1), 2)

@@ -1,4 +1,4 @@
-"""Meshes packed small enough to travel inside a page."""
+"""Compact encoding of meshes inside the page."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from vto_pipeline.geometry.decimate import decimate
+from vto_pipeline.geometry.remeshing.decimate import decimate
 from vto_pipeline.geometry.topology import submesh
 from vto_pipeline.model.arrays import ByteArray
 from vto_pipeline.model.mesh import TriangleMesh

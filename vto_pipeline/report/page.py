@@ -1,4 +1,4 @@
-"""The page: everything about a run in one file that needs nothing else."""
+"""The page: everything about a run in one self-contained file."""
 
 from __future__ import annotations
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from vto_pipeline.io.gltf import decode_srgb
-from vto_pipeline.io.gltf_read import encode_srgb
+from vto_pipeline.geometry.topology import concatenate
 from vto_pipeline.model.arrays import ByteArray
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.render import GlbPart
+from vto_pipeline.numerics.srgb import decode_srgb, encode_srgb
 
 
 def join_parts(parts: Sequence[GlbPart]) -> TriangleMesh:
@@ -19,15 +20,11 @@ def join_parts(parts: Sequence[GlbPart]) -> TriangleMesh:
     Args:
         parts: At least one.
     """
-    starts = np.cumsum([0, *(len(part.mesh.vertices) for part in parts[:-1])])
     plain = all(
         part.mesh.colors is None and part.texture is None and part.base_color[:3] == (1, 1, 1) for part in parts
     )
-    return TriangleMesh(
-        np.vstack([part.mesh.vertices for part in parts]),
-        np.vstack([part.mesh.faces + start for part, start in zip(parts, starts, strict=True)]),
-        None if plain else np.vstack([_colors(part) for part in parts]),
-    )
+    whole = concatenate([part.mesh for part in parts])
+    return whole if plain else replace(whole, colors=np.vstack([_colors(part) for part in parts]))
 
 
 def _colors(part: GlbPart) -> ByteArray:

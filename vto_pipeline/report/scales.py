@@ -68,11 +68,11 @@ class Key:
 _COLD_TO_HOT = ("#3b6fb6", "#8fc1d4", "#f2ecc2", "#f09a53", "#b8202c")
 
 STRETCH = Ramp("Stretch beyond rest", "%", (0, 2, 5, 10, 20), _COLD_TO_HOT)
-"""Ends at 20 %, blue to red, as CLO's strain map does; finer steps where woven cloth lives."""
+"""Ends at 20 %, blue to red, as CLO's strain map does; finer steps in the range of woven cloth."""
 
 CLEARANCE = Ramp("Distance to the body", "mm", (0, 3, 10, 30, 60), _COLD_TO_HOT[::-1])
 
-SCAN = Key("Scan", ("garment", "mannequin", "filled in, not seen"), ("#4f8f8b", "#b9b5ad", "#e08a3c"))
+SCAN = Key("Scan", ("garment", "mannequin"), ("#4f8f8b", "#b9b5ad"))
 
 
 def _rgb(color: str) -> tuple[int, int, int]:

@@ -1,4 +1,4 @@
-"""Rows of the page's tables that need more than a loop."""
+"""Rows of the page's tables."""
 
 from __future__ import annotations
 

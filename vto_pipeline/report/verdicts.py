@@ -1,4 +1,4 @@
-"""What a reader must know first: what failed, what is poor, what the garment does."""
+"""The verdicts at the top of the page: failures, warnings and fit."""
 
 from __future__ import annotations
 

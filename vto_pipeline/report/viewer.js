@@ -11,7 +11,7 @@
     byId("message").hidden = false;
   };
   if (!gl) {
-    say("This browser shows no WebGL 2, so there is no 3D view. Everything below is complete without it.");
+    say("This browser does not support WebGL 2, so there is no 3D view. The rest of the page is complete.");
     return;
   }
 
@@ -104,7 +104,7 @@
   ["position", "normal", "color"].forEach((name, slot) => gl.bindAttribLocation(program, slot, name));
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS)) {
-    say("The 3D view does not work with this graphics driver. Everything below is complete without it.");
+    say("The 3D view does not work with this graphics driver. The rest of the page is complete.");
     return;
   }
   const uniform = (name) => gl.getUniformLocation(program, name);
@@ -257,7 +257,7 @@
     event.preventDefault();
     KEYS[event.key]();
   });
-  canvas.addEventListener("webglcontextlost", () => say("The graphics driver has dropped the view. Load the page again."));
+  canvas.addEventListener("webglcontextlost", () => say("The graphics driver has lost the view. Reload the page."));
 
   // ---- buttons and legend ------------------------------------------------------------------------------------
 

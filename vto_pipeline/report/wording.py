@@ -1,4 +1,4 @@
-"""Figures and their names in words."""
+"""Formatting of values and their names."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ _LONGEST = 160  # characters of a value that is no number
 
 
 def label(name: str) -> str:
-    """A key in words, without the unit at its end: "rms_mm" is "rms"."""
+    """Return a key in words, without the unit at its end: "rms_mm" is "rms"."""
     head, _, tail = name.rpartition("_")
     words = head if head and tail in _UNITS else name
     return words.replace("_", " ")
 
 
 def figure(name: str, value: Any) -> str:
-    """A value in words, with the unit its key ends in: 0.4123 of "rms_mm" is "0.412 mm"."""
+    """Return a value with the unit its key ends in: 0.4123 of "rms_mm" is "0.412 mm"."""
     if name.endswith("_share") and isinstance(value, float):
         return f"{100 * value:.3g} %"
     unit = _UNITS.get(name.rpartition("_")[2], "") if "_" in name else ""
@@ -37,7 +37,7 @@ def figure(name: str, value: Any) -> str:
 
 
 def number(value: Any) -> str:
-    """A value in few characters; a float keeps three significant digits."""
+    """Return a value in few characters; a float keeps three significant digits."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if value is None:
@@ -53,12 +53,12 @@ def number(value: Any) -> str:
 
 
 def centimetres(metres: float) -> str:
-    """A length on a body, in the tailor's unit."""
+    """Return a body length in centimetres."""
     return f"{100 * metres:.1f}"
 
 
 def duration(seconds: float) -> str:
-    """A time in the unit that suits it."""
+    """Return a time in a suitable unit."""
     if seconds < 0.1:
         return f"{1000 * seconds:.0f} ms"
     if seconds < 60:

@@ -1,1 +1,8 @@
-"""From photos, depth frames and clouds to a surface in metres."""
+"""From photos, depth frames and clouds to a surface in metres.
+
+photos/, depth/: cameras and depth, from each kind of capture
+fuse: one surface from many depth maps
+normals, surface: a surface through an unorganised cloud
+upright, similarity: which way is up; one set of points mapped on another
+canonical: one order for what hash tables give in any order
+"""

@@ -1,4 +1,4 @@
-"""One order for what hash tables give in any order, and no crumbs."""
+"""Canonical order of vertices and faces, and removal of loose pieces."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vto_pipeline.errors import ScanError
-from vto_pipeline.geometry.topology import face_area_vectors, face_components, submesh
+from vto_pipeline.geometry.topology import component_areas, submesh
 from vto_pipeline.model.arrays import ByteArray, FloatArray, IntArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -38,19 +38,18 @@ def canonical_mesh(vertices: FloatArray, faces: IntArray, colors: ByteArray | No
     faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
     faces = np.unique(faces, axis=0)
     if len(faces) == 0:
-        raise ScanError("no surface came out", hint="are the depths in metres, and do the views overlap?")
+        raise ScanError("no surface was found", hint="are the depths in metres, and do the views overlap?")
     used, compact = np.unique(faces, return_inverse=True)
     corners = compact.reshape(-1, 3).astype(np.int32)
     kept = order[first][used]
     return TriangleMesh(vertices[kept], corners, None if colors is None else colors[kept])
 
 
-def drop_crumbs(mesh: TriangleMesh, min_share: float, job: Job) -> TriangleMesh:
+def drop_small_pieces(mesh: TriangleMesh, min_share: float, job: Job) -> TriangleMesh:
     """Keep the pieces whose area is at least a share of the largest piece's."""
-    count, piece = face_components(mesh)
-    area = np.bincount(piece, np.linalg.norm(face_area_vectors(mesh), axis=1), minlength=count)
+    piece, area = component_areas(mesh)
     keep = area >= min_share * area.max()
-    job.measure(pieces=int(keep.sum()), pieces_dropped=int(count - keep.sum()))
+    job.measure(pieces=int(keep.sum()), pieces_dropped=int((~keep).sum()))
     if not keep.all():
         job.note(f"dropped {int((~keep).sum())} loose pieces, {100 * area[~keep].sum() / area.sum():.2f} % of the area")
     return submesh(mesh, keep[piece])[0]

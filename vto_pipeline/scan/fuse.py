@@ -9,16 +9,17 @@ import numpy as np
 from pydantic import Field
 
 from vto_pipeline.errors import ScanError
-from vto_pipeline.io.depth import read_depth
-from vto_pipeline.io.images import read_image
+from vto_pipeline.io.captures.depth import read_depth
+from vto_pipeline.io.captures.images import read_image
 from vto_pipeline.model.arrays import ByteArray, FloatArray
+from vto_pipeline.model.camera import CameraSet, Intrinsics
 from vto_pipeline.model.frames import DepthFrameSet, DepthMaps, PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
-from vto_pipeline.scan.canonical import canonical_mesh, drop_crumbs, drop_vertices
-from vto_pipeline.scan.consistency import views_on_surface
-from vto_pipeline.scan.depth_mask import clean_depth
+from vto_pipeline.scan.canonical import canonical_mesh, drop_small_pieces, drop_vertices
+from vto_pipeline.scan.depth.depth_mask import clean_depth
+from vto_pipeline.scan.photos.consistency import views_on_surface
 
 GREY = 200
 """Colour of a surface without photos."""
@@ -31,22 +32,25 @@ SEEN_STRIDE = 4
 class FuseConfig(Config):
     """Settings of the fusion."""
 
-    voxel_mm: float | None = Field(None, gt=0.1, le=100, description="Side of a voxel; default from pixels [mm].")
-    voxel_pixels: float = Field(1.5, gt=0.2, le=10, description="The default voxel, in pixels seen on the surface.")
-    truncation_voxels: float = Field(4.0, ge=2, le=16, description="Reach of the distance field, in voxels.")
-    min_views: int = Field(2, ge=1, le=100, description="Depth maps that must lie on the surface at a vertex.")
-    support_voxels: float = Field(1.5, gt=0, le=16, description="How near a depth map must be to lie on it, in voxels.")
-    min_piece: float = Field(0.01, ge=0, le=1, description="Smallest piece kept, as a share of the largest's area.")
+    voxel_mm: float | None = Field(None, gt=0.1, le=100, description="Side of a voxel; default from pixels [mm]")
+    voxel_pixels: float = Field(1.5, gt=0.2, le=10, description="The default voxel, in pixels seen on the surface")
+    truncation_voxels: float = Field(4.0, ge=2, le=16, description="Reach of the distance field, in voxels")
+    min_views: int = Field(2, ge=1, le=100, description="Depth maps that must agree with the surface at a vertex")
+    support_voxels: float = Field(1.5, gt=0, le=16, description="Distance within which maps agree, in voxels")
+    min_piece: float = Field(0.01, ge=0, le=1, description="Smallest piece kept, as a share of the largest's area")
 
 
-def fuse_depth_maps(photos: PhotoSet, maps: DepthMaps, config: FuseConfig, job: Job) -> TriangleMesh:
+def fuse_depth_maps(
+    photos: PhotoSet, cameras: CameraSet, maps: DepthMaps, config: FuseConfig, job: Job
+) -> TriangleMesh:
     """Fuse the depth maps of photos into a surface with the photos' colours.
 
     Args:
         photos: The photos, for their colours.
-        maps: Their depth.
+        cameras: That took them, with their distortion.
+        maps: Their depth, after undistortion.
         config: Settings.
-        job: Told view by view.
+        job: Receives progress, view by view.
 
     Returns:
         Surface [m], open where nothing was seen.
@@ -55,7 +59,13 @@ def fuse_depth_maps(photos: PhotoSet, maps: DepthMaps, config: FuseConfig, job: 
         ScanError: no surface came out.
     """
     paths = {path.name: path for path in photos.paths}
-    return _fuse(maps, lambda index: read_image(paths[maps.names[index]]), config, job)
+    lenses = dict(zip(cameras.names, cameras.intrinsics, strict=True))
+
+    def color_of(index: int) -> ByteArray:
+        name = maps.names[index]
+        return undistorted(read_image(paths[name]), lenses[name])
+
+    return _fuse(maps, color_of, config, job)
 
 
 def fuse_depth_frames(frames: DepthFrameSet, world_from_cam: FloatArray, config: FuseConfig, job: Job) -> TriangleMesh:
@@ -65,7 +75,7 @@ def fuse_depth_frames(frames: DepthFrameSet, world_from_cam: FloatArray, config:
         frames: Depth, and colour if there is any.
         world_from_cam: Poses [m], shape (N, 4, 4).
         config: Settings.
-        job: Told frame by frame.
+        job: Receives progress, frame by frame.
 
     Returns:
         Surface [m], open where nothing was seen.
@@ -82,6 +92,15 @@ def fuse_depth_frames(frames: DepthFrameSet, world_from_cam: FloatArray, config:
     )
 
 
+def undistorted(picture: ByteArray, camera: Intrinsics) -> ByteArray:
+    """Return a picture, shape (H, W, 3), as the same camera without distortion would have taken it; black beyond it."""
+    import cv2
+
+    if camera.k1 == 0.0:
+        return picture
+    return np.asarray(cv2.undistort(picture, camera.matrix, np.array([camera.k1, 0.0, 0.0, 0.0])), dtype=np.uint8)
+
+
 def _fuse(maps: DepthMaps, color_of: Callable[[int], ByteArray], config: FuseConfig, job: Job) -> TriangleMesh:
     """Extract the surface, and keep what the depth maps lie on.
 
@@ -94,7 +113,7 @@ def _fuse(maps: DepthMaps, color_of: Callable[[int], ByteArray], config: FuseCon
     voxel = config.voxel_mm / 1000 if config.voxel_mm else config.voxel_pixels * _pixel_on_surface(maps)
     mesh = _level_set(maps, color_of, voxel, config, job)
     views = views_on_surface(mesh.vertices, maps, config.support_voxels * voxel)
-    mesh = drop_crumbs(drop_vertices(mesh, views < config.min_views), config.min_piece, job)
+    mesh = drop_small_pieces(drop_vertices(mesh, views < config.min_views), config.min_piece, job)
     job.measure(voxel_mm=round(1000 * voxel, 3), points=len(mesh.vertices), triangles=len(mesh.faces))
     return mesh
 
@@ -129,7 +148,7 @@ def _level_set(
             blocks = grid.compute_unique_block_coordinates(depth, matrix, inverse, scale, limit, reach)
             grid.integrate(blocks, depth, color, matrix, inverse, scale, limit, reach)
         job.progress(0.8 * (index + 1) / len(maps.names), f"fusing view {index + 1} of {len(maps.names)}")
-    surface = grid.extract_triangle_mesh(float(config.min_views))
+    surface = grid.extract_triangle_mesh(config.min_views - 0.5)  # Open3D keeps what weighs more, and a view weighs 1
     if "indices" not in surface.triangle or len(surface.triangle.indices) == 0:
         hint = "are the poses right? lower min_views, or take more overlapping views"
         raise ScanError(f"no surface was seen by {config.min_views} of {len(maps.names)} views", hint=hint)

@@ -1,4 +1,4 @@
-"""Normals of an unorganised cloud that all point out of the object."""
+"""Outward normals of an unorganised point cloud."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
 
-_VOTERS, _ASKED = 50_000, 8
+_VOTERS, _NEAR_VOTERS = 50_000, 8
 """Points of a larger cloud that vote, and how many of those near it each of the others follows."""
 
 _CLOSE, _STEPS = 1e-4, 20_000
@@ -30,7 +30,7 @@ def oriented_normals(cloud: PointCloud, neighbours: int, job: Job) -> FloatArray
     Args:
         cloud: Points [m].
         neighbours: Points a plane is fitted to.
-        job: Told how sure the sign is.
+        job: Receives how sure the sign is.
 
     Returns:
         Unit normals, shape (N, 3).
@@ -51,16 +51,16 @@ def oriented_normals(cloud: PointCloud, neighbours: int, job: Job) -> FloatArray
     votes = _voted(cloud.points[voters], normals[voters], agree[voters], neighbours)
     normals[voters] *= np.where(votes < 0.0, -1.0, 1.0)[:, None]
     if len(voters) < len(normals):
-        column = cKDTree(cloud.points[voters]).query(cloud.points, k=_ASKED)[1]
-        row = np.repeat(np.arange(len(normals)), _ASKED)
-        told = _alike(cloud.points, normals, row, voters[column.ravel()]).reshape(-1, _ASKED).sum(axis=1)
-        told[voters] = 1.0
-        normals *= np.where(told < 0.0, -1.0, 1.0)[:, None]
+        column = cKDTree(cloud.points[voters]).query(cloud.points, k=_NEAR_VOTERS)[1]
+        row = np.repeat(np.arange(len(normals)), _NEAR_VOTERS)
+        votes = _agreement(cloud.points, normals, row, voters[column.ravel()]).reshape(-1, _NEAR_VOTERS).sum(axis=1)
+        votes[voters] = 1.0
+        normals *= np.where(votes < 0.0, -1.0, 1.0)[:, None]
     agree = (normals * outwards).sum(1)
     share = float(agree[agree > 0].sum() / max(np.abs(agree).sum(), 1e-12))
     job.measure(normals_outward_share=round(share, 3))
     if share < 0.7:
-        job.warn(f"inside and outside are hard to tell: {100 * share:.0f} % of the normals agree")
+        job.warn(f"inside and outside are hard to tell apart: {100 * share:.0f} % of the normals agree")
     return normals
 
 
@@ -80,7 +80,7 @@ def _voted(points: FloatArray, normals: FloatArray, agree: FloatArray, neighbour
     neighbours = min(neighbours, count - 1)
     near = cKDTree(points).query(points, k=neighbours + 1)[1]
     row, column = np.repeat(np.arange(count), neighbours), near[:, 1:].ravel()
-    pairs = csr_matrix((_alike(points, normals, row, column), (row, column)), (count, count))
+    pairs = csr_matrix((_agreement(points, normals, row, column), (row, column)), (count, count))
     pairs = pairs + pairs.T
     root = np.sqrt(np.asarray(abs(pairs).sum(axis=1)).ravel())
     scale = diags(1.0 / np.maximum(root, 1e-9))
@@ -89,12 +89,14 @@ def _voted(points: FloatArray, normals: FloatArray, agree: FloatArray, neighbour
     system = (1.0 + hold) * diags(np.ones(count)) - scale @ pairs @ scale
     solved, left = cg(system, root * agree, rtol=_CLOSE, maxiter=_STEPS)
     if left:
-        raise ScanError("inside and outside of the cloud cannot be told", hint="give the points normals")
+        raise ScanError("inside and outside of the cloud cannot be told apart", hint="give the points normals")
     signs: FloatArray = solved
     return signs
 
 
-def _alike(points: FloatArray, normals: FloatArray, row: NDArray[np.int64], column: NDArray[np.int64]) -> FloatArray:
+def _agreement(
+    points: FloatArray, normals: FloatArray, row: NDArray[np.int64], column: NDArray[np.int64]
+) -> FloatArray:
     """Return how far the normals of pairs of points are alike (1) or opposite (-1), shape (P,).
 
     Less, as far as the points do not lie in each other's plane: what lies across a gap does not count.

@@ -1,4 +1,4 @@
-"""A surface through an unorganised cloud: normals, Poisson, and a trim that opens again what Poisson closed."""
+"""A surface through an unorganised cloud: normals, Poisson, and trimming of what Poisson closed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud, TriangleMesh
 from vto_pipeline.model.settings import Config
-from vto_pipeline.scan.canonical import canonical_mesh, drop_crumbs, drop_vertices
+from vto_pipeline.scan.canonical import canonical_mesh, drop_small_pieces, drop_vertices
 from vto_pipeline.scan.normals import oriented_normals
 
 MIN_POINTS = 100
@@ -30,13 +30,13 @@ MAX_DEPTH = 11
 class SurfaceConfig(Config):
     """Settings of the surface through a cloud."""
 
-    outlier_sigmas: float = Field(3.0, gt=0, le=20, description="Points lonelier than the mean by this are left out.")
-    neighbours: int = Field(20, ge=6, le=200, description="Points that a normal is fitted to.")
-    cell_spacings: float = Field(1.0, gt=0.2, le=10, description="Finest octree cell, in spacings of the points.")
-    gap_spacings: float = Field(3.0, gt=0.5, le=50, description="Surface this far from any point is cut out.")
-    rim_spacings: float = Field(1.0, gt=0.1, le=50, description="It is cut back to this distance from the points.")
-    thin_percent: float = Field(1.0, ge=0, lt=100, description="The least supported surface goes with it, too [%].")
-    min_piece: float = Field(0.01, ge=0, le=1, description="Smallest piece kept, as a share of the largest's area.")
+    outlier_sigmas: float = Field(3.0, gt=0, le=20, description="Points more isolated than this are dropped")
+    neighbours: int = Field(20, ge=6, le=200, description="Points that a normal is fitted to")
+    cell_spacings: float = Field(1.0, gt=0.2, le=10, description="Finest octree cell, in spacings of the points")
+    gap_spacings: float = Field(3.0, gt=0.5, le=50, description="Surface this far from any point is cut away")
+    rim_spacings: float = Field(1.0, gt=0.1, le=50, description="Rims are cut back to this distance from the points")
+    thin_percent: float = Field(1.0, ge=0, lt=100, description="Share of least supported surface cut away as well [%]")
+    min_piece: float = Field(0.01, ge=0, le=1, description="Smallest piece kept, as a share of the largest's area")
 
 
 def reconstruct_cloud(cloud: PointCloud, config: SurfaceConfig, job: Job) -> TriangleMesh:
@@ -47,7 +47,7 @@ def reconstruct_cloud(cloud: PointCloud, config: SurfaceConfig, job: Job) -> Tri
     Args:
         cloud: Points [m]; normals are used where they are given.
         config: Settings.
-        job: Told of what was left out and cut off.
+        job: Notified of what was left out and cut off.
 
     Raises:
         InputError: too few points, or all on one line or plane.
@@ -80,7 +80,7 @@ def reconstruct_cloud(cloud: PointCloud, config: SurfaceConfig, job: Job) -> Tri
     loose |= np.asarray(density) < np.percentile(np.asarray(density), config.thin_percent)
     bad = _patches_with(whole, loose, distance > config.gap_spacings * spacing)
     mesh = drop_vertices(whole, bad)
-    mesh = drop_crumbs(canonical_mesh(mesh.vertices, mesh.faces, mesh.colors), config.min_piece, job)
+    mesh = drop_small_pieces(canonical_mesh(mesh.vertices, mesh.faces, mesh.colors), config.min_piece, job)
     residual, _ = cKDTree(mesh.vertices).query(cloud.points)
     job.measure(
         spacing_mm=round(1000 * spacing, 3),
@@ -118,10 +118,10 @@ def _subset(cloud: PointCloud, chosen: NDArray[Any]) -> PointCloud:
 def _without_outliers(cloud: PointCloud, config: SurfaceConfig, job: Job) -> PointCloud:
     """Leave out points whose mean distance to their neighbours is unusual."""
     distance, _ = cKDTree(cloud.points).query(cloud.points, k=min(config.neighbours, len(cloud.points) - 1) + 1)
-    lonely = distance[:, 1:].mean(1)
-    keep = lonely <= lonely.mean() + config.outlier_sigmas * lonely.std()
+    gap = distance[:, 1:].mean(1)
+    keep = gap <= gap.mean() + config.outlier_sigmas * gap.std()
     if not keep.all():
-        job.note(f"left out {int((~keep).sum())} lonely points of {len(keep)}")
+        job.note(f"left out {int((~keep).sum())} isolated points of {len(keep)}")
     return _subset(cloud, keep)
 
 

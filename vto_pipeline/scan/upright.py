@@ -1,4 +1,4 @@
-"""A guess at which way is up and where the front is, from how cameras are held."""
+"""A guess at the up axis and the front, from how cameras are held."""
 
 from __future__ import annotations
 

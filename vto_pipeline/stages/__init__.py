@@ -1,8 +1,13 @@
-"""The table: every stage, every artifact, and what may be given."""
+"""The table: every stage, every artifact, and what may be given.
+
+scan, garment, avatar, cloth, output: the rows, by subject
+roles: rows that serve garment, mannequin and body alike
+outfit, outfit_page: several garments in one document
+"""
 
 from __future__ import annotations
 
-from vto_pipeline.io.artifacts import ARTIFACTS
+from vto_pipeline.io.runs.artifacts import ARTIFACTS
 from vto_pipeline.pipeline.catalogue import Catalogue
 from vto_pipeline.stages import avatar, cloth, garment, output, scan
 from vto_pipeline.stages.roles import ROLES

@@ -1,4 +1,4 @@
-"""From whatever is known of a body to an avatar."""
+"""Stages that make an avatar from scans, measurements or photos."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from pydantic import Field
 from vto_pipeline.avatar.from_measurements import MeasurementsConfig, fit_measurements
 from vto_pipeline.avatar.from_scan import ScanConfig, fit_scan
 from vto_pipeline.avatar.from_silhouettes import SilhouettesConfig, fit_silhouettes
-from vto_pipeline.avatar.measure import landmarks, measure
-from vto_pipeline.avatar.pose import clear_pose
-from vto_pipeline.io.images import read_image
+from vto_pipeline.avatar.measuring.avatar_measurements import landmarks, measure_avatar
+from vto_pipeline.avatar.model.pose import clear_pose
+from vto_pipeline.io.captures.images import read_image
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.settings import Config
 from vto_pipeline.pipeline.stage import Stage
@@ -25,7 +25,7 @@ class PoseConfig(Config):
     """Settings of the pose."""
 
     pose: Literal["as_fitted", "a_pose", "t_pose", "arms_down", "sitting"] = Field(
-        "as_fitted", description="How the avatar stands; as_fitted keeps the pose of the scan or of the template."
+        "as_fitted", description="How the avatar stands; as_fitted keeps the pose of the scan or of the template"
     )
 
 
@@ -66,13 +66,13 @@ def _pose(inputs: Inputs, settings: PoseConfig, job: Job) -> Outputs:
 
 def _measure(inputs: Inputs, settings: Config, job: Job) -> Outputs:
     avatar = inputs["avatar"]
-    return {"measurements": measure(avatar), "landmarks": landmarks(avatar)}
+    return {"measurements": measure_avatar(avatar), "landmarks": landmarks(avatar)}
 
 
 STAGES: tuple[Stage, ...] = (
     Stage(
         name="register_mannequin",
-        about="the template fitted to the mannequin, so that it can turn into the customer",
+        about="the template fitted to the mannequin, so that it can morph into the customer",
         needs=("mannequin_surface",),
         makes=("source_avatar",),
         run=_register_mannequin,
@@ -81,7 +81,7 @@ STAGES: tuple[Stage, ...] = (
     ),
     Stage(
         name="shape_mannequin",
-        about="a mannequin known by its measurements only",
+        about="a mannequin built from its measurements",
         needs=("mannequin_measurements",),
         makes=("source_avatar", "mannequin_surface"),
         run=_shape_mannequin,
@@ -90,7 +90,7 @@ STAGES: tuple[Stage, ...] = (
     ),
     Stage(
         name="register_body",
-        about="the template fitted to the body mesh, so that what the garment was on can turn into it",
+        about="the template fitted to the body mesh, so that the source body can morph into it",
         needs=("body_mesh", "source_avatar"),
         makes=("body_avatar",),
         run=_register_body,
@@ -99,7 +99,7 @@ STAGES: tuple[Stage, ...] = (
     ),
     Stage(
         name="fit_measurements",
-        about="the avatar that a tape would measure so",
+        about="the avatar that matches the tape measurements",
         needs=("body_measurements",),
         makes=("fitted_avatar",),
         run=_fit_measurements,
@@ -117,7 +117,7 @@ STAGES: tuple[Stage, ...] = (
     ),
     Stage(
         name="fit_silhouettes",
-        about="the avatar behind a front and a side photo",
+        about="the avatar fitted to a front and a side photo",
         needs=("body_silhouettes",),
         makes=("fitted_avatar",),
         run=_fit_silhouettes,
@@ -126,7 +126,7 @@ STAGES: tuple[Stage, ...] = (
     ),
     Stage(
         name="pose",
-        about="how the avatar stands",
+        about="the avatar in the pose it is draped in",
         needs=("fitted_avatar",),
         makes=("avatar",),
         run=_pose,

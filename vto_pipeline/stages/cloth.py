@@ -1,4 +1,4 @@
-"""The drape: from where the garment was to where it goes."""
+"""Stages of the drape: from the source body to the customer."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from vto_pipeline.avatar.carry import carry
-from vto_pipeline.avatar.pose import morph
+from vto_pipeline.avatar.model.pose import morph
+from vto_pipeline.avatar.scan.body_transfer import transfer_motion
 from vto_pipeline.cloth.drape import drape
 from vto_pipeline.cloth.drape_config import DrapeConfig
-from vto_pipeline.cloth.regrade import GradeConfig, worn_rest
-from vto_pipeline.io.fabric_assumed import told
+from vto_pipeline.cloth.placement.regrade import GradeConfig, worn_rest
+from vto_pipeline.io.fabric_formats.assumed import told
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.garment import Garment
 from vto_pipeline.model.job import Job
@@ -27,13 +27,13 @@ Outputs = Mapping[str, Any]
 class MorphConfig(Config):
     """Settings of the body that the garment is draped on."""
 
-    keyframes: int = Field(21, ge=2, le=500, description="Shapes between the source body and the customer.")
+    keyframes: int = Field(21, ge=2, le=500, description="Number of shapes from source body to customer")
 
 
 def _morph(inputs: Inputs, settings: MorphConfig, job: Job) -> Outputs:
     avatar = inputs["avatar"]
     if "source_avatar" not in inputs:
-        job.leave_out("morphing", "the body that the garment was on is not known: the body stands still")
+        job.leave_out("morphing", "the source body is not known, so the body does not change")
         return {"collider": MovingBody(avatar.vertices[np.newaxis], avatar.faces)}
     return {"collider": morph(inputs["source_avatar"], avatar, settings.keyframes)}
 
@@ -41,10 +41,10 @@ def _morph(inputs: Inputs, settings: MorphConfig, job: Job) -> Outputs:
 def _mesh_morph(inputs: Inputs, settings: MorphConfig, job: Job) -> Outputs:
     body = inputs["body_mesh"]
     if "body_avatar" not in inputs:
-        job.leave_out("fitting an avatar", "a body mesh was given: the cloth lies on that very mesh")
+        job.leave_out("fitting an avatar", "a body mesh was given, and the cloth is draped on it directly")
         return {"collider": MovingBody(body.vertices[np.newaxis], body.faces)}
     motion = morph(inputs["source_avatar"], inputs["body_avatar"], settings.keyframes)
-    return {"collider": carry(body, motion)}
+    return {"collider": transfer_motion(body, motion)}
 
 
 def _grade(inputs: Inputs, settings: GradeConfig, job: Job) -> Outputs:
@@ -63,7 +63,7 @@ def _drape(inputs: Inputs, settings: DrapeConfig, job: Job) -> Outputs:
 STAGES: tuple[Stage, ...] = (
     Stage(
         name="morph",
-        about="a body that turns from what the garment was on into the customer",
+        about="a body that morphs from the source body into the customer",
         needs=("avatar",),
         optional=("source_avatar",),
         makes=("collider",),
@@ -72,7 +72,7 @@ STAGES: tuple[Stage, ...] = (
     ),
     Stage(
         name="mesh.morph",
-        about="a body mesh as it is, into which what the garment was on turns if that is known",
+        about="the body mesh as given; the source body, if known, morphs into it",
         needs=("body_mesh",),
         optional=("source_avatar", "body_avatar"),
         makes=("collider",),

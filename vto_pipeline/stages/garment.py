@@ -1,4 +1,4 @@
-"""From a scanned surface to a garment that can be simulated."""
+"""Stages from a scanned surface to a garment ready for simulation."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from vto_pipeline.cloth.rest_shape import RestShapeConfig, rest_shape
+from vto_pipeline.cloth.rest_shape.from_hanging import RestShapeConfig, rest_shape
 from vto_pipeline.garment.align import AlignConfig, align_to_mannequin
 from vto_pipeline.garment.openings import OpeningsConfig, close_scan_holes, list_openings
 from vto_pipeline.garment.simulation_mesh import SimulationMeshConfig, remesh_for_simulation
 from vto_pipeline.garment.subtract import SubtractConfig, extract_garment, label_garment
-from vto_pipeline.geometry.repair import RepairConfig, repair
+from vto_pipeline.garment.wearable import check_wearable
+from vto_pipeline.geometry.remeshing.repair import RepairConfig, repair
 from vto_pipeline.geometry.rigid import moved
 from vto_pipeline.model.garment import SurfaceLabels
 from vto_pipeline.model.job import Job
@@ -33,9 +34,9 @@ def _subtract(inputs: Inputs, settings: SubtractConfig, job: Job) -> Outputs:
         surface = moved(surface, inputs["garment_placement"])
         labels = label_garment(surface, inputs["mannequin_surface"], settings, job)
     else:
-        job.leave_out("subtraction", "no mannequin was given: all of the scan is garment")
+        job.leave_out("subtraction", "no mannequin was given: the whole scan is garment")
         everything = np.ones(len(surface.vertices), dtype=bool)
-        labels = SurfaceLabels(everything, everything, everything.astype(float))
+        labels = SurfaceLabels(everything, everything.astype(float))
     return {"labels": labels, "garment_shell": extract_garment(surface, labels, settings, job)}
 
 
@@ -49,6 +50,7 @@ def _openings(inputs: Inputs, settings: OpeningsConfig, job: Job) -> Outputs:
 def _take_mesh(inputs: Inputs, settings: RepairConfig, job: Job) -> Outputs:
     garment = repair(inputs["garment_mesh"], settings, job)
     openings = list_openings(garment)
+    check_wearable(garment, openings)
     job.measure(openings=len(openings), vertices=len(garment.vertices))
     return {"garment": garment, "openings": openings, "observed": np.ones(len(garment.vertices), dtype=bool)}
 
@@ -63,14 +65,14 @@ def _rest_shape(inputs: Inputs, settings: RestShapeConfig, job: Job) -> Outputs:
 
 
 def _without_body(settings: RestShapeConfig) -> tuple[str, ...]:
-    """What the rest shape is not found from when it is taken as scanned: another fabric then re-uses it."""
+    """Inputs that the rest shape ignores when taken as scanned, so that another fabric reuses it."""
     return ("mannequin_surface", "fabric") if settings.mode == "as_scanned" else ()
 
 
 STAGES: tuple[Stage, ...] = (
     Stage(
         name="align",
-        about="where the mannequin stands in the garment's scan (robust ICP on its bare parts)",
+        about="the scan aligned to the mannequin (robust ICP on its bare parts)",
         needs=("garment_surface", "mannequin_surface"),
         makes=("garment_placement",),
         run=_align,
@@ -79,7 +81,7 @@ STAGES: tuple[Stage, ...] = (
     ),
     Stage(
         name="subtract",
-        about="what is garment and what is mannequin (graph cut)",
+        about="the scan split into garment and mannequin (graph cut)",
         needs=("garment_surface",),
         optional=("mannequin_surface", "garment_placement"),
         makes=("labels", "garment_shell"),
@@ -108,7 +110,7 @@ STAGES: tuple[Stage, ...] = (
     ),
     Stage(
         name="simulation_mesh",
-        about="even triangles of the size the simulation wants",
+        about="the garment in even triangles, for simulation",
         needs=("garment",),
         makes=("sim_mesh",),
         run=_simulation_mesh,
@@ -117,7 +119,7 @@ STAGES: tuple[Stage, ...] = (
     ),
     Stage(
         name="rest_shape",
-        about="what the cloth would be without forces",
+        about="the shape of the cloth without forces",
         needs=("sim_mesh",),
         optional=("mannequin_surface", "fabric"),
         idle=_without_body,

@@ -13,10 +13,10 @@ from typing import Any
 
 from vto_pipeline.assess.allowance import known_kinds
 from vto_pipeline.cloth.drape_config import DrapeConfig
-from vto_pipeline.cloth.layers import drape_layers
-from vto_pipeline.errors import ConfigError
+from vto_pipeline.cloth.outfit.layers import drape_layers
+from vto_pipeline.errors import ConfigError, FormatError
 from vto_pipeline.io.documents import Document
-from vto_pipeline.io.fabric_assumed import told
+from vto_pipeline.io.fabric_formats.assumed import told
 from vto_pipeline.model.artifact import ArtifactKind
 from vto_pipeline.model.garment import Garment
 from vto_pipeline.model.job import Job
@@ -63,20 +63,23 @@ def garment_names(document: Document) -> tuple[str, ...]:
         raise ConfigError("given.garment and given.garments: give one or the other", where=where)
     if not isinstance(garments, Mapping) or not garments:
         hint = "as in garments: {trousers: {mesh: trousers.ply}, shirt: {mesh: shirt.ply}}, inner first"
-        raise ConfigError(f"given.garments: wanted names of garments (got {garments!r})", where=where, hint=hint)
+        raise ConfigError(f"given.garments: expected named garments (got {garments!r})", where=where, hint=hint)
     for name in garments:
         if not isinstance(name, str) or not _NAME.fullmatch(name):
             raise ConfigError(
-                f"given.garments: {name!r} is no name for a garment",
+                f"given.garments: {name!r} is not a valid garment name",
                 where=document.where(("given", "garments", str(name))),
-                hint="small letters, digits and _, a letter first",
+                hint="use lower-case letters, digits and _, with a letter first",
             )
     return tuple(garments)
 
 
 def names_in_run(record: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the names of the garments of a run, inner first, from what run.json holds; none where it had one."""
-    rows = [str(stage["name"]).rpartition(".") for stage in record["stages"]]
+    try:
+        rows = [str(stage["name"]).rpartition(".") for stage in record["stages"]]
+    except (KeyError, TypeError):
+        raise FormatError("run.json holds no stages by name", hint="run the document again") from None
     return tuple(name for name, _, row in rows if name and row == "take_mesh")
 
 
@@ -119,7 +122,7 @@ def outfit_tables(tables: Catalogue, names: Sequence[str]) -> Catalogue:
     taken = [kind.name for kind in (*own, *rest)]
     twins = sorted({artifact for artifact in taken if taken.count(artifact) > 1})
     if twins:
-        raise ConfigError(f"given.garments: {twins[0]} would stand for two things", hint="name the garments otherwise")
+        raise ConfigError(f"given.garments: {twins[0]} would be ambiguous", hint="rename a garment")
     rows: list[Stage] = []
     for stage in tables.stages:
         if stage.name in _OWN_ROWS:
@@ -149,7 +152,7 @@ def document_schema(tables: Catalogue) -> dict[str, Any]:
         "minProperties": 1,
         "propertyNames": {"pattern": f"^{_NAME.pattern}$"},
         "additionalProperties": {"$ref": "#/$defs/Garment"},
-        "description": "In place of garment: several by name, worn one over the other, inner first.",
+        "description": "Instead of garment: several garments by name, worn in layers, innermost first.",
     }
     return schema
 
@@ -207,7 +210,7 @@ def _drape_row(stage: Stage, names: Sequence[str]) -> Stage:
 
     return replace(
         stage,
-        about="the garments at rest on the body, one over the other",
+        about="the garments at rest on the body, in layers",
         needs=(*needs, "collider"),
         makes=(*(_own("draped", name) for name in names), "audit", "trace"),
         run=run,

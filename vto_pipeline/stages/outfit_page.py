@@ -1,4 +1,4 @@
-"""The page of several garments: shown together, judged one by one."""
+"""The page of several garments: shown together, assessed one by one."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from vto_pipeline.geometry.topology import concatenate
 from vto_pipeline.model.job import Job
-from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.render import GlbPart
 from vto_pipeline.model.settings import Config
 from vto_pipeline.pipeline.stage import Stage
@@ -37,7 +37,7 @@ def outfit_page(stage: Stage, names: Sequence[str]) -> Stage:
             if artifact in inputs:
                 found[part][name] = inputs[artifact]
         if found["draped"]:
-            parts["draped"] = _joined(list(found["draped"].values()))
+            parts["draped"] = concatenate(list(found["draped"].values()))
         if found["fit_maps"] and found["fit_maps"].keys() == found["draped"].keys():
             maps = list(found["fit_maps"].values())
             parts["fit_maps"] = {key: np.concatenate([one[key] for one in maps]) for key in maps[0]}
@@ -51,12 +51,6 @@ def outfit_page(stage: Stage, names: Sequence[str]) -> Stage:
         return stage.run(parts, settings, job)
 
     return replace(stage, optional=(*_SHARED, *own), run=run)
-
-
-def _joined(meshes: Sequence[TriangleMesh]) -> TriangleMesh:
-    first = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
-    faces = [mesh.faces + at for mesh, at in zip(meshes, first[:-1], strict=True)]
-    return TriangleMesh(np.vstack([mesh.vertices for mesh in meshes]), np.vstack(faces).astype(np.int32))
 
 
 def _told_apart(part: GlbPart, name: str, names: Sequence[str]) -> GlbPart:

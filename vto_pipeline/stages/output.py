@@ -1,4 +1,4 @@
-"""What people look at: the render mesh, the fit report, the page."""
+"""Stages of the output: render mesh, fit report, page."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from vto_pipeline.assess.fit import FitConfig, assess_fit
-from vto_pipeline.avatar.measure import fit_levels
-from vto_pipeline.avatar.regions import trunk
+from vto_pipeline.avatar.measuring.avatar_measurements import fit_levels
+from vto_pipeline.avatar.template.regions import trunk
 from vto_pipeline.cloth.judge.worn import vertex_maps
 from vto_pipeline.geometry.topology import face_area_vectors
 from vto_pipeline.model.job import Job
@@ -32,7 +32,7 @@ def _assess(inputs: Inputs, settings: FitConfig, job: Job) -> Outputs:
     body: TriangleMesh = inputs["collider"].final
     avatar = inputs.get("avatar")
     if avatar is None:
-        job.leave_out("ease at chest, waist and hip", "a bare mesh does not say where these are; fit an avatar to it")
+        job.leave_out("ease at chest, waist and hip", "a plain mesh has no landmarks; fit an avatar to it")
     report, maps = assess_fit(
         inputs["draped"],
         inputs["worn_rest"].positions,
@@ -84,7 +84,7 @@ STAGES: tuple[Stage, ...] = (
     ),
     Stage(
         name="assess",
-        about="ease, stretch and clearance: does it fit",
+        about="ease, stretch and clearance of the garment",
         needs=("draped", "worn_rest", "collider", "fabric"),
         optional=("avatar", "garment", "observed"),
         makes=("fit_report", "fit_maps"),

@@ -7,11 +7,11 @@ from typing import Any
 
 from vto_pipeline.model.job import Job
 from vto_pipeline.pipeline.stage import Stage
+from vto_pipeline.scan.depth.odometry import OdometryConfig, estimate_trajectory
 from vto_pipeline.scan.fuse import FuseConfig, fuse_depth_frames, fuse_depth_maps
-from vto_pipeline.scan.odometry import OdometryConfig, estimate_trajectory
-from vto_pipeline.scan.scale import ScaleConfig, apply_board
-from vto_pipeline.scan.sfm import SfmConfig, estimate_cameras
-from vto_pipeline.scan.stereo import StereoConfig, estimate_depth_maps
+from vto_pipeline.scan.photos.scale import ScaleConfig, apply_board
+from vto_pipeline.scan.photos.sfm import SfmConfig, estimate_cameras
+from vto_pipeline.scan.photos.stereo import StereoConfig, estimate_depth_maps
 from vto_pipeline.scan.surface import SurfaceConfig, reconstruct_cloud
 from vto_pipeline.stages.roles import for_each_role
 
@@ -34,7 +34,8 @@ def _stereo(inputs: Inputs, settings: StereoConfig, job: Job) -> Outputs:
 
 
 def _fuse_photos(inputs: Inputs, settings: FuseConfig, job: Job) -> Outputs:
-    return {"surface": fuse_depth_maps(inputs["photos"], inputs["depth_maps"], settings, job)}
+    photos, cameras, maps = (inputs[name] for name in ("photos", "cameras", "depth_maps"))
+    return {"surface": fuse_depth_maps(photos, cameras, maps, settings, job)}
 
 
 def _odometry(inputs: Inputs, settings: OdometryConfig, job: Job) -> Outputs:
@@ -52,7 +53,7 @@ def _poisson(inputs: Inputs, settings: SurfaceConfig, job: Job) -> Outputs:
 STAGES: tuple[Stage, ...] = (
     *for_each_role(
         "sfm",
-        "where the photos were taken, up to scale (structure from motion)",
+        "camera poses of the photos, up to scale (structure from motion)",
         needs=("photos",),
         makes=("sparse",),
         run=_sfm,
@@ -61,7 +62,7 @@ STAGES: tuple[Stage, ...] = (
     ),
     *for_each_role(
         "scale",
-        "metres and the floor, from the printed board",
+        "scale and floor, from the printed board",
         needs=("photos", "sparse"),
         makes=("cameras", "points"),
         run=_scale,
@@ -70,7 +71,7 @@ STAGES: tuple[Stage, ...] = (
     ),
     *for_each_role(
         "stereo",
-        "a depth map per photo that its neighbours agree on",
+        "a depth map for each photo, checked against its neighbours",
         needs=("photos", "cameras", "points"),
         makes=("depth_maps",),
         run=_stereo,
@@ -80,7 +81,7 @@ STAGES: tuple[Stage, ...] = (
     *for_each_role(
         "fuse_photos",
         "one surface from the depth maps",
-        needs=("photos", "depth_maps"),
+        needs=("photos", "cameras", "depth_maps"),
         makes=("surface",),
         run=_fuse_photos,
         settings=FuseConfig,
@@ -88,7 +89,7 @@ STAGES: tuple[Stage, ...] = (
     ),
     *for_each_role(
         "odometry",
-        "where the depth frames were taken",
+        "camera poses of the depth frames",
         needs=("depth",),
         makes=("trajectory",),
         run=_odometry,
@@ -106,7 +107,7 @@ STAGES: tuple[Stage, ...] = (
     ),
     *for_each_role(
         "poisson",
-        "a surface through a cloud of points, trimmed where there are none",
+        "a surface through the point cloud, trimmed where there are no points",
         needs=("cloud",),
         makes=("surface",),
         run=_poisson,

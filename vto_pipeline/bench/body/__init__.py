@@ -1,4 +1,11 @@
-"""Bodies from a scan, naked or dressed, from a tape, from two outlines, extreme ones; and the measure's noise floor."""
+"""Bench of bodies: from scans, naked or dressed, from a tape, from two outlines; extremes, and the noise floor.
+
+people: people whose true body is known
+scans, clothed, extremes, coverage, repeats: bodies from scans
+measurements, silhouettes: bodies from a tape and from two photos
+slices: an independent tape on plane sections
+iso20685: the limits of ISO 20685
+"""
 
 from __future__ import annotations
 

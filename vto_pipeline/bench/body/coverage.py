@@ -1,18 +1,17 @@
-"""Whether the uncertainties of a scanned body are true: how often 95 % intervals hold what was measured on the body."""
+"""Coverage of the uncertainties of a scanned body: how often 95 % intervals hold the truth."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from vto_pipeline.avatar.definitions import DEFINITIONS
 from vto_pipeline.avatar.from_scan import ScanConfig, fit_scan
 from vto_pipeline.avatar.measure import measure
+from vto_pipeline.avatar.measuring.definitions import DEFINITIONS
 from vto_pipeline.bench.bench import Measured, Row, Value, Watch
 from vto_pipeline.bench.body.people import as_standing, cloud_of, person
-from vto_pipeline.bench.timing import Timing
+from vto_pipeline.bench.timing import Timing, clocked
 from vto_pipeline.model.body import Measurements
 from vto_pipeline.model.job import Job
 from vto_pipeline.scan.surface import SurfaceConfig, reconstruct_cloud
@@ -25,7 +24,7 @@ _KINDS = {
     "heights": ("height",),
     "lengths": ("path", "span", "drop"),
 }
-_TOLD = ("neck", "chest", "waist", "navel", "hip", "thigh", "knee", "calf", "ankle")
+_GIRTHS = ("neck", "chest", "waist", "navel", "hip", "thigh", "knee", "calf", "ankle")
 
 
 def coverage_rows(quick: bool, watch: Watch) -> Iterator[Row]:
@@ -40,14 +39,13 @@ def _covered(count: int, config: ScanConfig) -> Measured:
         sex = ("female", "male")[k % 2]
         body = person(sex, _FIRST_SEED + k)
         scan = reconstruct_cloud(cloud_of(body, _FIRST_SEED + k), SurfaceConfig.model_validate({}), Job())
-        began = time.perf_counter()
-        found = measure(fit_scan(scan, config))
-        seconds.append(time.perf_counter() - began)
-        pairs.append((found, measure(as_standing(body)).values))
-    return Timing(float(np.median(seconds)), count), told(pairs)
+        fitted, taken = clocked(fit_scan, scan, config)
+        seconds.append(taken)
+        pairs.append((measure(fitted), measure(as_standing(body)).values))
+    return Timing(float(np.median(seconds)), count), interval_errors(pairs)
 
 
-def told(pairs: Sequence[tuple[Measurements, Mapping[str, float]]]) -> dict[str, Value]:
+def interval_errors(pairs: Sequence[tuple[Measurements, Mapping[str, float]]]) -> dict[str, Value]:
     """Return by kind the share of true values inside their 95 % intervals, and errors beside half intervals [mm].
 
     Args:
@@ -60,7 +58,7 @@ def told(pairs: Sequence[tuple[Measurements, Mapping[str, float]]]) -> dict[str,
         f"{label}_inside_share": float(np.mean([inside[n] for n, what in DEFINITIONS.items() if what.kind in kinds]))
         for label, kinds in _KINDS.items()
     }
-    for row in _TOLD:
+    for row in _GIRTHS:
         name = f"{row}_girth"
         out[f"{name}_rms_mm"] = 1e3 * float(np.sqrt(np.mean(wrong[name] ** 2)))
         out[f"{name}_interval_mm"] = 1e3 * float(np.sqrt(np.mean(half[name] ** 2)))

@@ -1,8 +1,7 @@
-"""People and scans at the edge: an answer with its uncertainty, a warning or a refusal, but no silent absurdity."""
+"""Extreme people and scans: each must give an answer with its uncertainty, a warning or a refusal."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -10,11 +9,11 @@ import numpy as np
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.from_scan import ScanConfig, fit_scan
 from vto_pipeline.avatar.measure import measure
-from vto_pipeline.avatar.pose import pose_avatar
-from vto_pipeline.avatar.template import membership
+from vto_pipeline.avatar.model.pose import pose_avatar
+from vto_pipeline.avatar.template.template import JOINT_KINDS, membership
 from vto_pipeline.bench.bench import Measured, Row, Value, Watch
 from vto_pipeline.bench.body.people import person
-from vto_pipeline.bench.timing import Timing
+from vto_pipeline.bench.timing import Timing, clocked
 from vto_pipeline.errors import AvatarError
 from vto_pipeline.geometry.topology import submesh
 from vto_pipeline.model.body import Avatar, Measurements
@@ -41,9 +40,8 @@ def extreme_rows(quick: bool, watch: Watch) -> Iterator[Row]:
 
 
 def _from_tape(tape: Measurements) -> Measured:
-    job, began = Job(), time.perf_counter()
-    body = fit_measurements(tape, None, job)
-    seconds = time.perf_counter() - began
+    job = Job()
+    body, seconds = clocked(fit_measurements, tape, None, job)
     read = measure(body)
     away: dict[str, Value] = {
         "stature_mm": 1e3 * abs(read.values["stature"] - tape.values["stature"]),
@@ -55,12 +53,12 @@ def _from_tape(tape: Measurements) -> Measured:
 
 def _from_scan(scan: Callable[[Avatar], TriangleMesh]) -> Measured:
     body = person("female", 0)
-    job, began = Job(), time.perf_counter()
+    job, config = Job(), ScanConfig.model_validate({"sex": "female"})
     try:
-        read = measure(fit_scan(scan(body), ScanConfig.model_validate({"sex": "female"}), job))
+        fitted, seconds = clocked(fit_scan, scan(body), config, job)
     except AvatarError:
-        return Timing(time.perf_counter() - began, 1), {"outcome": "refused"}
-    seconds, true = time.perf_counter() - began, measure(body).values
+        return Timing(0.0), {"outcome": "refused"}
+    read, true = measure(fitted), measure(body).values
     away = {name: abs(read.values[name] - true[name]) for name in true if name.endswith("_girth")}
     return Timing(seconds, 1), {
         "outcome": "answered",
@@ -78,6 +76,5 @@ def _one_armed(body: Avatar) -> TriangleMesh:
 
 def _crouched(body: Avatar) -> TriangleMesh:
     pose = body.pose.copy()
-    for k, name in enumerate(body.joint_names):
-        pose[k, 0] += _CROUCH_RAD.get(name.rpartition("_")[2], 0.0)
+    pose[:, 0] += [_CROUCH_RAD.get(kind, 0.0) for kind in JOINT_KINDS]
     return pose_avatar(body, pose, body.translation).mesh

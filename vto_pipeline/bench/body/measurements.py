@@ -1,18 +1,17 @@
-"""From four measurements of a tape to a body: whether it has them, and what it makes of all others."""
+"""A body from four tape measurements: whether it meets them, and the errors of all others."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 
 import numpy as np
 
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.measure import measure
-from vto_pipeline.avatar.population import population
+from vto_pipeline.avatar.measuring.population import population
 from vto_pipeline.bench.bench import Measured, Row, Watch
 from vto_pipeline.bench.body.people import ASKED, drawn
-from vto_pipeline.bench.timing import Timing
+from vto_pipeline.bench.timing import Timing, clocked
 from vto_pipeline.model.body import Measurements
 
 
@@ -38,9 +37,8 @@ def _people(sex: str, count: int) -> Measured:
     average = dict(zip(population(sex).names, population(sex).mean, strict=True))
     for seed in range(count):
         true = drawn(sex, seed).values
-        began = time.perf_counter()
-        body = fit_measurements(_asked(sex, seed))
-        seconds.append(time.perf_counter() - began)
+        body, taken = clocked(fit_measurements, _asked(sex, seed))
+        seconds.append(taken)
         read = measure(body).values
         asked.append(max(abs(read[name] - true[name]) for name in ASKED))
         rest = [name for name in true if name not in ASKED and name != "mass"]

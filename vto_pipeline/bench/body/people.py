@@ -1,4 +1,4 @@
-"""People whose true body is known: drawn from the population, posed at random, scanned with noise, outliers, holes."""
+"""People whose true body is known: drawn from the population, posed at random, scanned with errors."""
 
 from __future__ import annotations
 
@@ -7,16 +7,17 @@ from dataclasses import replace
 import numpy as np
 
 from vto_pipeline.avatar.from_measurements import fit_measurements
-from vto_pipeline.avatar.population import population
-from vto_pipeline.avatar.pose import pose_avatar
-from vto_pipeline.avatar.registration import Fit, model
-from vto_pipeline.avatar.settle import settle
-from vto_pipeline.avatar.shape import shape_space
-from vto_pipeline.avatar.stance import stance
+from vto_pipeline.avatar.measuring.population import population
+from vto_pipeline.avatar.model.fit import Fit, model
+from vto_pipeline.avatar.model.pose import pose_avatar
+from vto_pipeline.avatar.model.shape import shape_space
+from vto_pipeline.avatar.model.stance import stance
+from vto_pipeline.avatar.scan.bind_pose import to_bind_pose
+from vto_pipeline.avatar.template.template import JOINT_KINDS
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Avatar, Measurements
-from vto_pipeline.model.mesh import PointCloud
+from vto_pipeline.model.mesh import PointCloud, TriangleMesh
 
 ASKED = ("stature", "chest_girth", "waist_girth", "hip_girth")
 """What a tape is put to; the population says the rest."""
@@ -48,9 +49,7 @@ def person(sex: str, seed: int) -> Avatar:
     known = drawn(sex, seed)
     body = fit_measurements(Measurements({name: known.values[name] for name in ASKED}, sex=sex))
     rng = np.random.default_rng(seed)
-    pose = np.zeros((len(body.joints), 3))
-    for k, name in enumerate(body.joint_names):
-        pose[k] = rng.normal(0.0, _SPREAD_RAD.get(name.rpartition("_")[2], 0.0), 3)
+    pose = np.array([rng.normal(0.0, _SPREAD_RAD.get(kind, 0.0), 3) for kind in JOINT_KINDS])
     pose[0] = [0.0, rng.uniform(-np.pi, np.pi), 0.0]
     return pose_avatar(body, pose, np.array([rng.normal(0.0, 0.3), 0.0, rng.normal(0.0, 0.3)]))
 
@@ -62,7 +61,23 @@ def as_standing(body: Avatar) -> Avatar:
     fit = Fit(parameters, body.pose, np.zeros(3), parameters)
     # the space's own skeleton hangs a little lower than the body's, whose soles are on the floor
     fit = replace(fit, translation=(body.vertices - model(space, fit)).mean(axis=0))
-    return settle(space, fit, stance(space, fit), body.vertices, body.vertices)[0]
+    return to_bind_pose(space, fit, stance(space, fit), body.vertices, body.vertices)[0]
+
+
+def first_hits(mesh: TriangleMesh, rays: FloatArray) -> FloatArray:
+    """Return where rays first meet a mesh, in lengths of their direction; infinite where they do not.
+
+    Args:
+        mesh: [m].
+        rays: Origin and direction, shape (..., 6).
+    """
+    import open3d as o3d
+
+    scene = o3d.t.geometry.RaycastingScene()
+    corners, faces = mesh.vertices.astype(np.float32), mesh.faces.astype(np.uint32)
+    scene.add_triangles(o3d.core.Tensor.from_numpy(corners), o3d.core.Tensor.from_numpy(faces))
+    hit: FloatArray = scene.cast_rays(o3d.core.Tensor.from_numpy(rays.astype(np.float32)))["t_hit"].numpy()
+    return hit
 
 
 def cloud_of(

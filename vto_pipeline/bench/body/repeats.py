@@ -1,18 +1,18 @@
-"""The noise floor: the same body scanned again and again, and how much what is measured on it varies."""
+"""The noise floor: the spread of measurements over repeated scans of one body."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from vto_pipeline.avatar.from_scan import ScanConfig, fit_scan
 from vto_pipeline.avatar.measure import measure
 from vto_pipeline.bench.bench import Measured, Row, Watch
 from vto_pipeline.bench.body.iso20685 import CLASSES, LIMITS_MM
 from vto_pipeline.bench.samples.customer import make_customer
-from vto_pipeline.bench.timing import Timing
+from vto_pipeline.bench.timing import Timing, clocked
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -42,9 +42,7 @@ def repeat_rows(quick: bool, watch: Watch) -> Iterator[Row]:
 
 def _again(body: TriangleMesh, config: ScanConfig, seed: int) -> tuple[dict[str, float], float]:
     rng = np.random.default_rng(seed)
-    cos, sin = np.cos(angle := rng.uniform(-np.pi, np.pi)), np.sin(angle)
-    turn = np.array([[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]])
+    turn = Rotation.from_rotvec([0.0, rng.uniform(-np.pi, np.pi), 0.0]).as_matrix()
     scan = TriangleMesh(body.vertices @ turn.T + rng.normal(0.0, _JITTER_M, body.vertices.shape), body.faces)
-    began = time.perf_counter()
-    fitted = fit_scan(scan, config, Job(seed=seed))
-    return dict(measure(fitted).values), time.perf_counter() - began
+    fitted, seconds = clocked(fit_scan, scan, config, Job(seed=seed))
+    return dict(measure(fitted).values), seconds

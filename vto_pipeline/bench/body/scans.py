@@ -1,4 +1,4 @@
-"""How near a registration comes to a body that is known, against its run time: by points used and stiffness levels."""
+"""Error of a registration to a known body against run time, by points used and stiffness levels."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vto_pipeline.avatar.correspondence import closest_points
 from vto_pipeline.avatar.from_scan import ScanConfig, fit_scan
 from vto_pipeline.avatar.measure import measure
-from vto_pipeline.avatar.template import beyond_armscye
+from vto_pipeline.avatar.template.template import beyond_armscye
 from vto_pipeline.bench.bench import Measured, Row, Value, Watch
 from vto_pipeline.bench.body.people import cloud_of, person
 from vto_pipeline.bench.body.slices import TRUNK, girth_errors
 from vto_pipeline.bench.samples.customer import make_customer
 from vto_pipeline.bench.timing import timed
+from vto_pipeline.geometry.closest import closest_points
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh

@@ -1,8 +1,7 @@
-"""From a front and a side picture to girths: error and interval, against stature alone."""
+"""Girths from a front and a side picture: error and interval, compared with stature alone."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,13 +11,14 @@ import numpy as np
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.from_silhouettes import SilhouettesConfig, fit_silhouettes
 from vto_pipeline.avatar.measure import measure
-from vto_pipeline.avatar.population import complete
-from vto_pipeline.avatar.pose import named_pose, pose_avatar
-from vto_pipeline.avatar.tape import DENSITY_KG_M3
+from vto_pipeline.avatar.measuring.population import complete
+from vto_pipeline.avatar.measuring.tape import mass_reading
+from vto_pipeline.avatar.model.pose import named_pose, pose_avatar
+from vto_pipeline.avatar.template.template import JOINT_KINDS
 from vto_pipeline.bench.bench import Measured, Row, Watch
-from vto_pipeline.bench.body.people import drawn
+from vto_pipeline.bench.body.people import drawn, first_hits
 from vto_pipeline.bench.samples.customer import make_customer, measure_truth
-from vto_pipeline.bench.timing import Timing
+from vto_pipeline.bench.timing import Timing, clocked
 from vto_pipeline.geometry.topology import vertex_normals
 from vto_pipeline.model.arrays import ByteArray
 from vto_pipeline.model.body import Measurements
@@ -88,12 +88,8 @@ def _foreign() -> Person:
     truth = measure_truth(body).values
     tall = float(np.ptp(body.vertices[:, 1]))
     girths = {"chest_girth": truth["bust_girth"], "waist_girth": truth["waist_girth"], "hip_girth": truth["hip_girth"]}
-    return Person("female", body, 2.5, _LENS_M, girths | {"stature": tall, "mass": DENSITY_KG_M3 * _volume(body)})
-
-
-def _volume(body: TriangleMesh) -> float:
-    a, b, c = (body.vertices[body.faces[:, k]] for k in range(3))
-    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
+    mass = mass_reading(body.vertices, body.faces).value
+    return Person("female", body, 2.5, _LENS_M, girths | {"stature": tall, "mass": mass})
 
 
 def _someone(sex: str, seed: int) -> Person:
@@ -104,7 +100,7 @@ def _someone(sex: str, seed: int) -> Person:
     away = np.linalg.norm(skin[:, None] - skin[rng.choice(len(skin), _BUMPS, replace=False)], axis=2)
     height = (np.exp(-((away / rng.uniform(*_BUMP_M, _BUMPS)) ** 2)) * rng.normal(0.0, _BUMP_HEIGHT_M, _BUMPS)).sum(1)
     body = replace(body, bind_vertices=skin + height[:, None] * vertex_normals(TriangleMesh(skin, body.faces)))
-    loose = [_LOOSE_RAD.get(name.rpartition("_")[2], 0.0) for name in body.joint_names]
+    loose = [_LOOSE_RAD.get(kind, 0.0) for kind in JOINT_KINDS]
     turns = named_pose(body, "a_pose").pose + rng.normal(0.0, 1.0, (len(loose), 3)) * np.array(loose)[:, None]
     mesh = pose_avatar(body, turns, np.zeros(3)).mesh
     floor = np.array([0.0, mesh.vertices[:, 1].min(), 0.0])
@@ -122,14 +118,8 @@ def photograph(body: TriangleMesh, yaw: float, distance: float, seed: int, lens:
         seed: Of the noise.
         lens: Height of the pinhole [m].
     """
-    import open3d as o3d
-
     cos, sin = np.cos(yaw), np.sin(yaw)
     turned = body.vertices @ np.array([[cos, 0.0, -sin], [0.0, 1.0, 0.0], [sin, 0.0, cos]])
-    scene = o3d.t.geometry.RaycastingScene()
-    scene.add_triangles(
-        o3d.core.Tensor.from_numpy(turned.astype(np.float32)), o3d.core.Tensor.from_numpy(body.faces.astype(np.uint32))
-    )
     stature = float(np.ptp(body.vertices[:, 1]))
     focal = 0.85 * _HEIGHT * (distance - 0.2) / stature
     column, row = np.meshgrid(np.arange(_WIDTH) + 0.5, np.arange(_HEIGHT) + 0.5)
@@ -137,8 +127,7 @@ def photograph(body: TriangleMesh, yaw: float, distance: float, seed: int, lens:
     across = (column - 0.5 * _WIDTH) / focal
     ahead = np.stack([across, up, -np.ones_like(up)], axis=2)
     eye = np.broadcast_to([0.0, lens, distance], ahead.shape)
-    rays = np.concatenate([eye, ahead], axis=2).astype(np.float32)
-    hit = np.isfinite(scene.cast_rays(o3d.core.Tensor.from_numpy(rays))["t_hit"].numpy())
+    hit = np.isfinite(first_hits(TriangleMesh(turned, body.faces), np.concatenate([eye, ahead], axis=2)))
     grey = np.where(hit, _BODY, _BACKDROP)[:, :, None] + np.random.default_rng(seed).normal(
         0.0, _NOISE, (_HEIGHT, _WIDTH, 3)
     )
@@ -150,9 +139,8 @@ def _people(people: list[Person]) -> Measured:
     for k, one in enumerate(people):
         job, config = Job(), SilhouettesConfig.model_validate({"sex": one.sex})
         front, side = (photograph(one.body, yaw, one.distance, k, one.lens) for yaw in (0.0, np.pi / 2))
-        began = time.perf_counter()
-        fit_silhouettes(Silhouettes(Path("front"), Path("side"), one.true["stature"]), front, side, config, job)
-        seconds.append(time.perf_counter() - began)
+        names = Silhouettes(Path("front"), Path("side"), one.true["stature"])
+        seconds.append(clocked(fit_silhouettes, names, front, side, config, job)[1])
         guess = complete(Measurements({name: one.true[name] for name in ("stature", "mass")}, sex=one.sex)).values
         read = [float(str(job.metrics[f"{name}_m"])) - one.true[name] for name in GIRTHS]
         half = [float(str(job.metrics[f"{name}_interval_mm"])) * 1e-3 for name in GIRTHS]

@@ -1,4 +1,4 @@
-"""A second tape that knows nothing of our topology: the convex hull of a plane section of any mesh, by trimesh."""
+"""An independent tape: the convex hull of a plane section of any mesh, by trimesh."""
 
 from __future__ import annotations
 

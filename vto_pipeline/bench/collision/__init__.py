@@ -1,4 +1,12 @@
-"""Collision: queries, broad phase, scenes of self-contact, what is left out, bad starts, and friction."""
+"""Collision: queries, broad phase, scenes of self-contact, work left out, bad starts, and friction.
+
+known_queries, queries: continuous tests whose answer is known
+broad: the broad phase against size
+sheets, contact_scene, scenes, penetration: scenes of self-contact, and what is measured on them
+bad_starts, untangling: tangled starts, and what is left of them
+friction, capstan, stick_slip: closed forms of friction
+left_out: what leaving work out saves
+"""
 
 from __future__ import annotations
 

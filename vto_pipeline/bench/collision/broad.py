@@ -1,4 +1,4 @@
-"""The broad phase: pairs and time of one search against size, and the proof that makes a search needless."""
+"""The broad phase: pairs and time of one search against size, and the proof that skips it."""
 
 from __future__ import annotations
 
@@ -9,19 +9,18 @@ from typing import NamedTuple
 import numpy as np
 
 from vto_pipeline.bench.bench import Measured, Row, Value, Watch
+from vto_pipeline.bench.cloth.scenes import FRICTION
 from vto_pipeline.bench.collision.sheets import square
-from vto_pipeline.bench.scaling import growth
-from vto_pipeline.bench.scenes import FRICTION
+from vto_pipeline.bench.scaling.sizes import power_law
 from vto_pipeline.bench.timing import timed
-from vto_pipeline.cloth.collision.candidates import self_candidates
-from vto_pipeline.cloth.collision.features import Features, features
-from vto_pipeline.cloth.collision.pieces import pieces
-from vto_pipeline.cloth.collision.reach import reach
-from vto_pipeline.cloth.collision.self_contact import SelfContact
+from vto_pipeline.cloth.collision.self_collision.candidates import self_candidates
+from vto_pipeline.cloth.collision.self_collision.pieces import pieces
+from vto_pipeline.cloth.collision.self_collision.proximity_bound import reach
+from vto_pipeline.cloth.collision.self_collision.self_contact import SelfContact
+from vto_pipeline.cloth.collision.self_collision.surface_features import Features, features
 from vto_pipeline.model.arrays import FloatArray, IntArray
-from vto_pipeline.numerics import bvh
-from vto_pipeline.numerics.boxes import simplex_boxes, swept_boxes
-from vto_pipeline.numerics.spatial_hash import hashed
+from vto_pipeline.numerics.spatial import bvh
+from vto_pipeline.numerics.spatial.boxes import simplex_boxes, swept_boxes
 
 SIDE = 1.0  # [m]
 THICKNESS = 1e-3  # [m]
@@ -71,7 +70,7 @@ def _measure(prepare: Callable[[_Step], Search], make: Callable[[int], _Step], s
 
 
 def _exponent(rows: list[Row]) -> Row:
-    found = growth([row.vertices for row in rows], [row.seconds for row in rows])
+    found = power_law([row.vertices for row in rows], [row.seconds for row in rows])
     errors: dict[str, Value] = {"exponent": found.exponent, "exponent_uncertainty": found.uncertainty}
     last = rows[-1]
     return Row(last.scene, f"{last.method}, exponent", {"sizes": len(rows)}, last.vertices, 0.0, errors)
@@ -106,17 +105,6 @@ def _by_tree(step: _Step) -> Search:
     def search() -> dict[str, int]:
         bvh.refit_swept(tree, start, end, kinds.faces, radius)
         return {"pairs": sum(map(len, self_candidates(tree, kinds, start, end, radius)))}
-
-    return search
-
-
-def _by_hash(step: _Step) -> Search:
-    """Return a search with a hash table that is filled anew."""
-    kinds, start, end, radius = step
-
-    def search() -> dict[str, int]:
-        table = hashed(start, end, kinds.faces, radius)
-        return {"pairs": sum(map(len, self_candidates(table, kinds, start, end, radius)))}
 
     return search
 
@@ -173,7 +161,6 @@ def _by_proof(step: _Step) -> Search:
 
 _METHODS: dict[str, Callable[[_Step], Search]] = {
     "tree": _by_tree,
-    "hash": _by_hash,
     "brute force": _by_brute_force,
     "tree and narrow phase": _with_narrow_phase,
     "proof": _by_proof,

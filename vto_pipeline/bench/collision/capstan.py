@@ -1,4 +1,4 @@
-"""A strip over a drum with a weight at each end: how much heavier one must be to draw the other up."""
+"""The capstan: a strip over a drum with a weight at each end, and the ratio of weights at which it slips."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy as np
 from vto_pipeline.bench.physics.closed_forms import capstan
 from vto_pipeline.bench.physics.meshes import strip
 from vto_pipeline.cloth import Capsule
-from vto_pipeline.cloth.build import at_rest, build
-from vto_pipeline.cloth.materials import Materials
-from vto_pipeline.cloth.settings import checked
-from vto_pipeline.cloth.stepper import StepConfig, Stepper
+from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
+from vto_pipeline.cloth.model.build import at_rest, build
+from vto_pipeline.cloth.model.materials import Materials
+from vto_pipeline.cloth.model.settings import checked
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.mesh import TriangleMesh

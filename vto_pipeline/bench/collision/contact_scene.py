@@ -1,4 +1,4 @@
-"""A cloth that will meet itself, and what the last frame of it shows."""
+"""A scene in which cloth meets itself, and the figures of its last frame."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ import numpy as np
 
 from vto_pipeline.bench.bench import Value
 from vto_pipeline.bench.collision.penetration import penetration
+from vto_pipeline.bench.measures import edge_strain
+from vto_pipeline.cloth.judge.crossings import self_crossings
 from vto_pipeline.cloth.simulation import AnyCollider, Trajectory, simulate
-from vto_pipeline.geometry.intersections import self_intersections
-from vto_pipeline.geometry.topology import edges
+from vto_pipeline.geometry.topology import face_area_vectors
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.mesh import TriangleMesh
@@ -70,19 +71,17 @@ def contact_errors(scene: ContactScene, ended: Trajectory) -> dict[str, Value]:
     """
     x = ended.positions
     mesh = TriangleMesh(x, scene.mesh.faces)
-    ends = edges(mesh)
-    length, at_rest = (np.linalg.norm(p[ends[:, 1]] - p[ends[:, 0]], axis=1) for p in (x, scene.rest))
-    corners = scene.rest[scene.mesh.faces]
-    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    strain = edge_strain(x, scene.rest, mesh.faces)
+    area = np.linalg.norm(face_area_vectors(TriangleMesh(scene.rest, mesh.faces)), axis=1)
     mass = scene.fabric.areal_density * np.bincount(scene.mesh.faces.ravel(), np.repeat(area / 3.0, 3), len(x))
     moving = mass.copy()
     moving[list(scene.pinned)] = 0.0
     depths = [penetration(shape, mesh, scene.seconds) for shape in scene.colliders]
     return {
-        "crossings": len(self_intersections(mesh)),
+        "crossings": len(self_crossings(mesh)),
         "penetration_mm": 1e3 * max((found.deepest for found in depths), default=0.0),
         "wrong_side": sum(found.vertices for found in depths),
-        "rms_stretch": float(np.sqrt(np.mean((length / at_rest - 1.0) ** 2))),
+        "rms_stretch": float(np.sqrt(np.mean(strain**2))),
         "mean_height_m": float(mass @ x[:, 1] / mass.sum()),
         "kinetic_j": float(0.5 * moving @ (ended.velocities**2).sum(axis=1)),
     }

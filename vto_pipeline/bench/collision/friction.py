@@ -5,7 +5,6 @@ Errors are relative ("error_share"), with what is asked for beside them ("allowe
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
@@ -18,9 +17,8 @@ from vto_pipeline.bench.collision.scenes import LAYERS, pile
 from vto_pipeline.bench.collision.stick_slip import slipping_shortening
 from vto_pipeline.bench.physics.closed_forms import capstan, slide
 from vto_pipeline.bench.physics.elastica import slipping_strip
-from vto_pipeline.bench.timing import Timing
+from vto_pipeline.bench.timing import Timing, clocked
 from vto_pipeline.cloth import Plane, simulate
-from vto_pipeline.errors import ComputationError
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.units import GRAVITY
@@ -99,12 +97,8 @@ def _row(watch: Watch, scene: str, settings: Settings, friction: float, allowed:
 
 
 def _measured(error: Callable[[float], Mapping[str, float]], friction: float, allowed: float) -> Measured:
-    began = time.perf_counter()
-    try:
-        found: dict[str, Value] = {**error(friction), "allowed_share": allowed}
-    except ComputationError as failure:
-        found = {"status": failure.problem}
-    return Timing(time.perf_counter() - began), found
+    found, seconds = clocked(error, friction)
+    return Timing(seconds), {**found, "allowed_share": allowed}
 
 
 def _limit_error(settings: Settings, friction: float) -> dict[str, float]:
@@ -131,7 +125,7 @@ def _stick_slip_error(settings: Settings, friction: float) -> dict[str, float]:
 def _pile(count: int, seconds: float) -> Measured:
     """Five layers that have come to rest: how far the vertex that moves most moves in the seconds after."""
     scene = pile(count)
-    began = time.perf_counter()
-    before, after = (replace(scene, seconds=scene.seconds + more).run().positions for more in (0.0, seconds))
-    drift = float(np.linalg.norm(after - before, axis=1).max())
-    return Timing(time.perf_counter() - began), {"drift_mm": 1e3 * drift, "allowed_mm": 0.1}
+    before, first = clocked(scene.run)
+    after, second = clocked(replace(scene, seconds=scene.seconds + seconds).run)
+    drift = float(np.linalg.norm(after.positions - before.positions, axis=1).max())
+    return Timing(first + second), {"drift_mm": 1e3 * drift, "allowed_mm": 0.1}

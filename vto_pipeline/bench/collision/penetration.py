@@ -1,4 +1,4 @@
-"""How deep a cloth is in a collider, by formulas of their own."""
+"""Penetration depth of a cloth in a collider, by independent formulas."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vto_pipeline.cloth import Box, Capsule, Ellipsoid, MeshCollider, Moving, Plane, Sphere
-from vto_pipeline.cloth.collision.pose import pose
+from vto_pipeline.cloth.collision.shapes.pose import pose
 from vto_pipeline.cloth.simulation import AnyCollider
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.signed_distance import SurfaceDistance

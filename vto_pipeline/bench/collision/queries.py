@@ -1,4 +1,4 @@
-"""Continuous tests: missed, false, how early, and how many per second, beside Tight-Inclusion.
+"""Continuous tests: missed, false, how early, and how many per second, compared with Tight-Inclusion.
 
 The peer (Wang et al. 2021, "A large-scale benchmark and an inclusion-based algorithm for continuous collision
 detection") is ipctk's, where that is installed. It answers as many of the same queries as fit in its budget, one by one
@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 
 from vto_pipeline.bench.bench import Measured, Row, Value, Watch
 from vto_pipeline.bench.collision.known_queries import CLOTH, HITS, MISSES, REACH, Queries, hits, misses
-from vto_pipeline.bench.throughput import seconds_of
+from vto_pipeline.bench.scaling.throughput import seconds_of
 from vto_pipeline.bench.timing import Timing
 from vto_pipeline.numerics.ccd import edge_edge_impact, vertex_face_impact
+from vto_pipeline.numerics.cpu_threads import limited_threads
 from vto_pipeline.numerics.distance import blend, closest_on_segments, closest_on_triangle
-from vto_pipeline.numerics.threads import limited_threads
 from vto_pipeline.numerics.vector import axpy, load_at, norm, scale, sub
 
 _PEER_BUDGET = 5.0  # s for each row; a fiftieth when quick

@@ -1,12 +1,12 @@
-"""Sheets as the scenes of self-contact need them: squares, stacks, a folded towel; and the funnel."""
+"""Sheets for the scenes of self-contact: squares, stacks, a folded towel; and the funnel."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
+from vto_pipeline.bench.cloth.scenes import grid
 from vto_pipeline.bench.physics.meshes import strip
-from vto_pipeline.bench.scenes import grid
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -23,7 +23,7 @@ def square(count: int, side: float, width: float | None = None) -> tuple[FloatAr
 
 
 def stacked(layers: int, sheet: tuple[FloatArray, IntArray], gap: float) -> tuple[FloatArray, IntArray]:
-    """Return so many sheets over each other, the lowest half a gap [m] above y = 0."""
+    """Return this many sheets over each other, the lowest half a gap [m] above y = 0."""
     flat, faces = sheet
     points = []
     for k in range(layers):

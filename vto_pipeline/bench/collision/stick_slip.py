@@ -1,4 +1,4 @@
-"""A strip clamped plumb, its tip on a floor, its clamp lowered: the tip holds, and then slips."""
+"""A vertical strip with its tip on a floor and its clamp lowered: the tip sticks, then slips."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 from vto_pipeline.bench.physics.elastica import held_strip, slipping_strip
 from vto_pipeline.bench.physics.meshes import strip
 from vto_pipeline.cloth import Plane
-from vto_pipeline.cloth.build import at_rest, build
-from vto_pipeline.cloth.methods import FRAME
-from vto_pipeline.cloth.settings import checked
-from vto_pipeline.cloth.stepper import Pins, StepConfig, Stepper
+from vto_pipeline.cloth.dynamics.methods import FRAME
+from vto_pipeline.cloth.dynamics.stepper import Pins, StepConfig, Stepper
+from vto_pipeline.cloth.model.build import at_rest, build
+from vto_pipeline.cloth.model.settings import checked
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import RestShape

@@ -1,4 +1,4 @@
-"""Bad starts: what is left after untangling, how far the cloth had to move, whether it grew, and how long it took."""
+"""Bad starts: crossings left after untangling, motion and stretch of the cloth, and run time."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 
 from vto_pipeline.bench.bench import Measured, Row, Watch
 from vto_pipeline.bench.collision.bad_starts import BAD_STARTS, BadStart, bad_start
+from vto_pipeline.bench.measures import edge_strain
 from vto_pipeline.bench.timing import timed
+from vto_pipeline.cloth.judge.crossings import crossings_between, self_crossings
 from vto_pipeline.cloth.untangle import Untangled, untangle
-from vto_pipeline.geometry.intersections import intersecting_faces, self_intersections
-from vto_pipeline.geometry.topology import edges
 from vto_pipeline.model.mesh import TriangleMesh
 
 THICKNESS = 1e-3  # [m]
@@ -31,15 +31,14 @@ def _measure(start: BadStart) -> Measured:
         return untangle(start.positions, start.faces, body=start.body, thickness=THICKNESS)
 
     found, timing = timed(run, warm=run)
-    links = edges(TriangleMesh(start.positions, start.faces))
-    was, now = (np.linalg.norm(x[links[:, 1]] - x[links[:, 0]], axis=1) for x in (start.positions, found.positions))
+    strain = edge_strain(found.positions, start.positions, start.faces)
     move = np.linalg.norm(found.positions - start.positions, axis=1)
     return timing, {
         "pairs_before": _pairs(start, start.positions),
         "pairs_left": _pairs(start, found.positions),
         "places_left": len(found.places),
         "area_growth_share": found.area_growth,
-        "rms_stretch": float(np.sqrt(np.mean((now / was - 1.0) ** 2))),
+        "rms_stretch": float(np.sqrt(np.mean(strain**2))),
         "moved_mm": float(1e3 * move.max()),
         "moved_mean_mm": float(1e3 * move.mean()),
         "rounds": found.rounds,
@@ -48,5 +47,5 @@ def _measure(start: BadStart) -> Measured:
 
 def _pairs(start: BadStart, positions: np.ndarray) -> int:
     mesh = TriangleMesh(positions, start.faces)
-    outer = 0 if start.body is None else len(intersecting_faces(mesh, start.body))
-    return len(self_intersections(mesh)) + outer
+    outer = 0 if start.body is None else len(crossings_between(mesh, start.body))
+    return len(self_crossings(mesh)) + outer

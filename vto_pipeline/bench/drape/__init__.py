@@ -1,4 +1,4 @@
-"""Draping: error against run time and the honesty of its prediction, refinement, rest shapes, and what is left out."""
+"""Draping: error against run time, accuracy of its prediction, refinement, rest shapes, and work left out."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A garment, the body it is cut for, and its fabric; what a drape of it shows."""
+"""A garment, the body it is cut for, its fabric, and the figures of its drape."""
 
 from __future__ import annotations
 
@@ -6,14 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 
-import numpy as np
-
 from vto_pipeline.bench.bench import Value
-from vto_pipeline.bench.samples.wardrobe import WARDROBE
-from vto_pipeline.bench.samples.wearer import Wearer, wearer
+from vto_pipeline.bench.samples.garments.wardrobe import WARDROBE
+from vto_pipeline.bench.samples.garments.wearer import Wearer, wearer
 from vto_pipeline.cloth.drape import drape
 from vto_pipeline.io.fabrics import read_fabric
-from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.cloth import Draped
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import Garment
@@ -63,11 +60,6 @@ class Case:
         """
         cloth = read_fabric(self.fabric) if fabric is None else fabric
         return drape(self.made(), self.wearer.avatar.mesh, cloth, {**STAND, **settings}, job)
-
-
-def distance_mm(one: FloatArray, other: FloatArray) -> float:
-    """Return how far two shapes of one mesh are apart, rms over vertices [mm]."""
-    return float(1e3 * np.sqrt(((one - other) ** 2).sum(axis=1).mean()))
 
 
 def findings(found: Draped) -> dict[str, Value]:

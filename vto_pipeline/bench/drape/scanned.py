@@ -1,4 +1,4 @@
-"""Rest shapes from a scan: a shirt of known rest shape hangs on its form, is "scanned", and its lengths are found."""
+"""Rest shapes from a scan: a shirt of known rest shape is hung on its form, "scanned" and recovered."""
 
 from __future__ import annotations
 
@@ -9,15 +9,12 @@ from typing import Literal, get_args
 import numpy as np
 
 from vto_pipeline.bench.bench import Measured, Row, Value, Watch
+from vto_pipeline.bench.cloth.scenes import shirt_on_form
 from vto_pipeline.bench.drape.case import STAND
-from vto_pipeline.bench.samples.form import make_form
-from vto_pipeline.bench.samples.shirt import make_shirt
-from vto_pipeline.bench.timing import Timing, timed
+from vto_pipeline.bench.measures import edge_strain
+from vto_pipeline.bench.timing import timed
 from vto_pipeline.cloth.drape import drape
-from vto_pipeline.cloth.rest_shape import RestShapeConfig, rest_shape
-from vto_pipeline.errors import ComputationError
-from vto_pipeline.geometry.remesh import RemeshConfig, remesh
-from vto_pipeline.geometry.topology import edges
+from vto_pipeline.cloth.rest_shape.from_hanging import RestShapeConfig, rest_shape
 from vto_pipeline.io.fabrics import read_fabric
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.garment import Garment, RestShape
@@ -34,7 +31,7 @@ _ERROR_MM = 0.2  # to which each garment is brought to rest
 def scanned_rows(quick: bool, watch: Watch) -> Iterator[Row]:
     """Each mode on each fabric."""
     edge_mm, seconds = (40.0, 1.0) if quick else (20.0, 20.0)
-    vertices = len(_shirt(edge_mm)[0].vertices)
+    vertices = len(shirt_on_form(edge_mm)[0].vertices)
     for fabric in _FABRICS[:1] if quick else _FABRICS:
         for mode in ("as_scanned", "inverse") if quick else MODES:
             settings: dict[str, Value] = {"edge_mm": edge_mm, "target_error_mm": _ERROR_MM, "settle_seconds": seconds}
@@ -42,26 +39,16 @@ def scanned_rows(quick: bool, watch: Watch) -> Iterator[Row]:
             yield watch.row(f"rest shape: shirt, form, {fabric}", mode, settings, vertices, measure)
 
 
-def length_errors(rest: FloatArray, truth: FloatArray, mesh: TriangleMesh) -> FloatArray:
-    """Return the relative error of each edge's rest length, shape (E,)."""
-    ends = edges(mesh)
-    found, wanted = (np.linalg.norm(x[ends[:, 1]] - x[ends[:, 0]], axis=1) for x in (rest, truth))
-    return np.abs(found / wanted - 1.0)
-
-
 def _measure(mode: Mode, fabric: str, edge_mm: float, seconds: float) -> Measured:
     """Return the errors of the rest lengths, and how far the garment then is from the scan, and from elsewhere."""
     cloth = read_fabric(fabric)
-    mesh, body = _shirt(edge_mm)
-    try:
-        scan = TriangleMesh(_scan(fabric, edge_mm, seconds), mesh.faces)
-        config = RestShapeConfig(mode=mode, target_error_mm=_ERROR_MM, settle_seconds=seconds)
-        found, timing = timed(partial(rest_shape, scan, config, Job(), body, cloth), runs=1)
-        again = drape(Garment(scan, found), body, cloth, _until_rest(seconds)).mesh.vertices
-        elsewhere = drape(Garment(mesh, found), body, cloth, _until_rest(seconds)).mesh.vertices
-    except ComputationError as failure:
-        return Timing(0.0), {"status": failure.problem}
-    wrong = length_errors(found.positions, mesh.vertices, mesh)
+    mesh, body = shirt_on_form(edge_mm)
+    scan = TriangleMesh(_scan(fabric, edge_mm, seconds), mesh.faces)
+    config = RestShapeConfig(mode=mode, target_error_mm=_ERROR_MM, settle_seconds=seconds)
+    found, timing = timed(partial(rest_shape, scan, config, Job(), body, cloth), runs=1)
+    again = drape(Garment(scan, found), body, cloth, _until_rest(seconds)).mesh.vertices
+    elsewhere = drape(Garment(mesh, found), body, cloth, _until_rest(seconds)).mesh.vertices
+    wrong = np.abs(edge_strain(found.positions, mesh.vertices, mesh.faces))
     apart, other = (1e3 * np.linalg.norm(x - scan.vertices, axis=1) for x in (again, elsewhere))
     return timing, {
         "length_error_median_share": float(np.median(wrong)),
@@ -73,16 +60,9 @@ def _measure(mode: Mode, fabric: str, edge_mm: float, seconds: float) -> Measure
 
 
 @cache
-def _shirt(edge_mm: float) -> tuple[TriangleMesh, TriangleMesh]:
-    """Return the shirt as it is cut, which is its rest shape, and the form."""
-    form = make_form()
-    return remesh(make_shirt(form), RemeshConfig(edge_mm=edge_mm), Job()), form.mesh
-
-
-@cache
 def _scan(fabric: str, edge_mm: float, seconds: float) -> FloatArray:
     """Return where the shirt hangs on its form [m], shape (V, 3)."""
-    mesh, body = _shirt(edge_mm)
+    mesh, body = shirt_on_form(edge_mm)
     cut = Garment(mesh, RestShape(mesh.vertices))
     return drape(cut, body, read_fabric(fabric), _until_rest(seconds)).mesh.vertices
 

@@ -13,10 +13,10 @@ from vto_pipeline.bench.bench import Row, Watch
 from vto_pipeline.bench.physics.elastica import Elastica, cantilever
 from vto_pipeline.bench.physics.meshes import MeshKind, strip
 from vto_pipeline.bench.physics.refinement import Case, refined
-from vto_pipeline.cloth.build import ClothModel, build
-from vto_pipeline.cloth.equilibrium import Equilibrium, equilibrium
-from vto_pipeline.cloth.materials import Materials
-from vto_pipeline.cloth.settings import checked
+from vto_pipeline.cloth.model.build import ClothModel, build
+from vto_pipeline.cloth.model.materials import Materials
+from vto_pipeline.cloth.model.settings import checked
+from vto_pipeline.cloth.rest.equilibrium import Equilibrium, equilibrium
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import RestShape
@@ -63,7 +63,7 @@ def clamped_strip(
     gravity: float = GRAVITY,
     seed: int = 0,
 ) -> ClampedStrip:
-    """Return a strip with so many edges from clamp to tip, and two more in the clamp.
+    """Return a strip with this many edges from clamp to tip, and two more in the clamp.
 
     Args:
         bending: A model of bending of `Materials`.

@@ -1,4 +1,4 @@
-"""What mechanics says in closed form: Bessel functions, elliptic integrals, exponentials."""
+"""Closed forms of mechanics: Bessel functions, elliptic integrals, exponentials."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def capstan(friction: float, wrap: float) -> float:
 
 
 def slide(friction: float, incline: float, gravity: float, h: float, steps: int) -> float:
-    """Return how far a block slides in so many steps from rest [m], with (semi-)implicit Euler: a h² n (n + 1) / 2.
+    """Return how far a block slides in this many steps from rest [m], with (semi-)implicit Euler: a h² n (n + 1) / 2.
 
     a = g (sin θ - μ cos θ), or nothing where the slope does not exceed the friction.
     """

@@ -1,4 +1,4 @@
-"""The Cusick drape test: a disc of cloth on a smaller disc, and how much of the ring around it stays in its shadow.
+"""The Cusick drape test: a disc of cloth on a smaller disc, and the share of the ring in its shadow.
 
 The four fabrics of Matsudaira et al. 2015 (J. Textile Eng. 61(6)) whose mass, thickness, bending rigidity and
 hysteresis were measured together with the drape coefficient. Their resistance in the plane was not: what is assumed is
@@ -7,7 +7,6 @@ in `MEMBRANE` and `SHEAR`. As in the test, the cloth is held between discs, so w
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -17,12 +16,12 @@ import numpy as np
 from vto_pipeline.bench.bench import Measured, Row, Value, Watch
 from vto_pipeline.bench.physics.cantilever import MESHES
 from vto_pipeline.bench.physics.meshes import MeshKind, disc
-from vto_pipeline.bench.timing import Timing
-from vto_pipeline.cloth.build import ClothModel, at_rest, build
+from vto_pipeline.bench.timing import Timing, clocked
 from vto_pipeline.cloth.collision.contacts import nothing
-from vto_pipeline.cloth.equilibrium import EquilibriumConfig, equilibrium
-from vto_pipeline.cloth.materials import Materials
-from vto_pipeline.cloth.settings import checked
+from vto_pipeline.cloth.model.build import ClothModel, at_rest, build
+from vto_pipeline.cloth.model.materials import Materials
+from vto_pipeline.cloth.model.settings import checked
+from vto_pipeline.cloth.rest.equilibrium import EquilibriumConfig, equilibrium
 from vto_pipeline.cloth.solvers import SOLVERS
 from vto_pipeline.errors import DivergedError
 from vto_pipeline.model.arrays import FloatArray, IntArray
@@ -203,12 +202,7 @@ def _row(watch: Watch, geometry: str, name: str, method: str, kind: MeshKind, ed
     one = specimen(fabric.fabric(name), geometry, kind, edge, hysteresis="2HB" in method, seed=seed)
 
     def measure() -> Measured:
-        began = time.perf_counter()
-        try:
-            rest = let_fall(one) if "fall" in method else settled(one)
-        except DivergedError as failure:
-            return Timing(time.perf_counter() - began), {"failure": failure.problem}
-        seconds = time.perf_counter() - began
+        rest, seconds = clocked(let_fall if "fall" in method else at_minimum, one)
         drape = drape_coefficient(rest, one.model.faces, one.radius, one.support)
         return Timing(seconds), {
             "drape_error_share": drape - fabric.drape,
@@ -222,7 +216,7 @@ def _row(watch: Watch, geometry: str, name: str, method: str, kind: MeshKind, ed
     return watch.row(f"Cusick {geometry}", method, settings, len(one.start), measure)
 
 
-def settled(one: Specimen) -> FloatArray:
+def at_minimum(one: Specimen) -> FloatArray:
     """Return the positions in the minimum of energy that Newton finds [m], shape (V, 3)."""
     limits = EquilibriumConfig(tolerance=1e-6, iterations=2000)
     return equilibrium(one.model, one.start, limits).positions

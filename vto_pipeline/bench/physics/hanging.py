@@ -1,4 +1,4 @@
-"""What hangs and swings: chains and strips under their weight, the catenary, the pendulum."""
+"""Hanging and swinging: chains and strips under their weight, the catenary, the pendulum."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from vto_pipeline.bench.physics.cantilever import MESHES
 from vto_pipeline.bench.physics.closed_forms import catenary, hanging_strip, pendulum_period
 from vto_pipeline.bench.physics.meshes import MeshKind, strip
 from vto_pipeline.bench.physics.refinement import Case, refined
-from vto_pipeline.cloth.build import ClothModel, ClothState, build, model_of
 from vto_pipeline.cloth.collision.contacts import nothing
-from vto_pipeline.cloth.constraints.spring import springs
-from vto_pipeline.cloth.equilibrium import EquilibriumConfig, equilibrium
+from vto_pipeline.cloth.constraints.points.spring import springs
 from vto_pipeline.cloth.integrators import INTEGRATORS
-from vto_pipeline.cloth.materials import Materials
-from vto_pipeline.cloth.settings import checked
+from vto_pipeline.cloth.model.build import ClothModel, ClothState, build, model_of
+from vto_pipeline.cloth.model.materials import Materials
+from vto_pipeline.cloth.model.settings import checked
+from vto_pipeline.cloth.rest.equilibrium import EquilibriumConfig, equilibrium
 from vto_pipeline.cloth.solvers import SOLVERS
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import Fabric

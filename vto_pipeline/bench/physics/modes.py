@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterator
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import eigh
-from scipy.sparse import diags_array
+from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import eigsh
 
 from vto_pipeline.bench.bench import Row, Watch
@@ -23,18 +24,18 @@ from vto_pipeline.bench.physics.cantilever import (
 from vto_pipeline.bench.physics.closed_forms import cantilever_modes, hanging_sheet_modes
 from vto_pipeline.bench.physics.meshes import strip
 from vto_pipeline.bench.physics.refinement import Case, refined
-from vto_pipeline.cloth.build import ClothModel, ClothState, build
 from vto_pipeline.cloth.collision.contacts import nothing
-from vto_pipeline.cloth.equilibrium import EquilibriumConfig, equilibrium
+from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
 from vto_pipeline.cloth.integrators import INTEGRATORS
-from vto_pipeline.cloth.materials import Materials
-from vto_pipeline.cloth.settings import checked
-from vto_pipeline.cloth.stiffness import Stiffness
-from vto_pipeline.cloth.tangent import Tangent, lumped_mass
+from vto_pipeline.cloth.model.build import ClothModel, ClothState, build
+from vto_pipeline.cloth.model.materials import Materials
+from vto_pipeline.cloth.model.settings import checked
+from vto_pipeline.cloth.rest.equilibrium import EquilibriumConfig, equilibrium
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.numerics.linear.block_matrix import to_scipy
 from vto_pipeline.units import GRAVITY
 
 _RIGIDITY = 1e-5  # [N·m]
@@ -86,11 +87,10 @@ def _hung(kind: MeshKind, edges: int) -> Case:
 
 def bending_frequencies(model: ClothModel, flat: FloatArray) -> FloatArray:
     """Return ω of the modes that move across the sheet and do not twist it, lowest first [1/s]."""
-    tangent = Tangent(model, Stiffness(model))
-    stiffness, mass = tangent.assemble(flat), lumped_mass(model, tangent.free)
+    free, stiffness, mass = _free_system(model, flat)
     squares, shapes = eigsh(stiffness, 4 * _MODES, diags_array(mass), sigma=0.0)
     order = np.argsort(squares)
-    across = np.zeros((len(tangent.free), 3))
+    across = np.zeros((len(free), 3))
     across[:, 1] = 1.0
     taking_part = (shapes.T @ (mass * across.ravel())) ** 2 / mass.sum()
     kept = [i for i in order if taking_part[i] > 1e-3]
@@ -104,14 +104,21 @@ def hanging_frequencies(model: ClothModel, flat: FloatArray) -> FloatArray:
     polynomials of the length, at rest under the sheet's weight.
     """
     x = equilibrium(model, flat, EquilibriumConfig(exact_below=0.0, tolerance=1e-7)).positions
-    tangent = Tangent(model, Stiffness(model))
-    mass = lumped_mass(model, tangent.free)
-    down = -flat[tangent.free, 1] / _SHEET
-    trial = np.zeros((len(tangent.free), 3, _POWERS))
+    free, stiffness, mass = _free_system(model, x)
+    down = -flat[free, 1] / _SHEET
+    trial = np.zeros((len(free), 3, _POWERS))
     trial[:, 2] = np.polynomial.chebyshev.chebvander(2.0 * down - 1.0, _POWERS - 1) * down[:, None]
     basis = trial.reshape(-1, _POWERS)
-    squares = eigh(basis.T @ (tangent.assemble(x) @ basis), basis.T @ (mass[:, None] * basis), eigvals_only=True)
+    squares = eigh(basis.T @ (stiffness @ basis), basis.T @ (mass[:, None] * basis), eigvals_only=True)
     return np.sqrt(squares[:_MODES])
+
+
+def _free_system(model: ClothModel, x: FloatArray) -> tuple[NDArray[np.int64], csc_array, FloatArray]:
+    """Return the free vertices, and over their coordinates the exact stiffness at x [N/m] and the masses [kg]."""
+    free = np.flatnonzero(model.inverse_mass > 0.0)
+    rows = (3 * free[:, None] + np.arange(3)).ravel()
+    matrix = to_scipy(Stiffness(model).assemble_exact(x)).tocsr()[rows][:, rows]
+    return free, csc_array(0.5 * (matrix + matrix.T)), np.repeat(model.mass[free], 3)
 
 
 def _moving(edges: int) -> Case:
@@ -122,7 +129,7 @@ def _moving(edges: int) -> Case:
 
 
 def swing_frequency(one: ClampedStrip, steps: int) -> float:
-    """Return ω of the slowest swing of a weightless strip that was pushed [1/s], with so many steps a swing.
+    """Return ω of the slowest swing of a weightless strip that was pushed [1/s], with this many steps a swing.
 
     Fitted to the height of the tip, on which fast modes ride that average out. Implicit midpoint swings at
     (2/h) atan(ω h / 2), which is turned back.

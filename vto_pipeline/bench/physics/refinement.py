@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 from vto_pipeline.bench.bench import Measured, Row, Value, Watch
-from vto_pipeline.bench.timing import Timing
-from vto_pipeline.errors import DivergedError
+from vto_pipeline.bench.timing import Timing, clocked
 
 _EXACT = 1e-9  # an error below this is rounding and has no order
 
@@ -49,12 +47,8 @@ def refined(
 
 
 def _measured(case: Case, count: int, before: tuple[int, float] | None) -> Measured:
-    began = time.perf_counter()
-    try:
-        errors: dict[str, Value] = dict(case.run())
-    except DivergedError as failure:
-        errors = {"failure": failure.problem}
-    seconds = time.perf_counter() - began
+    found, seconds = clocked(case.run)
+    errors: dict[str, Value] = dict(found)
     error = next(iter(errors.values()))
     if before is not None and isinstance(error, float) and min(error, before[1]) > _EXACT and math.isfinite(error):
         errors["order"] = math.log(before[1] / error) / math.log(count / before[0])

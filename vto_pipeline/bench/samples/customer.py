@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from vto_pipeline.bench.samples.body import HEIGHTS, LEVELS, BodyShape, arm, body_distance
-from vto_pipeline.bench.samples.surface_nets import zero_surface
+from vto_pipeline.bench.samples.solids.body import HEIGHTS, LEVELS, BodyShape, arm, body_distance
+from vto_pipeline.bench.samples.solids.surface_nets import zero_surface
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Measurements
 from vto_pipeline.model.mesh import TriangleMesh

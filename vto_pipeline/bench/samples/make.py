@@ -1,4 +1,4 @@
-"""Which sample files there are, and in which order they are made."""
+"""The list of sample files, in the order in which they are made."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from vto_pipeline.bench.samples.board import write_board
-from vto_pipeline.bench.samples.cloud import around_stations, scan_stations
+from vto_pipeline.bench.samples.captures.board import write_board
+from vto_pipeline.bench.samples.captures.cloud import around_stations, scan_stations
+from vto_pipeline.bench.samples.captures.depth import around, write_depth_frames
+from vto_pipeline.bench.samples.captures.photos import exposed, write_photos
+from vto_pipeline.bench.samples.captures.render import SUIT, Surface, build_scene, render
+from vto_pipeline.bench.samples.captures.studio import dressed_form
+from vto_pipeline.bench.samples.captures.viewpoints import looking_at
 from vto_pipeline.bench.samples.customer import make_customer, measure_truth
-from vto_pipeline.bench.samples.depth import around, write_depth_frames
-from vto_pipeline.bench.samples.form import Form, make_form
-from vto_pipeline.bench.samples.photos import exposed, write_photos
-from vto_pipeline.bench.samples.render import SUIT, Surface, build_scene, render
-from vto_pipeline.bench.samples.shirt import make_shirt
-from vto_pipeline.bench.samples.studio import dressed_form
-from vto_pipeline.bench.samples.viewpoints import looking_at
-from vto_pipeline.io.bodies import write_measurements
-from vto_pipeline.io.cameras import write_cameras, write_trajectory
+from vto_pipeline.bench.samples.garments.shirt import make_shirt
+from vto_pipeline.bench.samples.solids.form import Form, make_form
+from vto_pipeline.io.bodies.measurements import write_measurements
+from vto_pipeline.io.captures.cameras import write_cameras, write_trajectory
 from vto_pipeline.io.documents import write_json
 from vto_pipeline.io.files import replacing
 from vto_pipeline.io.meshes import write_ply
@@ -33,6 +33,8 @@ FORM_CAMERA = Intrinsics(640, 480, 525.0, 525.0, 319.5, 239.5)
 BODY_CAMERA = Intrinsics(480, 640, 525.0, 525.0, 239.5, 319.5)
 PORTRAIT = Intrinsics(540, 720, 900.0, 900.0, 269.5, 359.5)
 FORM_FRAMES, BODY_FRAMES = 60, 30
+MESH_CELL = 0.012
+"""Edge of the shirt as a finished mesh, such as a designer hands over [m]."""
 # Near which point of the shirt the laser saw nothing [m], and how wide [m].
 HOLES = (
     ((0.17, 0.52, 0.0), 0.050),
@@ -48,7 +50,7 @@ def make_samples(out: Path, parts: Collection[str] = PARTS, say: Callable[[str],
     Args:
         out: The folder, `sample_data` in the repository.
         parts: Which of PARTS to make; form and shirt are always made.
-        say: Told what is being done.
+        say: Receives what is being done.
     """
     say("form and shirt")
     form = make_form()
@@ -56,6 +58,7 @@ def make_samples(out: Path, parts: Collection[str] = PARTS, say: Callable[[str],
     shirt = rounded(make_shirt(form))
     write_ply(out / "shirt_on_form" / "form.ply", form.mesh)
     write_ply(out / "truth" / "shirt.ply", shirt)
+    write_ply(out / "shirt_on_form" / "shirt.ply", rounded(make_shirt(form, MESH_CELL)))
     scene = dressed_form(form, shirt)
     if "photos" in parts:
         say("photos of the form")

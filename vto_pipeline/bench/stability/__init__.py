@@ -1,1 +1,7 @@
-"""What survives, and what does not: every method on stiff, distorted and extreme cloth. `table.rows` measures."""
+"""Stiff, distorted and extreme cases: every method on each.
+
+table: the rows
+case, trial: one case; one method on it, guarded
+sheets, strands, worn, refused: the cases
+limits, frequency: the largest step of explicit methods
+"""

@@ -1,4 +1,4 @@
-"""A stiff, distorted or extreme case: what a method is given, and what it must keep to."""
+"""A stiff, distorted or extreme case: the input of a method, and the limits it must keep."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import scipy.linalg
 
 from vto_pipeline.bench.bench import Value
 from vto_pipeline.bench.stability.frequency import highest_frequency
-from vto_pipeline.cloth.build import ClothModel
+from vto_pipeline.cloth.model.build import ClothModel
 from vto_pipeline.model.arrays import FloatArray, IntArray
 
 _COUNTED = 1e-3  # of the median: the strain of an edge shorter than this says nothing about the cloth

@@ -1,14 +1,14 @@
-"""The highest frequency of a cloth: what bounds the step of every explicit method."""
+"""The highest frequency of a cloth, which bounds the step of every explicit method."""
 
 from __future__ import annotations
 
 import numpy as np
 import scipy.linalg
 
-from vto_pipeline.cloth.build import ClothModel
-from vto_pipeline.cloth.stiffness import Stiffness
+from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
+from vto_pipeline.cloth.model.build import ClothModel
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.numerics.block_matrix import to_scipy
+from vto_pipeline.numerics.linear.block_matrix import to_scipy
 
 
 def highest_frequency(model: ClothModel, positions: FloatArray) -> tuple[float, FloatArray]:

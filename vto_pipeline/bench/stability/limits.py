@@ -1,4 +1,4 @@
-"""The largest step of an explicit method: where theory says it breaks, and where it does.
+"""The largest stable step of an explicit method, in theory and measured.
 
 In the mode of its highest frequency a sheet that swings in its plane is a harmonic oscillator for as long as it moves
 little. A method multiplies its state by a factor that depends on z = hω alone, and breaks where that exceeds
@@ -7,18 +7,18 @@ one (Hairer, Lubich & Wanner 2006, "Geometric numerical integration", I.1 and IX
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import sqrt
 
 import numpy as np
 from scipy.optimize import brentq
 
+from vto_pipeline.bench.cloth.closed_forms import growth_and_frequency
 from vto_pipeline.bench.stability.case import Case
 from vto_pipeline.bench.stability.frequency import highest_frequency
 from vto_pipeline.bench.stability.trial import Maker
-from vto_pipeline.cloth.balance import elastic_energy
-from vto_pipeline.cloth.build import ClothState
 from vto_pipeline.cloth.collision.contacts import nothing
+from vto_pipeline.cloth.dynamics.residual import elastic_energy
+from vto_pipeline.cloth.model.build import ClothState
 from vto_pipeline.errors import ComputationError
 
 STEPS = 400
@@ -34,32 +34,6 @@ _LOWEST = 0.05  # hω at which the search begins
 _EXACT = 1e-4  # of the limit, to which it is bracketed
 
 
-def _symplectic(z: float) -> float:
-    """Both roots of ρ² - (2 - z²) ρ + 1: symplectic Euler, and leapfrog in all its forms."""
-    return _radius(1.0, z * z - 2.0, 1.0)
-
-
-def _abm2(z: float) -> float:
-    """Adams-Bashforth of second order, corrected by the trapezoidal rule (PECE)."""
-    w = 1j * z
-    return _radius(1.0, -(1.0 + w + 0.75 * w * w), 0.25 * w * w)
-
-
-def _radius(*coefficients: complex) -> float:
-    return float(np.abs(np.roots(coefficients)).max())
-
-
-GROWTH: dict[str, Callable[[float], float]] = {
-    "explicit_euler": lambda z: abs(1 + 1j * z),
-    "symplectic_euler": _symplectic,
-    "verlet": _symplectic,
-    "leapfrog": _symplectic,
-    "rk2": lambda z: abs(1 + 1j * z - z**2 / 2),
-    "rk4": lambda z: abs(1 + 1j * z - z**2 / 2 - 1j * z**3 / 6 + z**4 / 24),
-    "predictor_corrector": _abm2,
-}
-"""Explicit method -> factor by which it multiplies an undamped oscillation in each step, from hω."""
-
 LIMIT: dict[str, float] = {
     "explicit_euler": 0.0,
     "symplectic_euler": 2.0,
@@ -69,16 +43,16 @@ LIMIT: dict[str, float] = {
     "rk4": 2.0 * sqrt(2.0),
     "predictor_corrector": 1.2871885058111652,
 }
-"""Explicit method -> the largest hω at which nothing grows, the root of GROWTH = 1. Zero: it grows at every hω."""
+"""Explicit method -> the largest hω at which its root has modulus 1, so that nothing grows. Zero: it always grows."""
 
 
 def predicted_break(method: str) -> float:
     """Return the hω at which theory has an explicit method grow a thousandfold in `STEPS` steps."""
     low = max(LIMIT[method], 1e-3)
-    return float(brentq(lambda z: GROWTH[method](z) - _BROKEN, low, 2.0 * low + 1.0, xtol=1e-12))
+    return float(brentq(lambda z: growth_and_frequency(method, z)[0] - _BROKEN, low, 2.0 * low + 1.0, xtol=1e-12))
 
 
-def growth(case: Case, make: Maker, z: float) -> float:
+def measured_growth(case: Case, make: Maker, z: float) -> float:
     """Return by what factor a step of hω = z multiplies the amplitude of the highest mode, from its energy.
 
     Args:
@@ -110,7 +84,7 @@ def breaks_at(case: Case, make: Maker) -> tuple[float, float]:
     """Return the largest hω found to hold, and the smallest found to break; infinite where none up to 100 does."""
 
     def breaks(z: float) -> bool:
-        return growth(case, make, z) > _BROKEN
+        return measured_growth(case, make, z) > _BROKEN
 
     holds, broken = 0.0, _LOWEST
     while not breaks(broken):

@@ -1,4 +1,4 @@
-"""Inputs that no method may be given: each must be refused at the door, by name."""
+"""Invalid inputs, each of which every method must refuse by name."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from vto_pipeline.bench.bench import Measured
-from vto_pipeline.bench.scenes import grid, isotropic
+from vto_pipeline.bench.cloth.scenes import grid, isotropic
 from vto_pipeline.bench.timing import Timing
 from vto_pipeline.cloth.simulation import simulate
 from vto_pipeline.errors import ConfigError, InputError

@@ -1,4 +1,4 @@
-"""Sheets in trouble: steps too large, starts far from rest, bad triangles, loads and units out of scale."""
+"""Difficult sheets: steps too large, starts far from rest, bad triangles, loads and units out of scale."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from vto_pipeline.bench.scenes import grid, isotropic
+from vto_pipeline.bench.cloth.scenes import grid, isotropic
 from vto_pipeline.bench.stability.case import Case
-from vto_pipeline.cloth.build import build
-from vto_pipeline.cloth.materials import Materials
-from vto_pipeline.cloth.untie import untie
+from vto_pipeline.cloth.model.build import build
+from vto_pipeline.cloth.model.materials import Materials
+from vto_pipeline.cloth.placement.collapsed_start import untie
 from vto_pipeline.geometry.topology import edges, face_area_vectors
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.garment import RestShape

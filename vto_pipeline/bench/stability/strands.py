@@ -1,4 +1,4 @@
-"""Strands of springs: stiffness and mass out of all proportion, and no compliance at all.
+"""Strands of springs with extreme stiffness and mass ratios, and with zero compliance.
 
 After Chen et al. 2024, "Vertex block descent": held at one end, tilted by 30°, one step a frame of 1/60 s with a
 hundred iterations, for five seconds. Spacing, stiffness and masses of the mass ratio are theirs throughout.
@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vto_pipeline.bench.stability.case import Case
-from vto_pipeline.cloth.build import model_of
-from vto_pipeline.cloth.constraints.spring import springs
+from vto_pipeline.cloth.constraints.points.spring import springs
+from vto_pipeline.cloth.model.build import model_of
 from vto_pipeline.model.arrays import FloatArray
 
 _SPACING = 0.05  # [m]

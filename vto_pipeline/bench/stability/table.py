@@ -1,4 +1,4 @@
-"""The table: every method on every case, where explicit methods break, what is refused at the door, what is worn."""
+"""The table: every method on every case, limits of explicit methods, refused inputs, worn fabrics."""
 
 from __future__ import annotations
 
@@ -10,15 +10,16 @@ from math import ceil
 import numpy as np
 
 from vto_pipeline.bench.bench import Measured, Row, Watch
+from vto_pipeline.bench.cloth.closed_forms import growth_and_frequency
 from vto_pipeline.bench.stability.case import Case
-from vto_pipeline.bench.stability.limits import GROWTH, HIGHEST, LIMIT, STEPS, breaks_at, growth, predicted_break
+from vto_pipeline.bench.stability.limits import HIGHEST, LIMIT, STEPS, breaks_at, measured_growth, predicted_break
 from vto_pipeline.bench.stability.refused import REFUSED, REFUSED_VERTICES, refuse
 from vto_pipeline.bench.stability.sheets import quiet_sheet, sheet_cases
 from vto_pipeline.bench.stability.strands import strand_cases
 from vto_pipeline.bench.stability.trial import Maker, attempt, undisturbed
 from vto_pipeline.bench.stability.worn import worn_rows
 from vto_pipeline.bench.timing import timed
-from vto_pipeline.cloth.methods import FRAME, METHODS, choose
+from vto_pipeline.cloth.dynamics.methods import FRAME, METHODS, choose
 
 DEFAULT = "default"
 """The method that a simulation chooses by the scene, with the steps and iterations it chooses."""
@@ -91,14 +92,14 @@ def measured_limit(name: str, case: Case) -> Measured:
     with undisturbed():
         make = METHODS[name]
         (holds, breaks), timing = timed(lambda: breaks_at(case, make), runs=1)
-        found = {"holds_at": holds, "breaks_at": breaks, "growth_at_half": growth(case, make, _SOMEWHERE)}
-        if name not in GROWTH:
+        found = {"holds_at": holds, "breaks_at": breaks, "growth_at_half": measured_growth(case, make, _SOMEWHERE)}
+        if name not in LIMIT:
             return timing, {"verdict": "passes" if breaks == np.inf else "limited", **found}
         predicted = predicted_break(name)
         theory = {
             "limit": LIMIT[name],
             "predicted_break": predicted,
-            "predicted_growth_at_half": GROWTH[name](_SOMEWHERE),
+            "predicted_growth_at_half": growth_and_frequency(name, _SOMEWHERE)[0],
         }
     if abs(breaks - predicted) > _MATCH * predicted:
         verdict = "breaks elsewhere"

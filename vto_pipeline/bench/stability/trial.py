@@ -1,4 +1,4 @@
-"""One method on one case, guarded: whatever it does ends in a verdict, and in the figures behind it."""
+"""One method on one case, guarded, so that any outcome becomes a verdict with its figures."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ import numpy as np
 from vto_pipeline.bench.bench import Measured, Value
 from vto_pipeline.bench.stability.case import Case
 from vto_pipeline.bench.timing import Timing
-from vto_pipeline.cloth.balance import elastic_energy
-from vto_pipeline.cloth.build import ClothState, at_rest
 from vto_pipeline.cloth.collision.contacts import nothing
-from vto_pipeline.cloth.methods import Method
+from vto_pipeline.cloth.dynamics.methods import Method
+from vto_pipeline.cloth.dynamics.residual import elastic_energy
+from vto_pipeline.cloth.model.build import ClothState, at_rest
 from vto_pipeline.errors import ComputationError, VtoError
 from vto_pipeline.model.arrays import FloatArray
 

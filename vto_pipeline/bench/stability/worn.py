@@ -1,4 +1,4 @@
-"""Extreme fabrics worn: each stiffness, the weight and the friction far beyond what is woven; finite, clean or not."""
+"""Extreme fabrics when worn: stiffness, weight and friction far beyond real cloth; finite, clean or not."""
 
 from __future__ import annotations
 

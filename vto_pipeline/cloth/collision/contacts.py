@@ -1,4 +1,4 @@
-"""Where the cloth touches something: planes that ride on the surface for a short while. Solvers know only these."""
+"""Contacts as planes attached to a surface for a short time, the only form that solvers see."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vto_pipeline.model.arrays import FloatArray
 class Contacts(NamedTuple):
     """For each surface S and cloth vertex V, a plane the vertex must stay in front of.
 
-    All vary linearly from the begin (index 0) to the end (index 1) of the round they were made for.
+    All vary linearly from the start (index 0) to the end (index 1) of the round they were made for.
 
     Args:
         active: Whether there is a plane, shape (S, V).
@@ -53,7 +53,7 @@ class Round(NamedTuple):
 
 
 class Collider(Protocol):
-    """Anything cloth can lie on."""
+    """A collider for cloth."""
 
     def contacts(self, positions: FloatArray, span: Round) -> Contacts:
         """Return the contacts of this surface alone with vertices at these positions [m], shape (V, 3)."""

@@ -1,19 +1,17 @@
-"""Everything that resists deformation: one kind a file, listed here."""
+"""Constraints that resist deformation: one kind per file, listed here.
+
+membrane/, bending/, points/: the kinds
+kind, sweep: what a kind brings along, and the loops that serve all kinds
+mass_spring: a sheet as structural, shear and bending springs (Provot 1995)
+rigid: constraints without compliance
+"""
 
 from __future__ import annotations
 
-from vto_pipeline.cloth.constraints import (
-    bend,
-    bend_friction,
-    combination,
-    curve,
-    green,
-    shape_operator,
-    spring,
-    strain_friction,
-    strain_limit,
-    stretch,
-)
+from vto_pipeline.cloth.constraints.bending import bend_friction, shape_operator
+from vto_pipeline.cloth.constraints.bending import hinge as bend
+from vto_pipeline.cloth.constraints.membrane import curve, green, strain_friction, strain_limit, stretch
+from vto_pipeline.cloth.constraints.points import combination, spring
 
 KINDS = (
     bend.KIND,

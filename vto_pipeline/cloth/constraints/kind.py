@@ -1,4 +1,4 @@
-"""What a kind of constraint must bring along; everything else about constraints is written once, for all kinds.
+"""The interface of a kind of constraint; everything else about constraints is written once for all kinds.
 
 Four compiled functions of one stencil i, at positions x [m], shape (V, 3):
 

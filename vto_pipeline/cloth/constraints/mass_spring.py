@@ -12,9 +12,9 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from vto_pipeline.cloth.constraints.bend import solid_hinges
-from vto_pipeline.cloth.constraints.spring import Spring, springs
-from vto_pipeline.cloth.constraints.threads import thread_axes
+from vto_pipeline.cloth.constraints.bending.hinge import solid_hinges
+from vto_pipeline.cloth.constraints.membrane.yarns import thread_axes
+from vto_pipeline.cloth.constraints.points.spring import Spring, springs
 from vto_pipeline.model.fabric import Fabric
 
 _SHEAR_COUNTS = 0.1  # beside stretch, where springs in all directions cannot be as soft in shear as a fabric

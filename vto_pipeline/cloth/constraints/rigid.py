@@ -1,4 +1,4 @@
-"""Constraints without compliance, which only multipliers can hold."""
+"""Rigid constraints, which only methods with multipliers can hold."""
 
 from __future__ import annotations
 
@@ -30,5 +30,5 @@ def refuse_rigid(constraints: tuple[Any, ...], positions: FloatArray, method: st
     if kind is not None:
         raise ConfigError(
             f"{method} needs stiffnesses, and {kind} constraints have a compliance of zero, which is rigid",
-            hint="give them a compliance, or take a solver that works with multipliers, such as xpbd",
+            hint="give them a compliance, or choose a solver that uses multipliers, such as xpbd",
         )

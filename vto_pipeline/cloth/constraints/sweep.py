@@ -115,7 +115,7 @@ def project(x, start, inverse_mass, constraints, lambdas, h, threaded):
 
     Args:
         x: Positions [m], shape (V, 3).
-        start: Positions at the begin of the step [m], shape (V, 3).
+        start: Positions at the start of the step [m], shape (V, 3).
         inverse_mass: [1/kg], shape (V,); zero holds a vertex.
         constraints: The data of each kind.
         lambdas: Multipliers so far in this step, shape (N, B) for each kind.

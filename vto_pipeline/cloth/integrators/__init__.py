@@ -1,22 +1,24 @@
-"""Time integrators of forces: each takes a model, and advances a state in front of contacts, like a solver."""
+"""Time integrators of forces: each takes a model and advances a state subject to contacts.
+
+integrator: what all of them share
+explicit, implicit, multistep: the families, one class a method
+system, air: forces and resistance, air drag among them
+potential, minimise: an implicit step as a minimum, and two ways to find it
+"""
 
 from __future__ import annotations
 
-from vto_pipeline.cloth.integrators.backward_euler import BackwardEuler
-from vto_pipeline.cloth.integrators.backward_euler_newton import BackwardEulerNewton
-from vto_pipeline.cloth.integrators.bdf2 import Bdf2
-from vto_pipeline.cloth.integrators.explicit_euler import ExplicitEuler
-from vto_pipeline.cloth.integrators.imex import Imex
-from vto_pipeline.cloth.integrators.implicit_midpoint import ImplicitMidpoint
+from vto_pipeline.cloth.integrators.explicit import ExplicitEuler, Leapfrog, Rk2, Rk4, SymplecticEuler, Verlet
+from vto_pipeline.cloth.integrators.implicit import (
+    BackwardEuler,
+    BackwardEulerNewton,
+    Imex,
+    ImplicitMidpoint,
+    Ncg,
+    Newmark,
+)
 from vto_pipeline.cloth.integrators.integrator import Integrator
-from vto_pipeline.cloth.integrators.leapfrog import Leapfrog
-from vto_pipeline.cloth.integrators.ncg import Ncg
-from vto_pipeline.cloth.integrators.newmark import Newmark
-from vto_pipeline.cloth.integrators.predictor_corrector import PredictorCorrector
-from vto_pipeline.cloth.integrators.rk2 import Rk2
-from vto_pipeline.cloth.integrators.rk4 import Rk4
-from vto_pipeline.cloth.integrators.symplectic_euler import SymplecticEuler
-from vto_pipeline.cloth.integrators.verlet import Verlet
+from vto_pipeline.cloth.integrators.multistep import Bdf2, PredictorCorrector
 
 INTEGRATORS: dict[str, type[Integrator]] = {
     "explicit_euler": ExplicitEuler,
@@ -34,4 +36,4 @@ INTEGRATORS: dict[str, type[Integrator]] = {
     "imex": Imex,
     "ncg": Ncg,
 }
-"""Name -> method. To add one: a file with its `step`, and a line here."""
+"""Name -> method. To add one: a class with its `step` in the file of its family, and a line here."""

@@ -3,27 +3,8 @@
 from __future__ import annotations
 
 from numba import njit
-from pydantic import Field
 
-from vto_pipeline.model.settings import Config
 from vto_pipeline.numerics.vector import axpy, cross, dot, load, norm, scale, store, sub
-
-
-class AirDrag(Config):
-    """How much the air resists."""
-
-    coefficient: float = Field(
-        default=0.0,
-        ge=0,
-        le=10,
-        description="Drag coefficient of a triangle along its normal [1]; a plate has 1.2",
-    )
-    density: float = Field(default=1.2, ge=0, le=2000, description="Density of the air [kg/m³]")
-
-    @property
-    def strength(self) -> float:
-        """½ ρ c [kg/m³]: pressure on a triangle over the square of its speed against its normal."""
-        return 0.5 * self.density * self.coefficient
 
 
 @njit(cache=True, error_model="numpy")

@@ -6,16 +6,15 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from vto_pipeline.cloth.build import ClothModel, ClothState
 from vto_pipeline.cloth.collision.contacts import Contacts, nothing
-from vto_pipeline.cloth.collision.pairs import Pairs, no_pairs
-from vto_pipeline.cloth.collision.respond import respond
-from vto_pipeline.cloth.collision.self_contact import SelfContact
+from vto_pipeline.cloth.collision.response.step_response import respond
+from vto_pipeline.cloth.collision.self_collision.pairs import Pairs, no_pairs
+from vto_pipeline.cloth.collision.self_collision.self_contact import SelfContact
 from vto_pipeline.cloth.constraints.rigid import refuse_rigid
 from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM
-from vto_pipeline.cloth.integrators.air import AirDrag
 from vto_pipeline.cloth.integrators.system import ForceSystem
-from vto_pipeline.cloth.losses import own, recall, remember, slip
+from vto_pipeline.cloth.model.build import ClothModel, ClothState
+from vto_pipeline.cloth.model.internal_friction import own, recall, remember, slip
 from vto_pipeline.model.arrays import FloatArray
 
 
@@ -27,7 +26,7 @@ class Integrator(ABC):
         sweeps: Not used: a step of an integrator is a step.
         damping: Rayleigh's mass term α, rate at which velocities fade [1/s].
         max_speed: No vertex moves faster [m/s].
-        air: Drag of the air; none by default.
+        air: Drag of the air, ½ρc [kg/m³].
         tolerance: How nearly implicit equations are solved, as a share of an edge's length.
 
     Attributes:
@@ -43,7 +42,7 @@ class Integrator(ABC):
         sweeps: int = 1,
         damping: float = 0.0,
         max_speed: float = np.inf,
-        air: AirDrag | None = None,
+        air: float = 0.0,
         tolerance: float = 1e-5,
     ) -> None:
         self.tolerance = tolerance * model.edge_length

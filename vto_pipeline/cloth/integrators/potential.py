@@ -8,7 +8,7 @@ import numpy as np
 
 from vto_pipeline.cloth.integrators.system import ForceSystem
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.numerics.block_matrix import BlockMatrix
+from vto_pipeline.numerics.linear.block_matrix import BlockMatrix
 
 
 @dataclass(frozen=True)

@@ -6,15 +6,15 @@ from functools import cached_property
 
 import numpy as np
 
-from vto_pipeline.cloth.build import ClothModel
-from vto_pipeline.cloth.collision.penalty import Penalty
+from vto_pipeline.cloth.collision.response.penalty import Penalty
 from vto_pipeline.cloth.constraints.sweep import add_damping_forces, add_forces
-from vto_pipeline.cloth.integrators.air import AirDrag, add_drag, add_drag_rate
-from vto_pipeline.cloth.stiffness import Stiffness
+from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
+from vto_pipeline.cloth.integrators.air import add_drag, add_drag_rate
+from vto_pipeline.cloth.model.build import ClothModel
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.numerics.block_matrix import BlockMatrix, multiply
-from vto_pipeline.numerics.linear import pcg
-from vto_pipeline.numerics.multigrid import Hierarchy, hierarchy, update
+from vto_pipeline.numerics.linear.block_matrix import BlockMatrix, multiply
+from vto_pipeline.numerics.linear.conjugate_gradients import pcg
+from vto_pipeline.numerics.linear.multigrid import Hierarchy, hierarchy, update
 
 
 class ForceSystem:
@@ -23,7 +23,7 @@ class ForceSystem:
     Args:
         model: The cloth. Its constraints' β is Rayleigh's stiffness term.
         damping: Rayleigh's mass term α [1/s].
-        air: Drag.
+        air: ½ρc, pressure on a triangle over the square of its speed against its normal [kg/m³].
 
     Attributes:
         mass: [kg], shape (V, 1).
@@ -31,18 +31,19 @@ class ForceSystem:
         inverse_mass: [1/kg], zero for held vertices, shape (V, 1).
         weight: [N], shape (V, 3).
         damping: α [1/s].
+        air: ½ρc [kg/m³]; may be set between runs.
         penalty: Contacts as forces, if they are; may be set between runs.
     """
 
-    def __init__(self, model: ClothModel, damping: float = 0.0, air: AirDrag | None = None) -> None:
+    def __init__(self, model: ClothModel, damping: float = 0.0, air: float = 0.0) -> None:
         self.mass = model.mass[:, None]
         self.inverse_mass = model.inverse_mass[:, None]
         self.free = (self.inverse_mass > 0.0).astype(np.float64)
         self.weight = self.mass * model.gravity
         self.damping = damping
+        self.air = air
         self.penalty: Penalty | None = None
         self._model = model
-        self._air = (air or AirDrag()).strength
         self._viscous = any(data.damping > 0.0 for data in model.constraints)
 
     def potential(self, x: FloatArray) -> tuple[float, FloatArray]:
@@ -85,9 +86,9 @@ class ForceSystem:
         """
         stiffness, _ = self._assembly
         matrix = stiffness.assemble(x, mass_factor + rate * self.damping, 1.0, rate)
-        if self._air > 0.0 and rate > 0.0:
+        if self.air > 0.0 and rate > 0.0:
             places = np.where(self._model.inverse_mass > 0.0, matrix.diagonal, np.int32(-1))
-            add_drag_rate(x, v, self._model.faces, self._air, rate, matrix.blocks, places)
+            add_drag_rate(x, v, self._model.faces, self.air, rate, matrix.blocks, places)
         if self.penalty is not None:
             self.penalty.add_to(matrix, x, rate)
         return matrix
@@ -119,8 +120,8 @@ class ForceSystem:
 
     def _drag(self, x: FloatArray, v: FloatArray) -> FloatArray:
         forces = np.zeros_like(x)
-        if self._air > 0.0:
-            add_drag(x, v, self._model.faces, self._air, forces)
+        if self.air > 0.0:
+            add_drag(x, v, self._model.faces, self.air, forces)
         return forces
 
     @cached_property
@@ -134,4 +135,4 @@ class ForceSystem:
     @property
     def resists(self) -> bool:
         """Whether anything depends on velocity."""
-        return self.damping > 0.0 or self._viscous or self._air > 0.0 or self.penalty is not None
+        return self.damping > 0.0 or self._viscous or self.air > 0.0 or self.penalty is not None

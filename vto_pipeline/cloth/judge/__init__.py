@@ -1,1 +1,10 @@
-"""What the judge after the fact measures with: formulas of its own, shared with no solver and no collision."""
+"""Independent audit: formulas of its own, shared with no solver and no collision code.
+
+audit: finite, crossings, penetration, strain, energy, residual
+residual: energy and residual force, computed a second time
+flanks, bearing: where a body may carry a point, and what force it can carry there
+gap: how near a cloth comes to itself
+order: whether what is worn beneath lies beneath
+strain, too_small: stretch against the rest shape; whether the garment is too small
+worn: strain of the yarns and pressure on the body, vertex by vertex
+"""

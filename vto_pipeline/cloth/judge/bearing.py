@@ -1,4 +1,4 @@
-"""What surfaces that touch a point can bear of the force on it, friction included."""
+"""The force that surfaces in contact can bear, friction included."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every place of a body that a point may rest on, not only the nearest: the flanks of the hollow it lies in."""
+"""All places of a body that support a point, not only the nearest: the flanks of a hollow."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How near a cloth comes to itself."""
+"""Distances of a cloth to itself."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
-"""Whether what is worn beneath lies beneath."""
+"""Layer order: whether inner garments lie beneath outer ones."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vto_pipeline.geometry.intersections import intersecting_faces
+from vto_pipeline.cloth.judge.crossings import crossings_between
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -29,5 +29,5 @@ def outside(inner: TriangleMesh, outer: TriangleMesh, body: TriangleMesh) -> NDA
     aside *= _WIDTH / np.maximum(np.linalg.norm(aside, axis=1, keepdims=True), np.finfo(float).tiny)
     slivers = np.arange(3 * len(end), dtype=np.int32).reshape(3, -1).T
     ways = TriangleMesh(np.vstack([start, end, end + aside]), slivers)
-    passed = np.bincount(intersecting_faces(ways, outer)[:, 0], minlength=len(end))
+    passed = np.bincount(crossings_between(ways, outer)[:, 0], minlength=len(end))
     return np.flatnonzero(passed % 2)

@@ -1,4 +1,4 @@
-"""How far each triangle is stretched from its rest shape."""
+"""Strain of each triangle relative to its rest shape."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""What a wearer feels, vertex by vertex: strain of the threads, and pressure on the body."""
+"""Per-vertex maps for the wearer: strain of the threads, and pressure on the body."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from vto_pipeline.cloth.judge.balance import Weave
+from vto_pipeline.cloth.judge.residual import Weave
 from vto_pipeline.cloth.judge.strain import gradients, rest_triangles, thread_strains
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.arrays import FloatArray

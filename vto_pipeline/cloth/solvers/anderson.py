@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from vto_pipeline.cloth.implicit_step.geometric_stiffness import is_due, put_back
+from vto_pipeline.cloth.implicit_step.iterated import ImplicitStep
 from vto_pipeline.cloth.solvers.gauss_seidel import GaussSeidel
-from vto_pipeline.cloth.solvers.iterated import ImplicitStep
-from vto_pipeline.cloth.solvers.turning import is_due, put_back
 from vto_pipeline.model.arrays import FloatArray
 
 _WINDOW = 5

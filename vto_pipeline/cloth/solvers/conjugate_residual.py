@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from vto_pipeline.cloth.build import ClothModel
-from vto_pipeline.cloth.solvers.iterated import ImplicitStep, Iterated
-from vto_pipeline.cloth.solvers.linearised import Linearised, inner
-from vto_pipeline.cloth.solvers.press import press
-from vto_pipeline.cloth.solvers.turning import is_due, put_back
+from vto_pipeline.cloth.implicit_step.dual_system import inner
+from vto_pipeline.cloth.implicit_step.geometric_stiffness import is_due, put_back
+from vto_pipeline.cloth.implicit_step.iterated import DualIterated, ImplicitStep
+from vto_pipeline.cloth.implicit_step.plane_multiplier import press
+from vto_pipeline.cloth.model.build import ClothModel
 from vto_pipeline.model.arrays import FloatArray
 
 
-class ConjugateResidual(Iterated):
+class ConjugateResidual(DualIterated):
     """The minimum residual method of Stiefel 1955 on A Δλ = r, linearised anew in each iteration.
 
     Frâncu & Moldoveanu 2014: with z = D⁻¹ r and q = A d, d ← z + β d by β = min(1, (zᵀ A z)' / zᵀ A z), and the step
@@ -26,16 +26,10 @@ class ConjugateResidual(Iterated):
 
     def __init__(self, model: ClothModel, *, sweeps: int = 1, damping: float = 0.0, max_speed: float = np.inf) -> None:
         super().__init__(model, sweeps=sweeps, damping=damping, max_speed=max_speed)
-        self.linear = Linearised(self.model)
         self._along, self._product, self._scaled = (
             tuple(np.zeros_like(one) for one in self.linear.multipliers) for _ in range(3)
         )
         self._direction = tuple(np.zeros_like(one) for one in self.linear.multipliers)
-
-    @property
-    def multipliers(self) -> tuple[FloatArray, ...]:
-        """Return λ of each kind of constraint at the end of the last step, shape (N, B) each."""
-        return self.linear.multipliers
 
     def solve(self, step: ImplicitStep, x: FloatArray) -> None:
         """See `Iterated.solve`."""

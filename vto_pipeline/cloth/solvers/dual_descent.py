@@ -6,18 +6,18 @@ from abc import abstractmethod
 
 import numpy as np
 
-from vto_pipeline.cloth.build import ClothModel, ClothState
 from vto_pipeline.cloth.collision.contacts import Contacts
-from vto_pipeline.cloth.solvers.iterated import ImplicitStep, Iterated
-from vto_pipeline.cloth.solvers.linearised import Linearised, inner
-from vto_pipeline.cloth.solvers.press import press
-from vto_pipeline.cloth.solvers.turning import is_due, put_back
+from vto_pipeline.cloth.implicit_step.dual_system import inner
+from vto_pipeline.cloth.implicit_step.geometric_stiffness import is_due, put_back
+from vto_pipeline.cloth.implicit_step.iterated import DualIterated, ImplicitStep
+from vto_pipeline.cloth.implicit_step.plane_multiplier import press
+from vto_pipeline.cloth.model.build import ClothModel, ClothState
 from vto_pipeline.model.arrays import FloatArray
 
 _GROWTH = 10.0  # of rᵀ D⁻¹ r since it was smallest: gradients have turned, and the acceleration begins anew
 
 
-class DualDescent(Iterated):
+class DualDescent(DualIterated):
     """A method that changes all multipliers at once along D⁻¹ r, linearised anew in each iteration.
 
     Acceleration rests on a linear problem. While a sheet is thrown about it is not, and what was gathered is dropped as
@@ -29,15 +29,9 @@ class DualDescent(Iterated):
 
     def __init__(self, model: ClothModel, *, sweeps: int = 1, damping: float = 0.0, max_speed: float = np.inf) -> None:
         super().__init__(model, sweeps=sweeps, damping=damping, max_speed=max_speed)
-        self.linear = Linearised(self.model)
         self._prepared = False
         self._along = tuple(np.zeros_like(one) for one in self.linear.multipliers)
         self._change = tuple(np.zeros_like(one) for one in self.linear.multipliers)
-
-    @property
-    def multipliers(self) -> tuple[FloatArray, ...]:
-        """Return λ of each kind of constraint at the end of the last step, shape (N, B) each."""
-        return self.linear.multipliers
 
     @abstractmethod
     def prepare(self) -> None:

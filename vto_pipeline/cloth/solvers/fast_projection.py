@@ -10,19 +10,19 @@ from numpy.typing import NDArray
 from scipy.sparse import block_array, block_diag, bsr_array, coo_array, csr_array, diags_array, vstack
 from scipy.sparse.linalg import splu
 
-from vto_pipeline.cloth.build import ClothModel
 from vto_pipeline.cloth.constraints.rigid import rigid_kind
 from vto_pipeline.cloth.constraints.sweep import stiffness_one, stiffness_scratch
-from vto_pipeline.cloth.solvers.iterated import ImplicitStep, Iterated
-from vto_pipeline.cloth.solvers.linearised import Linearised, Rows
-from vto_pipeline.cloth.solvers.merit import Merit
-from vto_pipeline.cloth.solvers.press import press
+from vto_pipeline.cloth.implicit_step.dual_system import Rows
+from vto_pipeline.cloth.implicit_step.iterated import DualIterated, ImplicitStep
+from vto_pipeline.cloth.implicit_step.line_search import Merit
+from vto_pipeline.cloth.implicit_step.plane_multiplier import press
+from vto_pipeline.cloth.model.build import ClothModel
 from vto_pipeline.model.arrays import FloatArray
 
 _REGULARISED = 1e-12  # share of ∇C W ∇Cᵀ that a row gets as compliance: rigid rows that repeat each other stay solvable
 
 
-class FastProjection(Iterated):
+class FastProjection(DualIterated):
     """All constraints at once, with a direct solve in each iteration.
 
     Goldenthal et al. 2007 project onto rigid constraints; with compliance the projection ends in backward Euler. The
@@ -37,13 +37,7 @@ class FastProjection(Iterated):
 
     def __init__(self, model: ClothModel, *, sweeps: int = 1, damping: float = 0.0, max_speed: float = np.inf) -> None:
         super().__init__(model, sweeps=sweeps, damping=damping, max_speed=max_speed)
-        self.linear = Linearised(self.model)
         self._free = np.repeat(model.inverse_mass > 0.0, 3)
-
-    @property
-    def multipliers(self) -> tuple[FloatArray, ...]:
-        """Return λ of each kind of constraint at the end of the last step, shape (N, B) each."""
-        return self.linear.multipliers
 
     def solve(self, step: ImplicitStep, x: FloatArray) -> None:
         """See `Iterated.solve`."""

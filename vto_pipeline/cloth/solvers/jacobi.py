@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from vto_pipeline.cloth.implicit_step.dual_system import Linearised, inner
 from vto_pipeline.cloth.solvers.dual_descent import DualDescent
-from vto_pipeline.cloth.solvers.linearised import Linearised, inner
 
 _EXPONENT = 0.6
 _POWER_ITERATIONS = 15

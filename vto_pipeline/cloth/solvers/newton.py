@@ -1,7 +1,7 @@
-"""Backward Euler in large steps, solved by Newton with multigrid: the method for stiff and for fine cloth.
+"""Backward Euler in large steps by Newton's method with multigrid, for stiff and for fine cloth.
 
 Each step minimises ½ |y - x̃|²_M / h² + E(y) over the positions y, x̃ being where the cloth would go without forces
-(Martin et al. 2011, eq. 3). One Newton iteration from the begin of the step is the scheme of Baraff & Witkin 1998. It
+(Martin et al. 2011, eq. 3). One Newton iteration from the start of the step is the scheme of Baraff & Witkin 1998. It
 is enough while the objective falls as a parabola does; where cloth turns, or is thrown about, more are made. The
 stiffness is positive semidefinite (`cloth.stiffness`), the systems are solved by `linear_system`, and contacts are part
 of them. Near rest, where what is left out to keep it so is what cloth waits for, it may be exact.
@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from vto_pipeline.cloth.build import ClothModel, ClothState
-from vto_pipeline.cloth.collision.active_set import ActiveSet, active_set, no_contacts, taken_on
-from vto_pipeline.cloth.collision.contact_springs import (
+from vto_pipeline.cloth.collision.contacts import Contacts
+from vto_pipeline.cloth.collision.response.active_set import ActiveSet, active_set, no_contacts, taken_on
+from vto_pipeline.cloth.collision.response.contact_springs import (
     add_contacts,
     add_last_forces,
     contact_energy,
@@ -26,20 +26,21 @@ from vto_pipeline.cloth.collision.contact_springs import (
     revise,
     taken_along,
 )
-from vto_pipeline.cloth.collision.contacts import Contacts
-from vto_pipeline.cloth.collision.pairs import no_pairs
-from vto_pipeline.cloth.collision.respond import respond
-from vto_pipeline.cloth.collision.self_contact import SelfContact
+from vto_pipeline.cloth.collision.response.step_response import respond
+from vto_pipeline.cloth.collision.self_collision.pairs import no_pairs
+from vto_pipeline.cloth.collision.self_collision.self_contact import SelfContact
 from vto_pipeline.cloth.constraints.rigid import refuse_rigid
 from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM, add_damping_forces, add_forces
-from vto_pipeline.cloth.losses import own, recall, remember, slip
-from vto_pipeline.cloth.solvers.linear_system import LinearSystem
-from vto_pipeline.cloth.solvers.momentum import keep_momentum, pieces
-from vto_pipeline.cloth.stiffness import Stiffness
+from vto_pipeline.cloth.implicit_step.linear_system import LinearSystem
+from vto_pipeline.cloth.implicit_step.momentum import keep_momentum, pieces
+from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
+from vto_pipeline.cloth.model.build import ClothModel, ClothState
+from vto_pipeline.cloth.model.internal_friction import own, recall, remember, slip
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.numerics.block_matrix import BlockMatrix, row_times
-from vto_pipeline.numerics.links import pull, pull_back
-from vto_pipeline.numerics.multigrid import Hierarchy
+from vto_pipeline.numerics.line_search import halvings
+from vto_pipeline.numerics.linear.block_matrix import BlockMatrix, row_times
+from vto_pipeline.numerics.linear.links import pull, pull_back
+from vto_pipeline.numerics.linear.multigrid import Hierarchy
 
 _LEFT = 6.0  # 1/s: share of the forces at the begin of a step left by a linear solve, times h, so errors fall with h
 _OF_WEIGHT = 0.3  # share of the weight that counts as force where cloth is in balance
@@ -215,7 +216,7 @@ class Newton:
         """Take a Newton iteration from y, of a step of time from x.
 
         Args:
-            x, y: Positions at the begin of the step and now [m], shape (V, 3).
+            x, y: Positions at the start of the step and now [m], shape (V, 3).
             target: Where vertices would go without forces [m], shape (V, 3).
             guess: Of the move from y [m], shape (V, 3).
             h: Step [s].
@@ -315,15 +316,13 @@ class Newton:
         now = energy + self._inertia(y, target, h) + pushes[0]
         bend = 2.0 * (pushes[0] - 2.0 * pushes[1] + pushes[2])
         slope = pushes[2] - pushes[0] - bend
-        share = 1.0
-        while share > _SHORTEST:
+        for share in halvings(_SHORTEST):
             there = y + share * move
             energy = add_forces(there, self._model.constraints, np.zeros_like(there))
             pushed = pushes[0] + share * (slope + share * bend)
             fall = now - energy - self._inertia(there, target, h) - pushed
             if fall >= -self._allowed - _ROUNDING * now:
                 return _Iteration(there, share, fall, foreseen, now - fall)
-            share *= 0.5
         return _Iteration(y, 0.0, 0.0, foreseen, now)
 
     def _inertia(self, y: FloatArray, target: FloatArray, h: float) -> float:

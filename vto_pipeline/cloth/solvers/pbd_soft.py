@@ -1,4 +1,4 @@
-"""The negative control: soft constraints without the memory that makes them right."""
+"""Negative control: soft constraints without multipliers, which gives the wrong stiffness."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Projective dynamics as a quasi-Newton method: one prefactored matrix, and a history that corrects it."""
+"""Projective dynamics as a quasi-Newton method: one prefactored matrix, corrected by a history of steps."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import SuperLU, splu
 
-from vto_pipeline.cloth.build import ClothModel
 from vto_pipeline.cloth.constraints.sweep import linearised
-from vto_pipeline.cloth.solvers.iterated import ImplicitStep, Iterated
-from vto_pipeline.cloth.solvers.merit import Merit
-from vto_pipeline.cloth.solvers.press import press
+from vto_pipeline.cloth.implicit_step.iterated import ImplicitStep, Iterated
+from vto_pipeline.cloth.implicit_step.line_search import Merit
+from vto_pipeline.cloth.implicit_step.plane_multiplier import press
+from vto_pipeline.cloth.model.build import ClothModel
 from vto_pipeline.model.arrays import FloatArray
 
 _HISTORY = 8

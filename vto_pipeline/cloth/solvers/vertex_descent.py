@@ -9,8 +9,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from vto_pipeline.cloth.build import ClothModel
-from vto_pipeline.cloth.collision.plane import plane_at
+from vto_pipeline.cloth.collision.response.plane_motion import plane_at
 from vto_pipeline.cloth.constraints.sweep import (
     linearise_one,
     rows_of,
@@ -18,7 +17,8 @@ from vto_pipeline.cloth.constraints.sweep import (
     stiffness_one,
     stiffness_scratch,
 )
-from vto_pipeline.cloth.solvers.iterated import ImplicitStep, Iterated
+from vto_pipeline.cloth.implicit_step.iterated import ImplicitStep, Iterated
+from vto_pipeline.cloth.model.build import ClothModel
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.numerics.vector import add, axpy, dot, load, norm, scale, store, sub
 

@@ -12,13 +12,13 @@ import numpy as np
 from numba import njit
 from numba.extending import overload
 
-from vto_pipeline.cloth.build import ClothModel, ClothState
 from vto_pipeline.cloth.collision.contacts import Contacts
-from vto_pipeline.cloth.collision.respond import respond
+from vto_pipeline.cloth.collision.response.step_response import respond
 from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM, multipliers, project
-from vto_pipeline.cloth.losses import own, recall, remember, slip
-from vto_pipeline.cloth.solvers.predict import predict
-from vto_pipeline.cloth.solvers.press import press
+from vto_pipeline.cloth.implicit_step.plane_multiplier import press
+from vto_pipeline.cloth.implicit_step.prediction import predict
+from vto_pipeline.cloth.model.build import ClothModel, ClothState
+from vto_pipeline.cloth.model.internal_friction import own, recall, remember, slip
 from vto_pipeline.model.arrays import FloatArray
 
 

@@ -1,4 +1,4 @@
-"""Cloth in a body: which way is out, also of a body that is neither closed nor free of crossings with itself."""
+"""The way out of a body for cloth inside it, even if the body is open or crosses itself."""
 
 from __future__ import annotations
 

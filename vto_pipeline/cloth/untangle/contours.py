@@ -1,4 +1,4 @@
-"""Where surfaces pass through each other: crossings of edges and faces, joined to contours.
+"""Intersection contours: crossings of edges and faces, joined to curves.
 
 Two faces that meet do so along a segment, each end of which lies where an edge of one crosses the other, or in a
 vertex that both share. At a crossing the segment goes on in the next face beside that edge, so segments chain to

@@ -1,4 +1,4 @@
-"""Global intersection analysis: which part of a sheet has come through another and has to go back.
+"""Global intersection analysis: the part of a sheet that passed through another and must go back.
 
 A contour cuts the sheets it lies on. Two floods rise from its two sides, and where they meet, the sheet is divided: by
 the contour alone if it is closed, by the contour and the boundary if it ends there, and else by the straightest way on

@@ -1,4 +1,4 @@
-"""Contour minimisation: how edges and faces must move against each other so that the contour grows shorter.
+"""Contour minimisation: motions of edges and faces that shorten an intersection contour.
 
 Volino & Magnenat-Thalmann 2006, "Resolving surface collisions through intersection contour minimization". The contour
 is a polygon of crossings. One of edge e (unit) with a face of normal n follows the edge's shift d as

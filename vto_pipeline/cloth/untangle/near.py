@@ -1,4 +1,4 @@
-"""What is near must stay apart: rows that keep untangled parts from running into each other."""
+"""Rows that keep untangled parts from running into each other."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from vto_pipeline.cloth.collision.candidates import self_candidates
-from vto_pipeline.cloth.collision.features import Features
+from vto_pipeline.cloth.collision.self_collision.candidates import self_candidates
+from vto_pipeline.cloth.collision.self_collision.surface_features import Features
 from vto_pipeline.cloth.untangle.rows import Rows, rows
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.numerics.bvh import Bvh, refit_swept
 from vto_pipeline.numerics.distance import blend, closest_on_segments, closest_on_triangle
+from vto_pipeline.numerics.spatial.bvh import Bvh, refit_swept
 from vto_pipeline.numerics.vector import add, load, norm, scale, store, sub, unit
 
 

@@ -1,4 +1,4 @@
-"""Rows that take crossings out: what has come through goes back, and where nobody knows what has, contours shorten."""
+"""Rows that resolve crossings: parts that passed through go back, and unresolved contours shorten."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Moves a cloth so that rows hold, without stretching it and as smoothly as that goes.
+"""Move a cloth so that rows hold, smoothly and without stretching it.
 
 Rows and bars are projected one after the other, again and again (Müller et al. 2007, "Position based dynamics").
 Neighbours drag each other along a little, so that what is pushed takes its surroundings with it.
@@ -55,7 +55,7 @@ def bars(mesh: TriangleMesh, rest: FloatArray) -> Bars:
 
 
 def opened_at(bars: Bars, vertices: IntArray, count: int) -> Bars:
-    """Return the bars with kinks at these of so many vertices to be opened."""
+    """Return the bars with kinks at these of this many vertices to be opened."""
     kinked = np.zeros(count, np.bool_)
     kinked[vertices] = True
     return bars._replace(least=np.where(kinked[bars.ends].any(axis=1), bars.opened, bars.least))
@@ -86,7 +86,7 @@ def _flat(rest: FloatArray, hinge: IntArray) -> FloatArray:
 
 @njit(cache=True, error_model="numpy")
 def relax(positions, rows, bars, sweeps, pressed):  # type: ignore[no-untyped-def]
-    """Return the positions [m], shape (V, 3), after so many sweeps; the rows have the last word.
+    """Return the positions [m], shape (V, 3), after this many sweeps; the rows have the last word.
 
     Args:
         positions: [m], shape (V, 3).

@@ -1,4 +1,4 @@
-"""What must hold between a few points of the cloth: rows of one-sided, linear conditions."""
+"""One-sided linear conditions on a few points of the cloth."""
 
 from __future__ import annotations
 

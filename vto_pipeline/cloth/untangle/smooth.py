@@ -1,4 +1,4 @@
-"""Takes kinks out: about a crossing that pushing does not undo, cloth is replaced by the smoothest that fits in."""
+"""Smoothing around crossings that pushing does not resolve."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Untangling of a bad start: cloth that passes through itself or a body is moved as little as need be, until none does.
+"""Untangling of a bad start: cloth that crosses itself or a body is moved as little as needed.
 
 Each round finds the crossings exactly, asks the flood for each contour which part has come through, and where that
 cannot be told, which way the contour shortens; turns both into rows, and relaxes the cloth to them without stretching
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vto_pipeline.cloth.collision.features import features
+from vto_pipeline.cloth.collision.self_collision.surface_features import features
 from vto_pipeline.cloth.untangle.body import Walls
 from vto_pipeline.cloth.untangle.contours import Crossings, contours, crossings
 from vto_pipeline.cloth.untangle.flood import sheet
@@ -27,7 +27,7 @@ from vto_pipeline.geometry.topology import face_area_vectors
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
-from vto_pipeline.numerics import bvh
+from vto_pipeline.numerics.spatial import bvh
 
 _STEP = 0.5  # of the mean edge: how far a round pushes
 _SWEEPS = 20  # of the relaxation, each round
@@ -97,7 +97,7 @@ def untangle(
     best = tangle = work.tangle(x)
     best_round, began = 0, best.count
     if not began:
-        job.leave_out("untangling the start", "no triangles meet")
+        job.leave_out("untangling the start", "no triangles intersect")
     for k in range(1, rounds + 1):
         stalled = k - 1 - best_round
         if best.count == 0 or stalled > _PATIENCE:
@@ -113,7 +113,7 @@ def untangle(
     places = work.places(best)
     if best.count:
         shown = ", ".join("({:.3f}, {:.3f}, {:.3f})".format(*points.mean(axis=0)) for points in places[:5])
-        job.warn(f"{best.count} of {began} pairs of triangles of the start still meet, near {shown}")
+        job.warn(f"{best.count} of {began} pairs of triangles still intersect at the start, near {shown}")
     return Untangled(best.positions, best.pairs, best.body_pairs, places, best_round, work.growth(best.positions))
 
 

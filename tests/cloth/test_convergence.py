@@ -1,0 +1,129 @@
+"""Rest: what hardly moves is not yet at rest, and no error is promised that is not kept."""
+
+import numpy as np
+import pytest
+from cloth_scenes import fabric, sheet
+from numpy.testing import assert_allclose
+
+from vto_pipeline.cloth.constraints.points.spring import springs
+from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
+from vto_pipeline.cloth.model.build import at_rest, build, model_of
+from vto_pipeline.cloth.rest.convergence import SettleLimits, settle
+from vto_pipeline.cloth.rest.equilibrium import equilibrium
+from vto_pipeline.errors import FallenError
+from vto_pipeline.model.garment import RestShape
+
+
+def pressed_springs(off):
+    """Two soft springs in line, pressed together, so little out of line that for 20 s nothing seems to move."""
+    points = np.array([[0.0, 0, 0], [0.5, off, 0], [1.0, 0, 0]])
+    long = springs([[0, 1], [1, 2]], points, 100.0, rest=0.6)
+    model = model_of((long,), np.full(3, 1e-3), pinned=[0, 2], gravity=(0.0, 0.0, 0.0))
+    return Stepper(model, [], np.full(3, 1e-3), StepConfig(), damping=5.0), at_rest(points)
+
+
+def test_what_buckles_slowly_is_not_called_at_rest():
+    stepper, start = pressed_springs(1e-8)
+    found = settle(stepper, start, SettleLimits(1e-4, 0.01, 100.0, 320))
+    assert found.settled
+    lengths = np.linalg.norm(np.diff(found.state.positions, axis=0), axis=1)
+    assert_allclose(lengths, 0.6, rtol=1e-4)  # free of force: nothing else bears it
+    assert_allclose(np.hypot(*found.state.positions[1, 1:]), np.sqrt(0.6**2 - 0.5**2), rtol=1e-4)
+    waiting = [row.error_mm for row in found.trace if row.error_mm < np.inf][:20]
+    assert min(waiting) >= 3.0  # it hardly moves, and no less is promised
+
+
+def test_coarse_answers_are_not_waited_for():
+    stepper, start = pressed_springs(1e-8)
+    found = settle(stepper, start, SettleLimits(4e-3, 0.01, 100.0, 320))
+    assert found.settled
+    assert found.error == 3e-3  # and told that it may be off by as much
+    assert len(found.trace) < 20
+
+
+@pytest.mark.parametrize("target", [3e-3, 1e-3, 3e-4, 1e-5])
+def test_a_hanging_cloth_is_as_near_to_rest_as_it_says(target):
+    """Against the same run, which goes on to a hundredth of the error."""
+    mesh = sheet(12, 12, 0.5, 0.5, upright=False)
+    model = build(mesh, RestShape(mesh.vertices), fabric(bending=1e-6), pinned=[0, 11])
+    ends = []
+    for error in (target, target / 100.0):
+        stepper = Stepper(model, [], np.full(144, 2e-3), StepConfig(), damping=5.0)
+        found = settle(stepper, at_rest(mesh.vertices), SettleLimits(error, 0.01, 60.0, 320))
+        assert found.settled
+        assert found.error <= error
+        ends.append(found)
+    true = np.sqrt(((ends[0].state.positions - ends[1].state.positions) ** 2).sum(axis=1).mean())
+    assert true <= 1.5 * ends[0].error
+
+
+@pytest.mark.parametrize("solver", ["xpbd", "projective"])
+def test_what_steps_solved_in_part_falsify_is_promised_too(solver):
+    """Against the minimum of the energy, by Newton."""
+    mesh = sheet(8, 8, 0.4, 0.4)
+    model = build(mesh, RestShape(mesh.vertices), fabric(stretch=100.0, shear=50.0), pinned=[56, 63])
+    start = mesh.vertices + np.outer(0.4 - mesh.vertices[:, 1], [0.0, 0.0, 0.05])
+    stepper = Stepper(model, [], np.full(64, 2e-3), StepConfig(solver=solver, sweeps=1), damping=5.0)
+    found = settle(stepper, at_rest(start), SettleLimits(3e-3, 0.01, 60.0, 320))
+    assert found.settled
+    assert found.error <= 3e-3
+    true = equilibrium(model, found.state.positions).positions
+    assert np.sqrt(((found.state.positions - true) ** 2).sum(axis=1).mean()) <= 1.5 * found.error
+
+
+class Standing:
+    """A cloth that does not move, with so much of its weight not in balance; its method has the exact rest."""
+
+    rests_exactly, polishes, definite, known = True, False, False, None
+    substeps, step, steps, bearing = 1.0, 0.1, 0, 7
+
+    def __init__(self, residual):
+        self._residual = residual
+
+    def prepare(self, positions):
+        pass
+
+    def polish(self, on):
+        pass
+
+    def run(self, state, seconds):
+        self.steps += 1
+        return state
+
+    def residual(self, state):
+        return self._residual
+
+
+@pytest.mark.parametrize(("residual", "settled"), [(0.009, True), (0.011, False), (5.0, False)])
+def test_cloth_that_stands_still_out_of_balance_is_not_at_rest(residual, settled):
+    found = settle(Standing(residual), at_rest(np.zeros((4, 3))), SettleLimits(1e-3, 0.01, 60.0, 320))
+    assert found.settled is settled
+    assert found.error == 0.0
+    assert len(found.trace) < 20  # waiting longer would bring nothing
+    assert f"a residual force of {residual:.2g} of a vertex's weight" in found.unrest
+
+
+def test_steps_are_as_before_when_it_is_over():
+    stepper, start = pressed_springs(1e-3)
+    found = settle(stepper, start, SettleLimits(1e-4, 0.01, 100.0, 320))
+    assert found.settled
+    assert stepper.substeps == stepper.choice.substeps
+    stepper.run(found.state, 0.1)
+    assert not stepper.definite  # nor is the stiffness the exact one
+
+
+def test_cloth_that_nothing_holds_has_fallen_off():
+    """It falls freely, 1 m in 0.45 s; what is held above the same height stays."""
+    mesh = sheet(3, 3, 0.2, 0.2)
+    free = build(mesh, RestShape(mesh.vertices), fabric())
+    lowest = float(mesh.vertices[:, 1].min()) - 1.0
+    with pytest.raises(FallenError, match="nothing holds it"):
+        settle(
+            Stepper(free, [], np.full(len(free.mass), 1e-3), StepConfig()),
+            at_rest(mesh.vertices),
+            SettleLimits(1e-3, 0.01, 30.0, 320, lowest=lowest),
+        )
+    held = build(mesh, RestShape(mesh.vertices), fabric(), pinned=[0])
+    stepper = Stepper(held, [], np.full(len(held.mass), 1e-3), StepConfig(), damping=5.0)
+    off = 1e-6 * np.random.default_rng(0).standard_normal(mesh.vertices.shape)  # flat, it would stand on a saddle
+    assert settle(stepper, at_rest(mesh.vertices + off), SettleLimits(1e-3, 0.01, 30.0, 320, lowest=lowest)).settled

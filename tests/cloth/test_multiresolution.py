@@ -1,0 +1,113 @@
+"""Coarse to fine: the same garment in fewer triangles, there and back, and drapes by way of it."""
+
+import numpy as np
+import pytest
+from cloth_scenes import fabric, tube
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+from test_drape import double_vest, pear, vest
+
+import vto_pipeline.cloth.rest.multiresolution as levels_module
+from vto_pipeline.cloth.drape import drape
+from vto_pipeline.cloth.rest.coarsening import coarser
+from vto_pipeline.errors import GarmentError
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.geometry.topology import boundary_loops, face_area_vectors
+from vto_pipeline.model.garment import Garment, RestShape
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+
+SETTINGS = {"settle_seconds": 4.0, "target_error_mm": 1.0}
+
+
+def area(mesh):
+    return np.linalg.norm(face_area_vectors(mesh), axis=1).sum()
+
+
+def worn():
+    """A tube at rest, and turned and drawn out where it is now."""
+    laid = tube(0.115, 0.2, 72, 24, base=0.0)
+    turn = Rotation.from_rotvec([0.3, -1.0, 0.2]).as_matrix()
+    now = laid.vertices * [1.0, 1.1, 1.0] @ turn.T + [1.0, 2.0, 3.0]
+    return Garment(TriangleMesh(now, laid.faces), RestShape(laid.vertices, mode="inverse", regraded=True))
+
+
+def test_the_same_garment_in_a_quarter_of_the_vertices():
+    fine = worn()
+    coarse = coarser(fine, len(fine.mesh.vertices) // 4).garment
+    laid = TriangleMesh(coarse.rest.positions, coarse.mesh.faces)
+    assert 0.8 < 4 * len(laid.vertices) / len(fine.mesh.vertices) < 1.3
+    assert area(laid) == pytest.approx(2 * np.pi * 0.115 * 0.2, rel=5e-3)  # of a cylinder; its polygons have less
+    assert len(boundary_loops(laid)) == 2
+    assert (coarse.rest.mode, coarse.rest.regraded) == ("inverse", True)
+    apart = SurfaceDistance(fine.mesh).nearest(coarse.mesh.vertices).distance
+    assert apart.max() < 1e-4  # it lies where the fine one is now, chords of the fine one apart
+    assert area(coarse.mesh) == pytest.approx(area(fine.mesh), rel=5e-3)
+
+
+def test_there_and_back():
+    fine = worn()
+    coarse = coarser(fine, len(fine.mesh.vertices) // 4)
+    back = coarse.finer(coarse.garment.rest.positions)
+    assert_allclose(back, fine.rest.positions, rtol=0, atol=1e-12)  # rounding only
+    turn = Rotation.from_rotvec([1.0, -2.0, 0.5]).as_matrix()
+    assert_allclose(
+        coarse.finer(coarse.garment.rest.positions @ turn.T + 1.0),
+        fine.rest.positions @ turn.T + 1.0,
+        rtol=0,
+        atol=1e-12,
+    )
+    assert_allclose(coarse.finer(coarse.garment.mesh.vertices), fine.mesh.vertices, rtol=0, atol=5e-4)
+
+
+def test_a_drape_by_way_of_a_coarser_mesh():
+    cloth, job = fabric(bending=1e-5), Job()
+    found = drape(vest(), pear(), cloth, {**SETTINGS, "coarsen_above": 1000}, job)
+    direct = drape(vest(), pear(), cloth, SETTINGS)
+    steps = sum(max(row.step for row in found.trace if row.level == level) for level in (0, 1))
+    assert job.metrics["body_refits_left_out"] >= steps  # what was left out on both meshes counts
+    assert found.audit["settled"] is True
+    assert found.audit["body_intersections"] == found.audit["self_intersections"] == 0
+    on = [row.level for row in found.trace]
+    assert on == sorted(on, reverse=True)
+    assert set(on) == {0, 1}
+    assert {row.level for row in direct.trace} == {0}
+    assert np.all(np.diff([row.seconds for row in found.trace]) > 0)
+    assert found.trace[-1].contacts > 100  # it lies on the pear all around
+    assert any("first came to rest on" in note for note in job.notes)
+    apart = np.linalg.norm(found.mesh.vertices - direct.mesh.vertices, axis=1)
+    assert np.median(apart) < 3e-3  # friction remembers the way, within 3 mm of skin and millimetres of slip
+    again = drape(vest(), pear(), cloth, {**SETTINGS, "coarsen_above": 1000})
+    assert (again.mesh.vertices == found.mesh.vertices).all()
+
+
+def test_a_small_garment_needs_none():
+    job = Job()
+    drape(vest(), pear(), fabric(), {"settle_seconds": 0.1}, job)
+    reasons = dict(job.left_out)
+    assert "1728 vertices; it pays off above 4000" in reasons["coming to rest on a coarser mesh first"]
+
+
+def test_a_garment_that_cannot_be_made_coarser_is_draped_as_it_is(monkeypatch):
+    def refuse(garment, vertices):
+        raise GarmentError("remeshing broke the surface")
+
+    monkeypatch.setattr(levels_module, "coarser", refuse)
+    job = Job()
+    found = drape(vest(), pear(), fabric(), {"settle_seconds": 0.1, "coarsen_above": 1000}, job)
+    assert {row.level for row in found.trace} == {0}
+    assert "remeshing broke the surface" in dict(job.left_out)["coming to rest on a coarser mesh first"]
+
+
+@pytest.mark.parametrize(("garment", "levels"), [(vest(), {0, 1}), (double_vest(), {0})])
+def test_what_cannot_be_freed_on_a_coarse_mesh_begins_on_the_first_that_can(garment, levels):
+    job = Job()
+    found = drape(
+        garment, pear(), fabric(bending=1e-5), {**SETTINGS, "target_error_mm": 4.0, "coarsen_above": 100}, job
+    )
+    given_up = [why for what, why in job.left_out if what.startswith("coming to rest on ")]
+    assert len(given_up) > 1
+    assert all("too coarse to clear the body" in why for why in given_up)
+    assert {row.level for row in found.trace} == levels
+    assert found.audit["settled"] is True
+    assert found.audit["body_intersections"] == found.audit["self_intersections"] == 0

@@ -1,0 +1,64 @@
+"""Rest and clearing: what is moved off the body after it came to rest has not come to rest."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from cloth_scenes import ball, fabric, sheet
+
+import vto_pipeline.cloth.rest.phases as module
+from vto_pipeline.cloth.drape_config import DrapeConfig
+from vto_pipeline.cloth.model.build import at_rest, build
+from vto_pipeline.cloth.rest.convergence import Settling
+from vto_pipeline.cloth.rest.phases import Phases
+from vto_pipeline.model.garment import RestShape
+from vto_pipeline.model.job import Job
+
+NONE, ONE = np.zeros((0, 2), np.int32), np.zeros((1, 2), np.int32)
+
+
+class Ready:
+    """A cloth among its colliders, of which only the length of its steps is asked."""
+
+    rests_exactly, substeps = True, 1.0
+
+    def prepare(self, positions):
+        pass
+
+
+def ended(monkeypatch, clearings):
+    """How a cloth ends that settles at once, each time; the clearing moves it, or not, and leaves pairs, in turn."""
+    mesh = sheet(4, 4, 0.1, 0.1)
+    model, rest = build(mesh, RestShape(mesh.vertices), fabric()), RestShape(mesh.vertices)
+    left = list(clearings)
+
+    def clear(stepper, state, *given):
+        moves, pairs = left.pop(0)
+        return (replace(state, positions=state.positions + 0.001) if moves else state), pairs
+
+    monkeypatch.setattr(module, "settle", lambda stepper, state, limits, watch: Settling(state, True, 1e-4, 1e-3))
+    monkeypatch.setattr(module, "clear_of_body", clear)
+    found = Phases(model, rest, fabric(), DrapeConfig(), Job()).settle(
+        at_rest(mesh.vertices), Ready(), ball(0.3, levels=1), np.inf
+    )
+    assert not left
+    return found
+
+
+def test_what_lies_clear_is_at_rest(monkeypatch):
+    found = ended(monkeypatch, [(False, NONE), (False, NONE)])
+    assert found.settled is True
+    assert found.error == 1e-4
+
+
+def test_what_was_cleared_comes_to_rest_again(monkeypatch):
+    assert ended(monkeypatch, [(False, NONE), (True, NONE), (False, NONE)]).settled is True
+
+
+@pytest.mark.parametrize("pairs", [NONE, ONE], ids=["clear", "still crossing"])
+def test_what_the_last_clearing_moved_is_not_at_rest(monkeypatch, pairs):
+    turns = module._TURNS - 1 if len(pairs) == 0 else 0
+    found = ended(monkeypatch, [(True, NONE)] * turns + [(True, pairs)])
+    assert found.settled is False
+    assert found.error == np.inf  # what was predicted was of another place
+    assert found.unrest == "not at rest, error unknown"

@@ -1,0 +1,168 @@
+"""Polishing: Newton's steps are taken as far as they lead to rest, and not where they lead away."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from vto_pipeline.cloth.dynamics.methods import FRAME
+from vto_pipeline.cloth.model.build import ClothState, at_rest
+from vto_pipeline.cloth.rest.convergence import SettleLimits, settle
+from vto_pipeline.cloth.rest.stable_newton import LONGEST, Polish
+
+
+class Steps:
+    """What polishing sees of a stepper."""
+
+    rests_exactly = polishes = True
+    bearing = steps = 0
+    known = None
+
+    def __init__(self):
+        self.substeps, self.definite, self.exact = 0.5, False, False
+
+    @property
+    def step(self):
+        return FRAME / self.substeps
+
+    def prepare(self, positions):
+        pass
+
+    def polish(self, on):
+        self.exact = on
+
+
+class Straying(Steps):
+    """One coordinate x [mm] with the force -x; steps as long as usual halve it, longer ones go far away.
+
+    What it knows of contacts, it has from the last step.
+    """
+
+    def __init__(self):
+        super().__init__()
+        self.known = "nothing"
+        self.tried = 0
+        self.knew = set()
+
+    def run(self, state, seconds):
+        self.definite = self.exact
+        self.knew.add(self.known)
+        strays = self.substeps < 0.5
+        self.tried += strays
+        self.known = "too far" if strays else "half way"
+        after = state.positions + 1.0 if strays else 0.5 * state.positions
+        return ClothState(after, np.zeros((1, 3)), state.time + seconds)
+
+    def residual(self, state):
+        return 0.01 * abs(1e3 * state.positions[0, 0])
+
+
+def test_a_long_step_that_leads_away_is_not_taken():
+    stepper = Straying()
+    found = settle(stepper, at_rest(np.array([[1e-3, 0, 0]])), SettleLimits(1e-5, 0.01, 4.0, 160))
+    assert stepper.tried > 5
+    assert stepper.knew == {"nothing", "half way"}
+    residuals = np.array([row.residual for row in found.trace])
+    assert_allclose(residuals, 0.01 * 0.5 ** np.arange(1, len(residuals) + 1), rtol=1e-9)
+    assert_allclose(found.state.positions[0, 0], 1e-3 * 0.5 ** len(residuals), rtol=1e-9)
+    assert not found.settled  # nobody knows whether it is stable there
+    assert stepper.substeps == 0.5
+    assert not stepper.exact
+
+
+def test_steps_grow_while_the_force_falls():
+    stepper = Steps()
+    polish = Polish(stepper, enough=0.01)
+    polish.choose(True, 5e-3)
+    assert stepper.exact
+    stepper.definite = True
+    lengths, residual = [], 5e-3
+    while not polish.whole:
+        assert not polish.goes_astray(residual)
+        polish.choose(True, residual)
+        lengths.append(stepper.step)
+        residual *= 0.5
+    assert_allclose(lengths, [4 / 30, 16 / 30, LONGEST])
+
+
+def test_what_leaves_more_force_is_tried_in_shorter_steps_until_they_are_as_usual():
+    stepper = Steps()
+    polish = Polish(stepper, enough=0.01)
+    polish.choose(True, 5e-3)
+    stepper.definite = True
+    assert not polish.goes_astray(0.04)  # what is soft comes first
+    polish.choose(True, 0.04)
+    assert stepper.step == pytest.approx(1 / 30)  # no longer steps before forces are all but in balance
+    polish.choose(True, 5e-3)
+    assert stepper.step == pytest.approx(4 / 30)
+    assert polish.goes_astray(0.04)  # but it has to fall
+    assert stepper.exact
+    assert stepper.step == pytest.approx(1 / 30)
+    assert not polish.goes_astray(0.4)
+    polish.choose(True, 0.4)
+    assert stepper.exact
+    assert stepper.step == pytest.approx(1 / 30)  # it is on its way: no longer steps yet
+    assert not polish.goes_astray(5e-3)
+    polish.choose(True, 5e-3)
+    assert stepper.step == pytest.approx(4 / 30)
+
+
+class Buckling(Steps):
+    """One coordinate x [mm] in the potential of a buckled strip, c/4 (1 - x²)²: stable at 1 and -1, not at 0.
+
+    Each step is one of Newton's method from rest, as cloth takes them where inertia damps: with the exact stiffness
+    while the system is positive definite, else with one that holds back ten times as much.
+    """
+
+    c = 0.95 * 30.0**2  # 1/s²: at 0, with the exact stiffness, a step of 1/30 s brings it twenty times as far
+
+    def run(self, state, seconds):
+        x, h = 1e3 * state.positions[0, 0], self.step
+        held = 1.0 + h * h * self.c * (3.0 * x * x - 1.0)
+        self.definite = self.exact and held > 0.0
+        if not self.definite:
+            held = 1.0 + 10.0 * h * h * self.c
+        x += h * h * self.c * x * (1.0 - x * x) / held
+        return ClothState(np.array([[1e-3 * x, 0, 0]]), np.zeros((1, 3)), state.time + seconds)
+
+    def residual(self, state):
+        x = 1e3 * state.positions[0, 0]
+        return 0.1 * abs(x * (1.0 - x * x))
+
+
+def test_what_falls_out_of_an_unstable_place_is_let_go():
+    found = settle(Buckling(), at_rest(np.array([[5e-6, 0, 0]])), SettleLimits(1e-5, 0.01, 4.0, 160))
+    assert found.settled
+    assert found.state.positions[0, 0] == pytest.approx(1e-3, abs=1e-5)
+    assert len(found.trace) < 12
+
+
+class Creeping(Buckling):
+    """The same strip with inertia, so soft that in a step as long as usual its system is not positive definite at 0.
+
+    The stiffness that holds back ten times as much lets it creep out of there by a tenth a step.
+    """
+
+    c = 20.0 * 30.0**2  # 1/s²
+
+    def run(self, state, seconds):
+        x, v, h = 1e3 * state.positions[0, 0], 1e3 * state.velocities[0, 0], self.step
+        self.definite = self.exact
+        for _ in range(round(seconds / h)):
+            self.steps += 1
+            held = 1.0 + h * h * self.c * (3.0 * x * x - 1.0)
+            if held <= 0.0:
+                self.definite = False
+            if not self.definite:
+                held = 1.0 + 10.0 * h * h * self.c
+            v = (np.exp(-5.0 * h) * v + h * self.c * x * (1.0 - x * x)) / held
+            x += h * v
+        return ClothState(np.array([[1e-3 * x, 0, 0]]), np.array([[1e-3 * v, 0, 0]]), state.time + seconds)
+
+
+def test_where_cloth_is_about_to_buckle_steps_are_short_enough_for_it_to():
+    strip = Creeping()
+    found = settle(strip, at_rest(np.array([[1e-9, 0, 0]])), SettleLimits(1e-5, 0.01, 4.5, 160))
+    assert found.settled  # in 37 looks; the usual stiffness alone takes 54
+    assert found.state.positions[0, 0] == pytest.approx(1e-3, abs=1e-5)
+    assert strip.substeps == 0.5
+    assert not strip.exact

@@ -1,0 +1,197 @@
+"""The pages: what they quote stands in results files, their prose is plain, their links lead somewhere."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from vto_pipeline.bench import BENCHES
+from vto_pipeline.bench.docs.__main__ import faults
+from vto_pipeline.bench.docs.pages import FIGURES, RESULTS, SOURCES, render
+from vto_pipeline.bench.docs.prose import LONGEST, count_words, long_sentences, typed_figures
+from vto_pipeline.bench.docs.results import Results
+from vto_pipeline.cli.work import catalogue, planned
+from vto_pipeline.errors import ConfigError, InputError
+from vto_pipeline.io.bodies.measurements import read_measurements
+from vto_pipeline.io.captures.photos import read_board
+from vto_pipeline.io.fabrics import read_fabric
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+
+
+def first_key(block: str) -> str:
+    return next(line for line in block.splitlines() if not line.startswith("#")).split(":")[0]
+
+
+BLOCKS = [
+    (page.name, block) for page in PAGES for block in re.findall(r"```yaml\n(.*?)```", page.read_text(), flags=re.S)
+]
+EXAMPLES = [(name, block) for name, block in BLOCKS if first_key(block) != "given"]
+"""All that is not a part of a document only."""
+
+ROW = {
+    "scene": "hang 32",
+    "method": "newton",
+    "settings": {"substeps": 2},
+    "vertices": 1024,
+    "seconds": 0.3456,
+    "errors": {"rms_stretch": 1.7e-5, "share": 0.123, "status": "reached", "crossings": 0, "settled": True},
+    "runs": 3,
+    "compile_s": 0.0,
+    "threads": 1,
+}
+MACHINE = {"cpu": "a processor", "cores": 2, "threads": 1, "memory_gb": 25.3, "load_at_start": 0.5}
+
+
+def document(*rows: dict) -> dict:
+    head = {"bench": "toy", "command": "vto bench toy", "commit": "0123456789ab", "date": "2026-11-23"}
+    return {**head, "machine": MACHINE, "quick": True, "rows": list(rows)}
+
+
+@pytest.fixture
+def project(tmp_path):
+    """A project with one page, one results file and a README."""
+    (tmp_path / SOURCES / "benchmarks").mkdir(parents=True)
+    (tmp_path / RESULTS).mkdir(parents=True)
+    other = {**ROW, "method": "xpbd", "seconds": 2.0}
+    (tmp_path / RESULTS / "toy.json").write_text(json.dumps(document(ROW, other)))
+    source = '# Toy\n\nIt takes {{ figure("toy", "seconds", method="newton") }} s for {{ chosen("1 m") }}.\n'
+    (tmp_path / SOURCES / "benchmarks" / "toy.md.j2").write_text(source)
+    (tmp_path / SOURCES / "README.md.j2").write_text("# A project\n")
+    for name, text in render(tmp_path).items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def test_the_pages_are_what_sources_and_results_say_and_read_well():
+    assert list(faults(ROOT)) == []
+
+
+def test_every_page_names_its_figures_with_command_and_file(project):
+    assert "It takes 0.35 s for 1 m." in (project / "docs/benchmarks/toy.md").read_text()
+    assert (
+        "| 0.35 | hang 32, newton: seconds | [toy.json](../results/toy.json) | `vto bench toy` |"
+        in (project / FIGURES).read_text()
+    )
+    assert list(faults(project)) == []
+
+
+def test_another_result_makes_the_page_stale(project):
+    path = project / RESULTS / "toy.json"
+    path.write_text(path.read_text().replace("0.3456", "0.4567"))
+    assert [line.split(":")[0] for line in faults(project)] == ["docs/benchmarks/toy.md", FIGURES]
+
+
+def test_an_edited_page_is_stale(project):
+    page = project / "docs/benchmarks/toy.md"
+    page.write_text(page.read_text().replace("0.35", "0.34"))
+    assert [line.split(":")[0] for line in faults(project)] == ["docs/benchmarks/toy.md"]
+
+
+@pytest.mark.parametrize(
+    ("asked", "problem"),
+    [
+        ('figure("toy", "seconds", method="rk4")', "no row with method='rk4'"),
+        ('figure("toy", "seconds")', "2 rows where one was expected"),
+        ('figure("toy", "meters", method="newton")', "no figure meters"),
+        ('figure("absent", "seconds")', "no such file"),
+        ('rows("toy").total("status")', "not a number"),
+        ("figure(", "unexpected"),
+        ("misspelt", "undefined"),
+    ],
+)
+def test_what_no_result_has_is_an_error_that_names_the_page(project, asked, problem):
+    source = project / SOURCES / "benchmarks" / "toy.md.j2"
+    source.write_text(f"{{{{ {asked} }}}}")
+    with pytest.raises(ConfigError, match=re.escape(problem)) as raised:
+        render(project)
+    assert str(source) in raised.value.where
+
+
+def test_results_that_do_not_say_where_they_come_from_are_refused(project):
+    path = project / RESULTS / "toy.json"
+    path.write_text(json.dumps({"rows": [ROW]}))
+    with pytest.raises(InputError, match="without command, commit, date, machine"):
+        Results(project / RESULTS).rows("toy")
+
+
+@pytest.mark.parametrize(
+    ("key", "form", "text"),
+    [
+        ("seconds", {}, "0.35"),
+        ("seconds", {"places": 1}, "0.3"),
+        ("seconds", {"scale": 1000, "significant": 3}, "346"),
+        ("rms_stretch", {}, "1.7e-5"),
+        ("share", {"scale": 100, "places": 0}, "12"),
+        ("vertices", {}, "1,024"),
+        ("crossings", {}, "0"),
+        ("status", {}, "reached"),
+        ("settled", {}, "yes"),
+    ],
+)
+def test_how_a_figure_is_written(project, key, form, text):
+    assert Results(project / RESULTS).figure("toy", key, method="newton", **form) == text
+
+
+def test_figures_over_several_rows(project):
+    rows = Results(project / RESULTS).rows("toy", scene="hang *")
+    assert (rows.least("seconds"), rows.most("seconds"), rows.total("seconds")) == ("0.35", "2.0", "2.3")
+    assert (rows.count(), rows.count("status", "reached"), rows.count("status", "failed")) == ("2", "2", "0")
+    assert [row.method for row in rows] == ["newton", "xpbd"]
+
+
+def test_a_figure_typed_by_hand_is_found():
+    typed = (
+        'within 3.6 mm\n{{ figure("toy", "seconds") }} s\n`2 s`\n| 86 % | 1.7e-5 | 12 GB |\n1/60 s, ISO 8559, 3 files'
+    )
+    assert [(fault.line, fault.problem.split(": ")[1]) for fault in typed_figures(typed)] == [
+        (1, "3.6 mm"),
+        (4, "86 %"),
+        (4, "1.7e-5"),
+        (4, "12 GB"),
+    ]
+
+
+def test_long_sentences_are_found_where_they_begin():
+    words = " ".join(["word"] * LONGEST)
+    skipped = f"| {words} {words} |\n\n```\n{words} {words}\n```\n\n"
+    text = f"# Title\n\nFirst {words}.\n\n- {words}.\n\n{skipped}{words}. `Code` {words}.\n"
+    assert [fault.line for fault in long_sentences(text)] == [3, 13]
+
+
+def test_links_code_and_abbreviations_count_as_they_read():
+    assert count_words("two [words](somewhere/else.md) - |") == 2
+    assert long_sentences("[" + "word " * 20 + "](a b c d e f g h)", longest=20) == []
+    assert long_sentences("e.g. This goes on, i.e. it ends here.", longest=7) != []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_links_lead_somewhere(page):
+    links = re.findall(r"\]\(([^)#\s]+)[^)]*\)", re.sub(r"```.*?```", "", page.read_text(), flags=re.S))
+    absent = [link for link in links if "://" not in link and not (page.parent / link).exists()]
+    assert absent == []
+
+
+@pytest.mark.parametrize(("page", "block"), EXAMPLES, ids=lambda value: str(value).split("\n")[0])
+def test_examples_are_read_as_they_stand(page, block, tmp_path):
+    path = tmp_path / "example.yaml"
+    path.write_text(block.replace("../sample_data", str(ROOT / "sample_data")))
+    kinds = {
+        "schema": lambda: planned(path, (), catalogue()),
+        "name": lambda: read_fabric(path),
+        "instrument": lambda: read_fabric(path),
+        "sex": lambda: read_measurements(path),
+        "columns": lambda: read_board(path),
+    }
+    assert kinds[first_key(block)]()
+
+
+def test_every_results_file_comes_from_a_bench_or_a_sample_run():
+    known = {*BENCHES, *(path.stem for path in (ROOT / "configs").glob("*.yaml"))}
+    found = {path.stem for path in (ROOT / RESULTS).glob("*.json")}
+    assert {name for name in found if not name.startswith("first_run_")} <= known

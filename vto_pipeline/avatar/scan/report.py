@@ -1,0 +1,147 @@
+"""Quality of a registration, and whether the scan shows a body at all."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vto_pipeline.avatar.measuring.population import population
+from vto_pipeline.avatar.model.shape import ShapeSpace
+from vto_pipeline.avatar.template.template import JOINT_KINDS
+from vto_pipeline.errors import AvatarError
+from vto_pipeline.geometry.closest import closest_points
+from vto_pipeline.geometry.sampling import sample_surface
+from vto_pipeline.geometry.topology import face_area_vectors
+from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.body import Measurements
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+
+_NEAR_M = 0.030
+"""So near an end of the body lies to its scan before the body is displaced onto it."""
+EXPLAINED_M = 0.010
+"""Farther scan points are something else: a stand, a floor, hair."""
+CORE = 0.3
+"""A vertex belongs to trunk and limbs when it belongs less than this to head, hands and feet."""
+_TRUNK = 0.8
+_MIN_TRUNK, _MIN_LIMB = 0.3, 0.5
+_STRAY = 0.25
+"""Of a limb's surface: so much that lies elsewhere and faces inwards is that limb, inside out; some of it lies near."""
+_POINTS = 5000
+_BUILD = ("shoulder_height", "back_shoulder_width", "outer_arm_length", "hip_height", "inside_leg", "knee_height")
+_BUILD_M, _ODD = 0.02, 4.0
+"""How well these are read off a bent body [m], and how many standard deviations no person is away."""
+
+
+def check(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray, max_mean_mm: float) -> None:
+    """Refuse a scan that is not a body.
+
+    Raises:
+        AvatarError: the scan lies too far from any body, or shows too little of the trunk; or a limb is inside out.
+    """
+    points, normals, _ = sample_surface(scan, _POINTS, 0)
+    face, _, distance = closest_points(points, vertices, space.base.faces)
+    mean = 1e3 * float(distance.mean())
+    share = _trunk_covered(scan, space, vertices)
+    if mean > max_mean_mm or share < _MIN_TRUNK:
+        raise AvatarError(
+            f"this is not a body, or too little of one: mean distance {mean:.1f} mm (at most {max_mean_mm}), "
+            f"{share:.0%} of the trunk found (at least {_MIN_TRUNK:.0%})",
+            hint="the scan must show the trunk from all sides, in metres, +Y up, its normals outwards",
+        )
+    body = TriangleMesh(vertices, space.base.faces)
+    each = _POINTS / np.linalg.norm(face_area_vectors(scan), axis=1).sum()  # points for an area
+    for limb, own in _limbs(space).items():
+        whole: NDArray[np.bool_] = np.all(own[body.faces], axis=1)
+        stray = whole[face] & (distance > EXPLAINED_M)
+        expected = each * np.linalg.norm(face_area_vectors(body)[whole], axis=1).sum()
+        # what encloses a volume faces away from its middle
+        outward = ((points[stray] - points[stray].mean(axis=0)) * normals[stray]).sum() if stray.any() else 0.0
+        if stray.sum() > _STRAY * expected and outward < 0:
+            raise AvatarError(
+                f"the surface of the {limb} is inside out", hint="flip its faces, so that normals point outwards"
+            )
+
+
+def check_build(read: Measurements, lean: float) -> None:
+    """Refuse a bent body that was not reconstructed: its lengths are implausible.
+
+    Args:
+        read: What was measured on it.
+        lean: The largest turn of a part of trunk and legs away from upright [rad].
+
+    Raises:
+        AvatarError: a length lies farther from what people of this stature have than pose and survey explain.
+    """
+    people = population(read.sex)
+    tall = float(people.mean[people.names.index("stature")])
+    usual = people.given({"stature": tall}, {})
+    for name in _BUILD:
+        k = usual.names.index(name)
+        # relative to stature, so that children have it too
+        away = read.values[name] * tall / read.values["stature"] - usual.mean[k]
+        if abs(away) > _ODD * np.hypot(np.sqrt(usual.covariance[k, k]), _BUILD_M):
+            raise AvatarError(
+                f"the body leans {np.rad2deg(lean):.0f} degrees and cannot be reconstructed: its {name} would be "
+                f"{100 * read.values[name]:.0f} cm at a stature of {100 * read.values['stature']:.0f} cm",
+                hint="scan it standing upright, with the arms held off the body",
+            )
+
+
+def report(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray, job: Job) -> list[str]:
+    """Return what the scan hides; measure how far it lies from the body, at points that the fit has not seen."""
+    faces = space.base.faces
+    points, _, _ = sample_surface(scan, _POINTS, job.seed + 1)
+    face, _, distance = closest_points(points, vertices, faces)
+    core = extremity_weights(space)[faces].mean(axis=1)[face] < CORE
+    explained = distance < EXPLAINED_M
+    for kind, which in (("", slice(None)), ("core_", core), ("explained_", explained)):
+        part = distance[which] * 1e3
+        if len(part):
+            job.measure(
+                **{
+                    f"{kind}mean_mm": round(float(part.mean()), 3),
+                    f"{kind}rms_mm": round(float(np.sqrt((part**2).mean())), 3),
+                    f"{kind}p95_mm": round(float(np.quantile(part, 0.95)), 3),
+                }
+            )
+    job.measure(explained_share=round(float(explained.mean()), 3))
+    job.measure(trunk_covered=round(_trunk_covered(scan, space, vertices), 3))
+    hidden = []
+    for limb, own in _limbs(space).items():
+        share = _shown(scan, vertices[own])
+        if share < _MIN_LIMB:
+            hidden.append(f"{limb} not seen")
+            job.warn(
+                f"{share:.0%} of the {limb} is in the scan: its measurements are estimates for a body of this size"
+            )
+    return hidden
+
+
+def extremity_weights(space: ShapeSpace) -> FloatArray:
+    """Return how much each vertex belongs to head, hands and feet, 0 to 1, shape (V,)."""
+    ends = np.flatnonzero(np.isin(JOINT_KINDS, ("head", "wrist", "ankle")))
+    share: FloatArray = space.base.weights[:, ends].sum(axis=1)
+    return share
+
+
+def _limbs(space: ShapeSpace) -> dict[str, NDArray[np.bool_]]:
+    """Return arm or leg -> which vertices are its own, without hand or foot, shape (V,)."""
+    names = space.base.joint_names
+    return {
+        f"{side} {limb}": space.base.weights[:, [names.index(f"{side}_{joint}") for joint in joints]].sum(axis=1)
+        > _TRUNK
+        for side in ("left", "right")
+        for limb, joints in {"arm": ("shoulder", "elbow"), "leg": ("hip", "knee")}.items()
+    }
+
+
+def _trunk_covered(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray) -> float:
+    names = space.base.joint_names
+    trunk = space.base.weights[:, [names.index(n) for n in ("pelvis", "spine", "chest")]].sum(axis=1) > _TRUNK
+    return _shown(scan, vertices[trunk])
+
+
+def _shown(scan: TriangleMesh, vertices: FloatArray) -> float:
+    """Return the share of some vertices that the scan shows."""
+    return float((closest_points(vertices, scan.vertices, scan.faces)[2] < EXPLAINED_M).mean())

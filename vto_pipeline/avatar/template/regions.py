@@ -1,0 +1,25 @@
+"""Vertices of each part of the body; the fixed topology makes them valid for every avatar."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vto_pipeline.avatar.template.template import membership
+from vto_pipeline.model.body import Avatar
+
+_HALF = 0.5
+
+
+def trunk(avatar: Avatar) -> NDArray[np.bool_]:
+    """Return which vertices are neither arm nor leg: trunk, neck and head, shape (V,)."""
+    return (membership("arm") < _HALF) & ~legs(avatar)
+
+
+def legs(avatar: Avatar) -> NDArray[np.bool_]:
+    """Return which vertices are leg: moved by a hip or what hangs on it more than by the pelvis, shape (V,)."""
+    joints = [k for k, name in enumerate(avatar.joint_names) if name.endswith(("hip", "knee", "ankle"))]
+    # the crotch is half left and half right leg, and still trunk
+    return (avatar.weights[:, joints].sum(axis=1) > _HALF) & (
+        avatar.vertices[:, 1] < avatar.vertices[avatar.landmarks["crotch_point"], 1]
+    )

@@ -1,0 +1,7 @@
+"""Bending constraints.
+
+hinge: the dihedral angle of two triangles
+isometric: quadratic, for sheets that hardly stretch
+shape_operator, mid_edge: the curvature of a triangle; it converges on any mesh
+bend_friction: internal friction
+"""

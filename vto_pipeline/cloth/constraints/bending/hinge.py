@@ -1,0 +1,195 @@
+"""Bending: one constraint a hinge, the dihedral angle against its rest angle.
+
+Energy ½ B (l²/A) (θ - θ₀)² with the bending rigidity B [N·m], the hinge's length l and the area A of its two
+triangles. Grinspun et al. 2003 and Bergou et al. 2006 give the weight 3 l²/A up to the material's constant; B is a
+rigidity per width, and one third of that weight makes the energy of a bent strip ½ B κ² per area: exactly so on a
+grid that follows the bend, where one hinge in three turns, and within some per cent on an isotropic mesh.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from vto_pipeline.cloth.constraints.kind import Kind
+from vto_pipeline.cloth.constraints.membrane.slivers import SLIVER, slenderness
+from vto_pipeline.cloth.constraints.membrane.yarns import thread_axes
+from vto_pipeline.model.fabric import Fabric
+from vto_pipeline.numerics.linear.coloured_blocks import blocks
+from vto_pipeline.numerics.mechanics.bending import dihedral
+from vto_pipeline.numerics.mechanics.xpbd_row import multiplier_step
+from vto_pipeline.numerics.vector import axpy, dot, load, store, store_at, sub
+
+
+class Bend(NamedTuple):
+    """Hinge constraints, in the order in which they are solved.
+
+    Args:
+        vertices: Ends of the hinge, then the wings, shape (H, 4).
+        rest: Rest angle [rad], shape (H,).
+        compliance: [1/(N·m)], shape (H,).
+        damping: Rayleigh's β, loss in proportion to stiffness [s].
+        starts, colours: See `numerics.blocks.Blocks`.
+    """
+
+    vertices: NDArray[np.int32]
+    rest: NDArray[np.float64]
+    compliance: NDArray[np.float64]
+    damping: float
+    starts: NDArray[np.int64]
+    colours: NDArray[np.int64]
+
+
+class Hinges(NamedTuple):
+    """Hinges of a sheet whose two triangles have areas at rest.
+
+    Args:
+        vertices: Ends, then the wings, shape (H, 4).
+        length: [m], shape (H,).
+        area: Of both triangles [m²], shape (H,).
+        along_warp: Squared cosine of the angle between hinge and warp, shape (H,).
+    """
+
+    vertices: NDArray[np.int32]
+    length: NDArray[np.float64]
+    area: NDArray[np.float64]
+    along_warp: NDArray[np.float64]
+
+    def stiffness(self, fabric: Fabric) -> NDArray[np.float64]:
+        """Return B l²/A [N·m], shape (H,): across a hinge at angle φ to the warp, B = B_warp sin²φ + B_weft cos²φ."""
+        rigidity = fabric.bending_warp * (1.0 - self.along_warp) + fabric.bending_weft * self.along_warp
+        stiff: NDArray[np.float64] = rigidity * self.length**2 / self.area
+        return stiff
+
+
+def solid_hinges(hinges: NDArray[np.int32], rest: NDArray[np.float64]) -> tuple[Hinges, NDArray[np.bool_]]:
+    """Return the hinges that can bend, and which of the given ones they are, shape (H,).
+
+    Args:
+        hinges: Ends and wings as from `geometry.topology.hinges`, shape (H, 4).
+        rest: Rest positions [m], shape (V, 3).
+    """
+    edge = rest[hinges[:, 1]] - rest[hinges[:, 0]]
+    length_sq = np.einsum("ij,ij->i", edge, edge)
+    warp, _, area_one = thread_axes(hinges[:, [0, 1, 2]], rest)
+    _, _, area_other = thread_axes(hinges[:, [1, 0, 3]], rest)
+    area = 0.5 * (area_one + area_other)
+    slender = np.minimum(slenderness(hinges[:, [0, 1, 2]], rest), slenderness(hinges[:, [1, 0, 3]], rest))
+    solid = (slender > SLIVER) & (length_sq > 0.0)
+    along = np.einsum("ij,ij->i", edge, warp)[solid] ** 2 / length_sq[solid]
+    return Hinges(hinges[solid], np.sqrt(length_sq[solid]), area[solid], along), solid
+
+
+def bend(
+    hinges: NDArray[np.int32],
+    rest: NDArray[np.float64],
+    rest_angles: NDArray[np.float64] | None,
+    fabric: Fabric,
+    damping: float = 0.0,
+) -> Bend:
+    """Return the hinges of a sheet; those that do not resist bending are left out.
+
+    Args:
+        hinges: Ends and wings as from `geometry.topology.hinges`, shape (H, 4).
+        rest: Rest positions, for lengths and areas [m], shape (V, 3).
+        rest_angles: Of each hinge [rad], shape (H,), as from `hinge_angles`; the sheet is flat at rest when None.
+        fabric: Bending rigidities.
+        damping: Rayleigh's β [s].
+    """
+    found, solid = solid_hinges(hinges, rest)
+    stiffness = found.stiffness(fabric)
+    stiff = stiffness > 0.0
+    angles = np.zeros(len(stiffness)) if rest_angles is None else rest_angles[solid]
+    order, starts, colours = blocks(found.vertices[stiff], rest)
+    vertices = np.ascontiguousarray(found.vertices[stiff][order])
+    return Bend(vertices, angles[stiff][order], 1.0 / stiffness[stiff][order], damping, starts, colours)
+
+
+@njit(cache=True, error_model="numpy")
+def hinge_angles(x, hinges):
+    """Return the angles of hinges [rad], shape (H,), at positions x [m], shape (V, 3)."""
+    angles = np.empty(len(hinges))
+    for i in range(len(hinges)):
+        a, b, c, d = hinges[i, 0], hinges[i, 1], hinges[i, 2], hinges[i, 3]
+        angles[i] = dihedral(load(x, a), load(x, b), load(x, c), load(x, d))[0]
+    return angles
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def folded(i, x, data):
+    """Return the angle of hinge i and its gradients."""
+    a, b, c, d = data.vertices[i, 0], data.vertices[i, 1], data.vertices[i, 2], data.vertices[i, 3]
+    angle, ga, gb, gc, gd = dihedral(load(x, a), load(x, b), load(x, c), load(x, d))
+    return angle, (ga, gb, gc, gd)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def fold_weight(i, inverse_mass, data, slopes):
+    """Return ∇θ W ∇θᵀ."""
+    weight = 0.0
+    for s in range(4):
+        weight += inverse_mass[data.vertices[i, s]] * dot(slopes[s], slopes[s])
+    return weight
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def fold_change(i, x, start, data, slopes):
+    """Return ∇θ·(x - xⁿ)."""
+    change = 0.0
+    for s in range(4):
+        v = data.vertices[i, s]
+        change += dot(slopes[s], sub(load(x, v), load(start, v)))
+    return change
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def fold(i, x, inverse_mass, data, slopes, shift):
+    """Move the vertices of hinge i by W ∇θᵀ Δλ."""
+    for s in range(4):
+        v = data.vertices[i, s]
+        store(x, v, axpy(shift * inverse_mass[v], slopes[s], load(x, v)))
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def add_moment(i, data, slopes, moment, forces):
+    """Add what a moment [N·m] that opens hinge i does to its vertices."""
+    for s in range(4):
+        v = data.vertices[i, s]
+        store(forces, v, axpy(moment, slopes[s], load(forces, v)))
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _project(i, x, start, inverse_mass, data, multipliers, h):
+    angle, slopes = folded(i, x, data)
+    weight = fold_weight(i, inverse_mass, data, slopes)
+    if weight == 0.0:
+        return
+    change = fold_change(i, x, start, data, slopes) if data.damping > 0.0 else 0.0
+    soft, viscous = data.compliance[i] / (h * h), data.damping / h
+    shift = multiplier_step(angle - data.rest[i], weight, soft, multipliers[i, 0], change, viscous)
+    multipliers[i, 0] += shift
+    fold(i, x, inverse_mass, data, slopes, shift)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _force(i, x, data, forces):
+    angle, slopes = folded(i, x, data)
+    moment = -(angle - data.rest[i]) / data.compliance[i]
+    add_moment(i, data, slopes, moment, forces)
+    return -0.5 * moment * (angle - data.rest[i])
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _linearise(i, x, data, values, gradients, compliance):
+    angle, slopes = folded(i, x, data)
+    values[0] = angle - data.rest[i]
+    for s in range(4):
+        store_at(gradients, 0, s, slopes[s])
+    compliance[0, 0] = data.compliance[i]
+
+
+# None for what stress adds: the second derivative of the angle is indefinite, and small beside the material's share.
+KIND = Kind(Bend, 1, _project, _force, _linearise, None)

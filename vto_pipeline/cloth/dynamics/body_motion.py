@@ -1,0 +1,103 @@
+"""Motion of a body, slowed down to what the cloth on it can follow."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from vto_pipeline.cloth.collision.body.contacts import BodyCollider
+from vto_pipeline.cloth.dynamics.stepper import Stepper
+from vto_pipeline.cloth.model.build import ClothState
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.body import MovingBody
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+
+_WINDOW = 0.05  # s of cloth time between changes of pace
+_SLOWEST = 0.125  # of the full pace
+_BRAKE, _PICK_UP = 0.5, 1.25  # of the pace, where contact is deep and where it is not
+_SHALLOW = 0.25  # of what counts as deep: between the two, the pace is kept
+_BESIDE = 0.15  # m: the body this near the cloth, where it begins or ends, sets the pace
+
+
+class PacedBody(BodyCollider):
+    """A moving body whose motion can be slowed and hurried while it goes on.
+
+    Args:
+        body: The keyframes.
+        seconds: How long the motion takes at full pace [s].
+        friction: Coulomb coefficient.
+        job: For what was repaired and left out.
+    """
+
+    def __init__(self, body: MovingBody, seconds: float, friction: float, job: Job | None = None) -> None:
+        self._full = seconds
+        self._since = self._gone = 0.0
+        super().__init__(body, seconds, friction, job)
+
+    @property
+    def ends(self) -> float:
+        """When the motion ends at the present pace [s]."""
+        return self._seconds
+
+    def at(self, time: float) -> FloatArray:
+        """Return the body's vertices at a time [s] not before the last change of pace, shape (V, 3) [m]."""
+        return super().at(self._share(time) * self._seconds)
+
+    def set_pace(self, time: float, pace: float) -> None:
+        """Go on from this time [s], before the end, at a share of the full pace."""
+        self._since, self._gone = time, self._share(time)
+        self._seconds = time + (1.0 - self._gone) * self._full / pace
+
+    def depth(self, time: float, positions: FloatArray) -> float:
+        """Return how deep in the body at a time [s] the deepest vertex is that was inside when contacts were found."""
+        inside = self.holds(len(positions))
+        if not inside.any():
+            return 0.0
+        surface = SurfaceDistance(TriangleMesh(self.at(time), self.faces))
+        return max(0.0, -float(surface.signed(positions[inside]).distance.min()))
+
+    def _share(self, time: float) -> float:
+        """Return what share of the motion is done at a time [s]."""
+        if time >= self._seconds:
+            return 1.0
+        return self._gone + (1.0 - self._gone) * (time - self._since) / (self._seconds - self._since)
+
+
+def ride(
+    stepper: Stepper, state: ClothState, body: PacedBody, deep: float, watch: Callable[[float], None]
+) -> ClothState:
+    """Return the cloth when the body's motion is over; where cloth is deep in the body, that waits for it.
+
+    Args:
+        stepper: The cloth among its colliders, the body one of them.
+        state: Where to begin, at the motion's begin.
+        body: Slowed as need be.
+        deep: Cloth deeper in the body than this is behind [m].
+        watch: Receives the share of the motion that is done.
+    """
+    pace = 1.0
+    while state.time < body.ends - 1e-9:
+        state = stepper.run(state, min(_WINDOW, body.ends - state.time))
+        watch(state.time / body.ends)
+        depth = body.depth(state.time, state.positions)
+        change = _BRAKE if depth > deep else _PICK_UP if depth < _SHALLOW * deep else 1.0
+        pace = float(np.clip(pace * change, _SLOWEST, 1.0))
+        if state.time < body.ends - 1e-9:
+            body.set_pace(state.time, pace)
+    return state
+
+
+def covered_way(body: MovingBody, cloth: TriangleMesh) -> float:
+    """Return how far the fastest point of the body near the cloth moves [m].
+
+    Args:
+        body: The keyframes.
+        cloth: On the body as it begins [m].
+    """
+    near = SurfaceDistance(cloth).nearest(body.keyframes[0]).distance < _BESIDE
+    steps = np.linalg.norm(np.diff(body.keyframes, axis=0), axis=2)[:, near]
+    fastest = steps.max(axis=1, initial=0.0)
+    return float(len(steps) * fastest.max(initial=0.0))

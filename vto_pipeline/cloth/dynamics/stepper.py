@@ -1,0 +1,298 @@
+"""Time stepping among colliders, in rounds short enough for the contacts found at their start."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from math import ceil
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from vto_pipeline.cloth.collision.body.contacts import BodyCollider
+from vto_pipeline.cloth.collision.contacts import Collider, Round, gather, let_slide, nothing
+from vto_pipeline.cloth.collision.response.active_set import ActiveSet, active_set, no_contacts
+from vto_pipeline.cloth.collision.response.penalty import FREQUENCY, Penalty
+from vto_pipeline.cloth.collision.response.projected_gauss_seidel import hold_apart
+from vto_pipeline.cloth.collision.self_collision.pairs import no_pairs
+from vto_pipeline.cloth.collision.self_collision.self_contact import SelfContact
+from vto_pipeline.cloth.dynamics.methods import FRAME, METHODS, Choice, Method, choose
+from vto_pipeline.cloth.dynamics.residual import out_of_balance
+from vto_pipeline.cloth.integrators import INTEGRATORS
+from vto_pipeline.cloth.integrators.integrator import Integrator
+from vto_pipeline.cloth.model.build import ClothModel, ClothState
+from vto_pipeline.cloth.solvers.newton import Newton
+from vto_pipeline.errors import ConfigError, DivergedError
+from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.settings import Config
+
+_HARD = 0.2  # of the distance layers keep: how much of it is not given way by contact forces
+_OUT_OF_BOUNDS = 1e9  # m
+_TOO_FAST = 1e6  # m/s: cloth that blows up may be kept from passing through itself, and so in its place
+_WHOLE = 1e-6  # steps: what rounding may add to a whole number of them
+
+
+class StepConfig(Config):
+    """Settings of the time stepping."""
+
+    solver: str | None = Field(None, description="Name of the method; by default chosen from the scene")
+    substeps: float | None = Field(
+        None, ge=0.1, le=10000, description="Steps per 1/60 s, below 1 for longer steps; by default the method's own"
+    )
+    sweeps: int | None = Field(None, ge=1, le=100000, description="Iterations per step; by default the method's own")
+    travel_mm: float = Field(
+        5.0, gt=0, le=100, description="How far cloth may move before contacts are searched again [mm]"
+    )
+    self_collision: bool = Field(True, description="Whether cloth is kept from passing through itself")
+    body_features: bool = Field(
+        False,
+        description="Whether body corners and edges push cloth between its vertices; requires self_collision. "
+        "Needed where the body is sharper than the cloth is fine. Slower, and later to rest",
+    )
+    contact_forces: bool = Field(
+        False,
+        description="Whether contacts are penalty forces, for comparing force-based integrators; cloth sinks in. "
+        "By default contacts are constraints",
+    )
+    air_drag: float = Field(
+        0.0,
+        ge=0,
+        le=10,
+        description="Drag coefficient of a triangle along its normal; a plate has 1.2. For integrators of forces",
+    )
+    air_density: float = Field(1.2, ge=0, le=2000, description="Density of the air, for its drag [kg/m³]")
+    recovery_speed: float = Field(0.5, gt=0, le=10, description="Speed at which cloth inside a body is moved out [m/s]")
+
+
+class Pins(NamedTuple):
+    """Held vertices that move along a path.
+
+    Args:
+        vertices: Which, shape (P,).
+        path: Where they are at a time [s]: [m], shape (P, 3).
+    """
+
+    vertices: NDArray[np.int64]
+    path: Callable[[float], FloatArray]
+
+
+class Stepper:
+    """A cloth, its colliders and a solver.
+
+    Attributes:
+        choice: The method taken, and why; after `prepare`.
+        skin: Distance each vertex keeps from surfaces [m], shape (V,); may be raised between runs.
+        loose: Vertices that slide on surfaces without friction, shape (V,); none, but may be changed between runs.
+        substeps: Steps per 1/60 s; after `prepare`, and may be changed between runs.
+        steps: Steps taken so far.
+        rounds: Times contacts were found.
+        self_contact: What keeps the cloth from itself, None if nothing does.
+    """
+
+    choice: Choice
+    substeps: float
+
+    def __init__(
+        self,
+        model: ClothModel,
+        colliders: Sequence[Collider],
+        skin: FloatArray,
+        config: StepConfig,
+        *,
+        damping: float = 0.0,
+        max_speed: float = np.inf,
+        pins: Pins | None = None,
+        crossed: NDArray[np.bool_] | None = None,
+        force_all: bool = False,
+    ) -> None:
+        self.skin = skin
+        self.loose = np.zeros(len(skin), np.bool_)
+        self.steps = 0
+        self.rounds = 0
+        self._model = model
+        self._colliders = colliders
+        self._config = config
+        self._damping = damping
+        self._max_speed = max_speed
+        self._method: Method | None = None
+        self._pins = pins
+        self._contacts = nothing(len(skin))
+        self.self_contact: SelfContact | None = None
+        if config.self_collision and len(model.faces) > 0:
+            self.self_contact = SelfContact(
+                model.faces,
+                model.reach,
+                model.friction,
+                bodies=[one for one in colliders if config.body_features and isinstance(one, BodyCollider)],
+                at_once=config.contact_forces,
+                crossed=crossed,
+                force_all=force_all,
+            )
+
+    def prepare(self, positions: FloatArray) -> None:
+        """Choose the method, and let it make what it needs, for a cloth that starts here [m], shape (V, 3). Once.
+
+        Raises:
+            ConfigError: no such method, or none that knows forces where contacts are to be forces.
+        """
+        if self._method is not None:
+            return
+        config = self._config
+        besides = FREQUENCY if config.contact_forces else 0.0
+        self.choice = choose(self._model, positions, config.solver, config.substeps, config.sweeps, besides)
+        self.substeps = self.choice.substeps
+        self._method = METHODS[self.choice.method](
+            self._model, sweeps=self.choice.sweeps, damping=self._damping, max_speed=self._max_speed
+        )
+        if isinstance(self._method, Integrator):
+            self._method.system.air = 0.5 * config.air_density * config.air_drag
+            self._method.system.penalty = Penalty(self._model) if config.contact_forces else None
+        elif config.contact_forces or config.air_drag > 0.0:
+            raise ConfigError(
+                f"{'contact_forces' if config.contact_forces else 'air_drag'} is set, and solver "
+                f"{self.choice.method!r} knows no forces; allowed: {', '.join(INTEGRATORS)}"
+            )
+        if isinstance(self._method, Newton | Integrator):
+            self._method.self_contact = self.self_contact
+
+    def run(self, state: ClothState, seconds: float) -> ClothState:
+        """Return the state after so much simulated time [s].
+
+        Raises:
+            DivergedError: a position is no longer finite.
+        """
+        self.prepare(state.positions)
+        h = FRAME / self.substeps
+        left = ceil(seconds / h - _WHOLE)
+        if abs(left * h - seconds) > _WHOLE * h:  # not a whole number of steps: they are a little shorter
+            h = seconds / left
+        while left > 0:
+            count = min(left, self._round_length(state, h))
+            state = self._round(state, h, count)
+            left -= count
+        return state
+
+    def residual(self, state: ClothState) -> float:
+        """Return the residual force; see `balance.out_of_balance`."""
+        x, still = state.positions, np.zeros_like(state.positions)
+        pairs = no_pairs() if self.self_contact is None else self.self_contact.near(x, x, FRAME)
+        mass = self._model.inverse_mass
+        touched = active_set(self._contacts, pairs, 0.0, 1.0, mass, x, still, still, self.known)
+        return out_of_balance(self._model, x, touched)
+
+    @property
+    def known(self) -> ActiveSet:
+        """What is known of the contacts from the last step, as far as the method keeps it; may be set back to it."""
+        return self._method.active if isinstance(self._method, Newton) else no_contacts(0)
+
+    @known.setter
+    def known(self, before: ActiveSet) -> None:
+        if isinstance(self._method, Newton):
+            self._method.active = before
+
+    @property
+    def rests_exactly(self) -> bool:
+        """Whether the state of rest does not depend on the length of steps; after `prepare`."""
+        return getattr(self._method, "rests_exactly", True)
+
+    @property
+    def bearing(self) -> int:
+        """How many contacts pushed in the last step, as far as the method counts them."""
+        return getattr(self._method, "bearing", 0)
+
+    @property
+    def step(self) -> float:
+        """Length of a step [s]."""
+        return FRAME / self.substeps
+
+    @property
+    def polishes(self) -> bool:
+        """Whether the method can use the exact stiffness; after `prepare`."""
+        return isinstance(self._method, Newton) and self._method.knows_exactly
+
+    def polish(self, on: bool) -> None:
+        """Let steps use the exact stiffness from now on, or no longer; after `prepare`."""
+        if isinstance(self._method, Newton):
+            self._method.exact = on
+
+    @property
+    def definite(self) -> bool:
+        """Whether the last step did throughout: at no point was the cloth about to buckle."""
+        return isinstance(self._method, Newton) and self._method.definite
+
+    def _speed(self, state: ClothState) -> float:
+        return float(np.abs(state.velocities).max() * np.sqrt(3.0))  # a bound, which does not overflow
+
+    def _round_length(self, state: ClothState, h: float) -> int:
+        """Return how many steps no vertex travels farther than the contacts are good for."""
+        most = 1 if self._pins is not None else max(1, round(self.substeps))
+        if not isinstance(self._method, Newton) and self._is_near_itself(state, h * most):
+            most = 1  # those that know no contacts of the cloth with itself have them put right after each step
+        if not self._colliders:
+            return most
+        speed = self._speed(state) + float(np.linalg.norm(self._model.gravity)) * h * most
+        return int(np.clip(self._config.travel_mm * 1e-3 / max(speed * h, 1e-12), 1, most))
+
+    def _round(self, state: ClothState, h: float, count: int) -> ClothState:
+        travel = max(self._config.travel_mm * 1e-3, 2.0 * self._speed(state) * h)
+        move = count * h * state.velocities
+        recovery = np.inf if self._config.contact_forces else self._config.recovery_speed
+        span = Round(state.time, state.time + count * h, travel, self.skin, recovery, move)
+        self._contacts = gather(self._colliders, state.positions, span)
+        if self.loose.any():
+            self._contacts = let_slide(self._contacts, self.loose)
+        assert self._method is not None  # `run` prepared it
+        before = state
+        if self._pins is not None:
+            state = self._led(state, self._pins, count * h)
+        after = self._method.advance(state, self._contacts, h, count)
+        self.steps += count
+        self.rounds += 1
+        self._refuse_divergence(after)
+        if self.self_contact is not None and not isinstance(self._method, Newton):
+            after = self._apart(before, after, h * count)
+        return after
+
+    def _refuse_divergence(self, state: ClothState) -> None:
+        with np.errstate(over="ignore", invalid="ignore"):
+            farthest = np.abs(state.positions).max(initial=0.0)
+            fastest = np.abs(state.velocities).max(initial=0.0)
+        if not (farthest < _OUT_OF_BOUNDS and fastest < _TOO_FAST):
+            raise DivergedError(
+                f"positions are not finite, or out of all bounds, after {self.steps} steps "
+                f"({state.time:.2f} s of cloth time)",
+                hint="more substeps, or a softer fabric",
+            )
+
+    def _led(self, state: ClothState, pins: Pins, seconds: float) -> ClothState:
+        """Return the state with the pins under way to where their path has them after this many seconds."""
+        positions, velocities = state.positions.copy(), state.velocities.copy()
+        there = pins.path(state.time + seconds)
+        velocities[pins.vertices] = (there - positions[pins.vertices]) / seconds
+        if not isinstance(self._method, Newton):  # the others hold what is held where it is
+            positions[pins.vertices] = there
+        return replace(state, positions=positions, velocities=velocities)
+
+    def _is_near_itself(self, state: ClothState, seconds: float) -> bool:
+        """Return whether, by its velocities, the cloth comes near itself in this many seconds."""
+        if self.self_contact is None:
+            return False
+        self.self_contact.at(state.time, state.time + seconds)
+        drift = seconds * state.velocities
+        end = state.positions + drift + 0.5 * seconds**2 * self._model.gravity
+        return len(self.self_contact.near(state.positions, end, seconds, drift).key) > 0
+
+    def _apart(self, state: ClothState, after: ClothState, seconds: float) -> ClothState:
+        """Resolve self-contacts after a step of a method that ignores them."""
+        assert self.self_contact is not None
+        positions = after.positions.copy()
+        self.self_contact.at(state.time, state.time + seconds)
+        pairs = self.self_contact.near(state.positions, positions, seconds)
+        if self._config.contact_forces:  # a spring bears only so much
+            pairs = pairs._replace(gap=_HARD * pairs.gap)
+        hold_apart(pairs, self._model.inverse_mass, state.positions, positions)
+        positions, _ = self.self_contact.safe(state.positions, positions)
+        velocities = after.velocities + (positions - after.positions) / seconds
+        return replace(after, positions=positions, velocities=velocities)

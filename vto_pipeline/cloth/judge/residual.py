@@ -1,0 +1,172 @@
+"""Independent computation of the energy and the residual force of a cloth.
+
+Energies are the formulas of the model, in plain arrays. Forces are differences of those energies, so no derivative of
+the solver's is trusted. What a body can bear is taken from distances to its surface.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vto_pipeline.cloth.judge.bearing import left_by_all, left_by_one
+from vto_pipeline.cloth.judge.flanks import flanks
+from vto_pipeline.cloth.judge.strain import RestTriangles, gradients, rest_triangles, thread_strains
+from vto_pipeline.cloth.model.materials import Materials
+from vto_pipeline.geometry.signed_distance import SurfacePoints
+from vto_pipeline.geometry.topology import hinges
+from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.fabric import Fabric
+from vto_pipeline.model.garment import RestShape
+from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.units import GRAVITY
+
+_STEP = 1e-6  # of an edge: central differences are then right to about 1e-10
+_MUCH = 1e-6  # of a vertex's weight: less is not shared out among flanks
+_ALIKE = 1e-3  # between directions: less is one flank
+_SLIVER = 0.01  # height over longest side of a triangle that counts as that high at least, and does not bend
+
+
+def knows(materials: Materials) -> bool:
+    """Return whether the energies of `Weave` are all that this model of cloth has."""
+    extra = (materials.strain_limit, materials.yield_curvature)
+    plain = extra == (None, None) and not materials.hysteresis
+    return plain and (materials.membrane, materials.bending) == ("threads", "hinge")
+
+
+class Weave:
+    """A cloth of the model "threads" with "hinge" bending, and its energies.
+
+    Args:
+        mesh: Its triangles.
+        rest: Its shape without forces.
+        fabric: Its stiffnesses and mass.
+    """
+
+    def __init__(self, mesh: TriangleMesh, rest: RestShape, fabric: Fabric) -> None:
+        x = rest.positions
+        self._rest: RestTriangles = rest_triangles(x, mesh.faces)
+        self._faces = mesh.faces[self._rest.solid]
+        self._weight = self._rest.area * np.minimum(1.0, _slenderness(x, self._faces) / _SLIVER)
+        self._stiffness = _plane_stiffness(fabric)
+        self._hinges, self._rigidity = _bending(x, hinges(mesh), fabric)
+        self._angles = _angles(x[self._hinges]) if rest.rest_angles else np.zeros(len(self._hinges))
+        area = np.zeros(len(mesh.faces))
+        area[self._rest.solid] = self._rest.area
+        self.mass = np.bincount(mesh.faces.ravel(), np.repeat(fabric.areal_density * area / 3.0, 3), len(x))
+        self._step = _STEP * float(np.median(np.sqrt(2.0 * self._rest.area)))
+
+    def energy(self, positions: FloatArray) -> float:
+        """Return the energy stored at these positions [m], shape (V, 3) [J]."""
+        stretched = self._membrane(positions[self._faces]).sum()
+        return float(stretched + self._folds(positions[self._hinges]).sum())
+
+    def forces(self, positions: FloatArray) -> FloatArray:
+        """Return the elastic forces on the vertices [N], shape (V, 3)."""
+        found = np.zeros_like(positions)
+        for stencils, energies in ((self._faces, self._membrane), (self._hinges, self._folds)):
+            corners = positions[stencils]
+            for k in range(stencils.shape[1]):
+                for d in range(3):
+                    moved = corners.copy()
+                    moved[:, k, d] += self._step
+                    ahead = energies(moved)
+                    moved[:, k, d] -= 2.0 * self._step
+                    pull = (energies(moved) - ahead) / (2.0 * self._step)
+                    found[:, d] += np.bincount(stencils[:, k], pull, len(found))
+        return found
+
+    def _membrane(self, corners: FloatArray) -> FloatArray:
+        local = np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3)
+        laid = RestTriangles(np.ones(len(corners), np.bool_), self._rest.area, self._rest.inverse)
+        strain = thread_strains(gradients(corners.reshape(-1, 3), local, laid))
+        return 0.5 * self._weight * np.einsum("ta,ab,tb->t", strain, self._stiffness, strain)
+
+    def _folds(self, corners: FloatArray) -> FloatArray:
+        return 0.5 * self._rigidity * (_angles(corners) - self._angles) ** 2
+
+
+def left_over_force(
+    weave: Weave,
+    positions: FloatArray,
+    body: TriangleMesh | None,
+    nearest: SurfacePoints | None,
+    *,
+    friction: float,
+    touching: FloatArray,
+    free: NDArray[np.bool_],
+) -> float:
+    """Return the residual force, rms over the free vertices, as a share of a vertex's weight.
+
+    A vertex near one place of the body is borne as what slides there; in a hollow, the flanks share what they can.
+
+    Args:
+        weave: The cloth.
+        positions: [m], shape (V, 3).
+        body: What it lies on.
+        nearest: The places of the body that are nearest to the vertices, with signed distances.
+        friction: Coulomb coefficient.
+        touching: Distance at which each vertex may be borne by the body [m], shape (V,).
+        free: Which vertices to look at, all of them with mass, shape (V,).
+    """
+    left = weave.forces(positions)
+    left[:, 1] -= GRAVITY * weave.mass
+    if not free.any():
+        return 0.0
+    if body is not None and nearest is not None:
+        inside = nearest.distance < 0.0
+        held = free & (nearest.distance < touching)
+        outward = (positions - nearest.point) * np.where(inside, -1.0, 1.0)[:, None]
+        outward /= np.maximum(np.abs(nearest.distance), np.finfo(float).tiny)[:, None]
+        forces = left.copy()
+        left[held] = left_by_one(forces[held], outward[held], friction)
+        much = np.linalg.norm(left, axis=1) > _MUCH * GRAVITY * weave.mass
+        (between,) = np.nonzero(held & much)  # two flanks, perhaps
+        owner, pushes = flanks(body, positions[between], inside[between], touching[between])
+        first = np.searchsorted(owner, np.arange(len(between) + 1))
+        for i, start, end in zip(between, first[:-1], first[1:], strict=True):
+            if end - start > 1 and np.ptp(pushes[start:end], axis=0).max() > _ALIKE:
+                left[i] = left_by_all(forces[i], pushes[start:end], friction)
+    share = np.linalg.norm(left[free], axis=1) / (GRAVITY * weave.mass[free])
+    return float(np.sqrt(np.mean(share**2)))
+
+
+def _plane_stiffness(fabric: Fabric) -> FloatArray:
+    """Return the stiffness of an orthotropic sheet in plane stress [N/m], shape (3, 3): warp, weft, shear."""
+    coupling = -fabric.poisson / fabric.stretch_warp
+    plane = np.array([[1.0 / fabric.stretch_warp, coupling], [coupling, 1.0 / fabric.stretch_weft]])
+    stiffness = np.zeros((3, 3))
+    stiffness[:2, :2] = np.linalg.inv(plane)
+    stiffness[2, 2] = fabric.shear
+    return stiffness
+
+
+def _bending(rest: FloatArray, found: NDArray[np.int32], fabric: Fabric) -> tuple[NDArray[np.int32], FloatArray]:
+    """Return the hinges that bend, shape (H, 4), and B l²/A of each [N·m], shape (H,)."""
+    one, two = found[:, [0, 1, 2]], found[:, [1, 0, 3]]
+    solid = np.minimum(_slenderness(rest, one), _slenderness(rest, two)) > _SLIVER
+    found, one, two = found[solid], one[solid], two[solid]
+    edge = rest[found[:, 1]] - rest[found[:, 0]]
+    laid = rest_triangles(rest, one)
+    warp = np.linalg.inv(laid.inverse)[:, 0]  # of the two edges that meet in the third corner
+    along = (warp[:, 1] - warp[:, 0]) ** 2 / np.sum(edge**2, axis=1)
+    area = laid.area + rest_triangles(rest, two).area
+    rigidity = fabric.bending_warp * (1.0 - along) + fabric.bending_weft * along
+    return found, rigidity * np.sum(edge**2, axis=1) / area
+
+
+def _angles(corners: FloatArray) -> FloatArray:
+    """Return the angle of each hinge [rad], shape (H,); ends and wings of shape (H, 4, 3)."""
+    edge = corners[:, 1] - corners[:, 0]
+    edge = edge / np.maximum(np.linalg.norm(edge, axis=1, keepdims=True), np.finfo(float).tiny)
+    one = np.cross(edge, corners[:, 2] - corners[:, 0])
+    two = np.cross(corners[:, 3] - corners[:, 0], edge)
+    return np.arctan2(np.sum(np.cross(one, two) * edge, axis=1), np.sum(one * two, axis=1))
+
+
+def _slenderness(rest: FloatArray, faces: NDArray[np.int32]) -> FloatArray:
+    corners = rest[faces]
+    sides = np.roll(corners, -1, axis=1) - corners
+    longest_sq = np.sum(sides**2, axis=2).max(axis=1, initial=0.0)
+    double_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    return np.divide(double_area, longest_sq, out=np.zeros(len(faces)), where=longest_sq > 0.0)

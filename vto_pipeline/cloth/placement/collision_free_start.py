@@ -1,0 +1,61 @@
+"""A start without crossings: untangled, or known crossings left alone."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vto_pipeline.cloth.untangle import untangle
+from vto_pipeline.geometry.intersections import intersecting_faces, meeting_vertices, self_intersections
+from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+
+_HOPELESS = 1.0  # pairs that meet for each triangle: no tangle, but cloth put into a point or a plane
+
+
+class Start(NamedTuple):
+    """Where a cloth starts.
+
+    Args:
+        positions: [m], shape (V, 3).
+        pairs: Of faces that met before, each other or the body.
+        left: Of faces that still do.
+        crossed: Vertices of those, which are not kept from the rest of the cloth until they are free, shape (V,).
+    """
+
+    positions: FloatArray
+    pairs: int
+    left: int
+    crossed: NDArray[np.bool_]
+
+
+def free_start(
+    positions: FloatArray,
+    faces: IntArray,
+    rest: FloatArray,
+    thickness: float,
+    job: Job,
+    body: TriangleMesh | None = None,
+) -> Start:
+    """Return the start of a cloth, moved as little as needed so that nothing crosses.
+
+    Args:
+        positions: Where it is [m], shape (V, 3).
+        faces: Shape (F, 3).
+        rest: Its shape without forces [m], shape (V, 3).
+        thickness: Gap to leave where something was moved [m].
+        job: For progress, and a warning if something is left.
+        body: Where the cloth is about it, and nowhere deep inside.
+    """
+    mesh = TriangleMesh(positions, faces)
+    pairs = left = self_intersections(mesh)
+    count = remaining = len(pairs) + (0 if body is None else len(intersecting_faces(mesh, body)))
+    if 0 < count <= _HOPELESS * len(faces):
+        untangled = untangle(positions, faces, body=body, rest=rest, thickness=thickness, job=job)
+        positions, left, remaining = untangled.positions, untangled.pairs, untangled.left
+    elif count > 0:
+        job.warn(f"{count} pairs of triangles intersect at the start; not all can be untangled before it moves")
+    return Start(positions, count, remaining, meeting_vertices(left, faces, len(positions)))

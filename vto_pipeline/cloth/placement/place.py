@@ -1,0 +1,220 @@
+"""Placement of a garment on a new body: unit, axes and best position."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from vto_pipeline.cloth.placement.voxel_fit import Cubes, Fill, quarter_turns
+from vto_pipeline.errors import InputError
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.garment import Garment
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.settings import Config
+from vto_pipeline.units import LENGTH_M
+
+_PLAUSIBLE = (0.12, 1.3)  # longest side of a garment as a share of the body's: from briefs to a gown with a train
+_SMALLEST = 0.02  # the same of a patch of cloth that is in metres: no other unit would make it larger
+_COARSE = 2.0  # times the cube: enough to tell which ways up are worth a second look
+_CLOSE = 0.9  # of the best coarse worth: these are looked at again with fine cubes
+_ALIKE = 0.98  # as good, but for where the cubes happen to lie
+_LARGER, _STEPS = 1.2, 4  # a garment may start up to twice as large as it is
+_FALLING = 0.85  # of the best worth yet: larger garments need not be tried
+_DEEP = 0.01  # m
+_AROUND = 32  # cubes along the longest side: enough to tell units, which differ by 2.5 at least
+
+
+class PlaceConfig(Config):
+    """How a garment without a source body is placed on the body."""
+
+    place: str = Field(
+        "auto", pattern="^(auto|as_it_stands|align)$", description="auto aligns a garment that is out of place"
+    )
+    cube_mm: float = Field(15.0, ge=5, le=50, description="Resolution of the placement search [mm]")
+    cloth_in_body: float = Field(
+        2.0, ge=0, le=100, description="Weight of cloth inside the body against body inside the garment"
+    )
+    stands_well: float = Field(
+        0.95, ge=0, le=1, description="auto keeps a garment whose place scores this share of the best"
+    )
+    turned_well: float = Field(
+        0.95, ge=0, le=1, description="A garment is not turned if its orientation scores this share of the best"
+    )
+    buried: float = Field(
+        0.1,
+        ge=0,
+        le=1,
+        description="Share of a garment over 10 mm deep in the body above which it starts enlarged",
+    )
+
+
+class Placement(NamedTuple):
+    """The placement of a garment: scaled and rotated about the origin, stretched, then shifted.
+
+    Args:
+        scale: Metres in its unit.
+        turn: Rotation, shape (3, 3).
+        stretch: How much larger than it is the garment starts, for the body to be inside.
+        shift: [m], shape (3,).
+    """
+
+    scale: float
+    turn: FloatArray
+    stretch: float
+    shift: FloatArray
+
+    def turned(self, rest: FloatArray) -> FloatArray:
+        """Return the rest positions of the garment, shape (V, 3), in metres and in the body's axes."""
+        return self.scale * rest @ self.turn.T
+
+    def put(self, positions: FloatArray) -> FloatArray:
+        """Return the start positions of a garment from its original ones, shape (V, 3) [m]."""
+        return self.stretch * self.turned(positions) + self.shift
+
+
+_AS_IT_STANDS = Placement(1.0, np.eye(3), 1.0, np.zeros(3))
+
+
+def place(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig, job: Job) -> Placement:
+    """Return the placement in which the body fills the garment best.
+
+    Args:
+        garment: As it stands, in metres or another unit, with any axis up.
+        body: Where it shall go [m].
+        config: Search and thresholds.
+        job: Receives what is done, and why.
+
+    Raises:
+        InputError: in no unit is this a garment for a body of this size, or the body fills it nowhere.
+    """
+    if config.place == "as_it_stands":
+        job.note("garment left where it stands, as requested")
+        return _AS_IT_STANDS
+    scale = _scale(garment, body, config, job)
+    metres = TriangleMesh(scale * garment.vertices, garment.faces)
+    stands, best = _best_way(metres, body, config)
+    if round(best.worth, 6) <= 0.0:  # but for what the transforms round
+        raise InputError(
+            "the body fills this garment nowhere: it goes around nothing of the body",
+            hint="give it as it is worn, sewn and open; drape.place=as_it_stands drapes it from where it lies",
+        )
+    if stands.worth < config.turned_well * best.worth:
+        best = _as_if_large_enough(metres, body, best, config)
+    as_turned = 1.0 if (best.turn == stands.turn).all() else _share(stands.worth, best.worth)
+    if as_turned >= _ALIKE:
+        best = stands
+    elif as_turned >= config.turned_well:
+        job.note(f"garment not turned, though ({_way(best)}) as (x, y, z) would score {1 / as_turned - 1:.1%} better")
+        best = stands
+    else:
+        job.note(
+            f"garment turned: its ({_way(best)}) is the body's (x, y, z); as it stood, it scored "
+            f"{as_turned:.0%} of the best"
+        )
+    stretch, best = _stretched(metres, body, best, config)
+    if stretch > 1.0:
+        job.warn(f"too small: this body needs it {stretch - 1:.0%} larger; it starts stretched by that much")
+    share = _share(best.here, best.worth)
+    if config.place == "auto" and best is stands and scale == 1.0 and share >= config.stands_well:
+        job.note(f"garment left where it stands: its place scores {share:.0%} of the best")
+        return _AS_IT_STANDS
+    job.note(
+        f"garment moved by ({', '.join(f'{1e3 * part:.0f}' for part in best.shift)}) mm (x, y, z) to where the body "
+        f"fills it best; its first place scored {share:.0%} of that"
+    )
+    return Placement(scale, best.turn, stretch, best.shift)
+
+
+def put(garment: Garment, body: TriangleMesh, config: PlaceConfig, job: Job) -> Garment:
+    """Return the garment in its place, with its rest shape in metres and rotated alike: the warp is its vertical.
+
+    Args, Raises: See `place`.
+    """
+    placed = place(garment.mesh, body, config, job)
+    mesh = TriangleMesh(placed.put(garment.mesh.vertices), garment.mesh.faces, garment.mesh.colors)
+    return Garment(mesh, replace(garment.rest, positions=placed.turned(garment.rest.positions)))
+
+
+def _best_way(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig) -> tuple[Fill, Fill]:
+    """Return the best place of the garment as it is turned, and of all quarter turns."""
+    cube = 1e-3 * config.cube_mm
+    turns = quarter_turns()
+    cubes = Cubes(garment, body, _COARSE * cube, config.cloth_in_body)
+    coarse = np.array([cubes.fill(turn).worth for turn in turns])
+    promising = coarse >= np.maximum(_CLOSE * coarse.max(), config.turned_well * coarse[0])
+    promising[0] = True
+    cubes = Cubes(garment, body, cube, config.cloth_in_body)
+    ways = [cubes.fill(turn) for turn, look in zip(turns, promising, strict=True) if look]
+    return ways[0], max(ways, key=lambda way: way.worth)
+
+
+def _as_if_large_enough(garment: TriangleMesh, body: TriangleMesh, best: Fill, config: PlaceConfig) -> Fill:
+    """Return the best place, turned as the garment would be if larger: one too small for the trunk may suit a thigh."""
+    ways = [best]
+    for step in range(1, _STEPS + 1):
+        larger = TriangleMesh(_LARGER**step * garment.vertices, garment.faces)
+        ways.append(_best_way(larger, body, config)[1])
+        if ways[-1].worth < _FALLING * max(way.worth for way in ways):
+            break
+    turn = max(ways, key=lambda way: way.worth).turn
+    return Cubes(garment, body, 1e-3 * config.cube_mm, config.cloth_in_body).fill(turn)
+
+
+def _stretched(garment: TriangleMesh, body: TriangleMesh, own: Fill, config: PlaceConfig) -> tuple[float, Fill]:
+    """Return by how much the garment must start larger for the body to be inside it, and its place then.
+
+    Args:
+        garment: As large as it is [m].
+        body: [m].
+        own: Its best place at its own size, with the turn to keep.
+        config: Search and thresholds.
+    """
+    depth = -SurfaceDistance(body).signed(garment.vertices @ own.turn.T + own.shift).distance
+    if (depth > _DEEP).mean() <= config.buried:
+        return 1.0, own
+    ways = [own]
+    for step in range(1, _STEPS + 1):
+        larger = TriangleMesh(_LARGER**step * garment.vertices, garment.faces)
+        ways.append(Cubes(larger, body, 1e-3 * config.cube_mm, config.cloth_in_body).fill(own.turn))
+        if ways[-1].worth < _FALLING * max(way.worth for way in ways):
+            break
+    best = max(range(len(ways)), key=lambda step: ways[step].worth)
+    return _LARGER**best, ways[best]
+
+
+def _scale(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig, job: Job) -> float:
+    """Return the garment's unit in metres: one if plausible, else the unit in which the body fills it best."""
+    longest = np.ptp(garment.vertices, axis=0).max() / np.ptp(body.vertices, axis=0).max()
+    low, high = _PLAUSIBLE
+    plausible = {unit: metres for unit, metres in LENGTH_M.items() if low <= metres * longest <= high}
+    if _SMALLEST <= longest <= high:
+        return 1.0
+    if not plausible:
+        raise InputError(
+            f"the garment's longest side is {longest:.3g} times the body's. It should be {low} to {high} times; "
+            f"no unit of {', '.join(LENGTH_M)} gives that",
+            hint="scale the garment, or give the unit of its file",
+        )
+    worth = dict.fromkeys(plausible, 0.0)
+    for unit, metres in plausible.items() if len(plausible) > 1 else ():
+        scaled = TriangleMesh(metres * garment.vertices, garment.faces)
+        cube = max(1e-3 * config.cube_mm, np.ptp(scaled.vertices, axis=0).max() / _AROUND)
+        cubes = Cubes(scaled, body, cube, config.cloth_in_body)
+        worth[unit] = max(cubes.fill(turn).worth for turn in quarter_turns())
+    unit = max(worth, key=lambda name: worth[name])
+    job.note(f"garment assumed to be in {unit}: in metres its longest side would be {longest:.3g} times the body's")
+    return plausible[unit]
+
+
+def _way(fill: Fill) -> str:
+    """Name which of the garment's axes are the body's x, y and z."""
+    return ", ".join(("-" if row.sum() < 0.0 else "") + "xyz"[np.abs(row).argmax()] for row in fill.turn)
+
+
+def _share(worth: float, best: float) -> float:
+    return max(worth, 0.0) / best if best > 0.0 else 0.0

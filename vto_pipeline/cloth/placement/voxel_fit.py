@@ -1,0 +1,113 @@
+"""Fit of a body in a garment as voxel solids, for all shifts at once and each quarter turn.
+
+Body and garment, its openings closed, are solids of cubes. Cubes of body inside the garment count for it, cubes of
+cloth inside the body against it; the sum over all shifts is a correlation (by FFT). No landmark is needed, so a skirt
+is as good as a shirt.
+"""
+
+from __future__ import annotations
+
+from itertools import permutations, product
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfftn, next_fast_len, rfftn
+
+from vto_pipeline.geometry.topology import boundary_loops
+from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.mesh import TriangleMesh
+
+
+class Fill(NamedTuple):
+    """The best place of a garment, turned in one way.
+
+    Args:
+        turn: The rotation about the origin, shape (3, 3).
+        shift: To the best place after that [m], shape (3,).
+        worth: There: cubes of body inside less what of the cloth is inside the body, as a share of the garment's cubes.
+        here: The same without shift.
+    """
+
+    turn: FloatArray
+    shift: FloatArray
+    worth: float
+    here: float
+
+
+def quarter_turns() -> list[FloatArray]:
+    """Return the 24 rotations that map the axes on each other, the identity first; each of shape (3, 3)."""
+    turns = []
+    for axes in permutations(range(3)):
+        for signs in product((1.0, -1.0), repeat=3):
+            turn = np.zeros((3, 3))
+            turn[range(3), axes] = signs
+            if np.linalg.det(turn) > 0.0:
+                turns.append(turn)
+    return turns
+
+
+class Cubes:
+    """A body and a garment as cubes.
+
+    Args:
+        garment: Where it stands [m].
+        body: [m].
+        cube: Side of the cubes [m].
+        penalty: Weight of cloth inside the body against body inside the garment.
+    """
+
+    def __init__(self, garment: TriangleMesh, body: TriangleMesh, cube: float, penalty: float) -> None:
+        self._cube = cube
+        self._body_low = body.vertices.min(axis=0)
+        self._body = _solid(body, self._body_low, cube)
+        # garment cubes lie on the body's lattice, so that the shifts found include "none"
+        low = garment.vertices.min(axis=0)
+        self._low = self._body_low + np.floor((low - self._body_low) / cube) * cube
+        inside = _solid(closed(garment), self._low, cube)
+        cloth = np.zeros_like(inside)
+        points = np.vstack([garment.vertices, garment.vertices[garment.faces].mean(axis=1)])
+        cloth[tuple(((points - self._low) / cube).astype(np.int64).T)] = True
+        self._worth = (inside & ~cloth).astype(np.float64) - penalty * cloth
+        self._whole = max(int((inside | cloth).sum()), 1)
+
+    def fill(self, turn: FloatArray) -> Fill:
+        """Return the best place of the garment after a quarter turn."""
+        worth, low = self._turned(turn)
+        size = [next_fast_len(int(a + b)) for a, b in zip(self._body.shape, worth.shape, strict=True)]
+        score = irfftn(rfftn(self._body.astype(np.float64), size) * np.conj(rfftn(worth, size)), size)
+        best = np.unravel_index(int(np.argmax(np.round(score, 6))), score.shape)
+        steps = np.array([k if k < b else k - n for k, n, b in zip(best, size, self._body.shape, strict=True)])
+        stay: IntArray = np.round((low - self._body_low) / self._cube).astype(np.int64)
+        overlaps = ((stay < np.array(self._body.shape)) & (stay > -np.array(worth.shape))).all()
+        here = score[tuple(stay % np.array(size))] if overlaps else 0.0
+        shift = self._body_low + steps * self._cube - low
+        return Fill(turn, shift, float(score[best] / self._whole), float(here / self._whole))
+
+    def _turned(self, turn: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the garment's cubes after a quarter turn, and their lowest corner [m]."""
+        axes = np.abs(turn).argmax(axis=1)
+        back = tuple(axis for axis in range(3) if turn[axis].sum() < 0.0)
+        ends = np.stack([self._low, self._low + self._cube * np.array(self._worth.shape)]) @ turn.T
+        return np.flip(self._worth.transpose(axes), back), ends.min(axis=0)
+
+
+def _solid(mesh: TriangleMesh, low: FloatArray, cube: float) -> NDArray[np.bool_]:
+    """Return which cubes, counted from `low`, have their centre inside the mesh, whichever way it is oriented."""
+    import igl
+
+    counts = np.ceil((mesh.vertices.max(axis=0) - low) / cube).astype(np.int64) + 1
+    centres = low + cube * (np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), axis=-1) + 0.5)
+    winding = igl.fast_winding_number(mesh.vertices, mesh.faces.astype(np.int64), centres.reshape(-1, 3))
+    return (np.abs(winding) > 0.5).reshape(counts)
+
+
+def closed(garment: TriangleMesh) -> TriangleMesh:
+    """Return the garment with a fan over each opening."""
+    vertices, faces = [garment.vertices], [garment.faces]
+    count = len(garment.vertices)
+    for loop in boundary_loops(garment):
+        vertices.append(garment.vertices[loop].mean(axis=0, keepdims=True))
+        faces.append(np.column_stack([np.roll(loop, -1), loop, np.full(len(loop), count)]).astype(np.int32))
+        count += 1
+    return TriangleMesh(np.vstack(vertices), np.vstack(faces))

@@ -1,0 +1,8 @@
+"""Settling of a cloth to rest, and its distance from rest.
+
+phases: the phases of one drape: freed, grown into, ridden along, settled
+multiresolution, coarsening: rest on coarser meshes first
+convergence: waiting for rest to a stated error
+stable_newton: the last steps, with the exact stiffness
+equilibrium: Newton on the potential energy, without contact
+"""

@@ -1,0 +1,60 @@
+"""Coarser meshes of a garment, and transfer back to the fine one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from vto_pipeline.errors import InputError
+from vto_pipeline.geometry.binding import Binding, apply, bind
+from vto_pipeline.geometry.remeshing.remesh import RemeshConfig, remesh
+from vto_pipeline.geometry.topology import face_area_vectors
+from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.garment import Garment
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+
+_ROUNDS = 5  # of the remesher: more make no better triangles
+_SHORTEST, _LONGEST = 1e-3, 0.1  # m, edges that it makes
+
+
+class Coarser(NamedTuple):
+    """A garment in fewer triangles.
+
+    Args:
+        garment: Where the fine one is, and of its rest shape.
+        binding: Of the fine garment on it, at rest.
+    """
+
+    garment: Garment
+    binding: Binding
+
+    def finer(self, positions: FloatArray) -> FloatArray:
+        """Return where the fine garment's vertices are when the coarse one's are here; [m], shapes (V, 3)."""
+        return apply(self.binding, positions)
+
+
+def coarser(fine: Garment, vertices: int) -> Coarser:
+    """Return a garment with about this many vertices.
+
+    It is remeshed at rest, where it is smooth and clear of itself, onto the rest surface of the fine one; so both have
+    the same lengths, but for chords across bends. Where the fine one is now is read off at the same places of it.
+
+    Args:
+        fine: The garment.
+        vertices: How many are wanted.
+
+    Raises:
+        InputError: as `remesh`, or edges would be too long or too short for it; GarmentError: as `remesh`.
+    """
+    laid = TriangleMesh(fine.rest.positions, fine.mesh.faces)
+    area = float(np.linalg.norm(face_area_vectors(laid), axis=1).sum())
+    edge = np.sqrt(area / (vertices * np.sqrt(0.75)))  # V corners of equilateral triangles cover V √3/2 l²
+    if not _SHORTEST <= edge <= _LONGEST:
+        raise InputError(f"edges would be {1e3 * edge:.3g} mm")
+    coarse = remesh(laid, RemeshConfig(edge_mm=1e3 * edge, iterations=_ROUNDS), Job())
+    now = apply(bind(coarse, laid), fine.mesh.vertices)
+    garment = Garment(TriangleMesh(now, coarse.faces), replace(fine.rest, positions=coarse.vertices))
+    return Coarser(garment, bind(laid, coarse))

@@ -1,0 +1,183 @@
+"""Convergence to rest within a stated error: the motion still to come, and the error of the step size."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vto_pipeline.cloth.dynamics.stepper import Stepper
+from vto_pipeline.cloth.model.build import ClothState
+from vto_pipeline.cloth.rest.stable_newton import LOOK, Polish
+from vto_pipeline.errors import FallenError
+from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.cloth import TraceRow
+
+_QUIET = 3  # looks in a row under the bound: an oscillating cloth stands still for an instant at each turn
+_COARSE = 2.0  # times the bound: waiting longer for a coarse answer, itself in error by more, is waste
+_STILL, _LONG = 1e-4, 10  # m, looks in a row: what stays within that is waited for no longer, in balance or not
+_VAGUE = 3e-3  # m: what is not known to be stable may still buckle by as much, as dresses of `vto bench drape` do
+_NEAR = 1e-3  # m a look: slow enough to ask whether it is
+_SLOWEST = 0.95  # a decay slower than this cannot be told from none
+
+
+@dataclass(frozen=True)
+class SettleLimits:
+    """Limits of settling.
+
+    Args:
+        error: Predicted distance to the state of rest, rms over vertices [m].
+        residual: And residual force, as a share of weight, by methods whose state of rest is exact.
+        seconds: Cloth time at most [s]; in longer steps than usual, as if they were of that length.
+        finest: Steps per 1/60 s that are not refined further.
+        deadline: `time.perf_counter` at which to stop; without effect on the result unless it is reached.
+        lowest: Height under which there is nothing that could hold cloth [m].
+    """
+
+    error: float
+    residual: float
+    seconds: float
+    finest: int
+    deadline: float = np.inf
+    lowest: float = -np.inf
+
+
+@dataclass
+class Settling:
+    """The result of settling.
+
+    Args:
+        state: At the end.
+        settled: Whether both bounds were reached: cloth that stands still out of balance is not at rest.
+        error: Predicted distance to the state of rest, rms over vertices [m]; infinite while unknown.
+        residual: Residual force as a share of weight.
+        trace: One row for each look.
+    """
+
+    state: ClothState
+    settled: bool = False
+    error: float = np.inf
+    residual: float = np.inf
+    trace: list[TraceRow] = field(default_factory=list)
+
+    @property
+    def error_mm(self) -> float | None:
+        """The predicted distance in mm, None while unknown."""
+        return 1e3 * self.error if np.isfinite(self.error) else None
+
+    @property
+    def unrest(self) -> str:
+        """The warning where it did not settle."""
+        if self.error_mm is None:
+            return "not at rest, error unknown"
+        left = f"a residual force of {self.residual:.2g} of a vertex's weight"
+        return f"not at rest: {self.error_mm:.1f} mm of motion predicted, {left}"
+
+
+def settle(
+    stepper: Stepper,
+    state: ClothState,
+    limits: SettleLimits,
+    watch: Callable[[float, float], None] = lambda done, error: None,
+) -> Settling:
+    """Run until rest; where that depends on the steps, halve them until halving changes no more than the bound.
+
+    The moves d of successive windows shrink by q, so d q / (1 - q) is still to come. Half the way of two windows is
+    taken for d: what goes to and fro, as a vertex between two flanks, gets nowhere. A method that solves each step
+    only in part, as one sweep of Gauss-Seidel does, leaves an error of order h² in the state of rest, so halving h
+    shows three quarters of it (Richardson) and a third of that is left.
+
+    Cloth that buckles slowly hardly moves for a long while, so being quiet does not prove much. A method that knows the
+    exact stiffness goes on in steps that grow as long as the system is positive definite (`cloth.polish`): one of these
+    goes all the way that was to come, and where it goes nowhere, the cloth is at rest, and stable.
+
+    Args:
+        stepper: The cloth among its colliders; its steps are changed, and as they were at the end if the rest does not
+            depend on them.
+        state: Where to begin.
+        limits: When to stop.
+        watch: Receives the share of time used and the error [m] at each look.
+
+    Raises:
+        FallenError: all of it is under the lowest thing that could hold it.
+    """
+    began = time.perf_counter()
+    result = Settling(state)
+    moves: list[float] = []
+    drifts: list[float] = []
+    earlier = state.positions
+    coarse: FloatArray | None = None
+    quiet = still = 0
+    stepper.prepare(state.positions)
+    exact, polish = stepper.rests_exactly, Polish(stepper, limits.residual)
+    looks, share = 0, 0.0
+    while share < 1.0 and time.perf_counter() < limits.deadline:
+        before, known = result.state.positions, stepper.known
+        span = polish.span
+        after = stepper.run(result.state, span)
+        residual = stepper.residual(after)
+        looks += 1
+        share = looks * LOOK / limits.seconds
+        if polish.goes_astray(residual):
+            stepper.known = known
+            continue
+        result.state, result.residual = after, residual
+        if after.positions[:, 1].max() < limits.lowest:
+            raise FallenError(
+                "the garment has fallen off the body: nothing holds it",
+                hint="does it go around the body, right way up, and is it small enough?",
+            )
+        moved, brief = _rms(after.positions - before), span < LOOK
+        if not brief:  # a shorter time tells nothing about rest
+            moves.append(moved)
+            drifts.append(0.5 * _rms(after.positions - earlier) if len(moves) > 1 else moved)
+            earlier = before
+            whole = polish.whole and len(moves) > 1
+            to_come = max(moves[-2:]) if whole else max(moved, _still_to_come(drifts))
+            result.error = max(to_come, _VAGUE) if stepper.polishes and not whole else to_come
+            if not exact:
+                result.error += np.inf if coarse is None else _rms(after.positions - coarse) / 3.0
+        seconds = time.perf_counter() - began
+        row = TraceRow(seconds, stepper.steps, 1e3 * result.error, result.residual, contacts=stepper.bearing)
+        result.trace.append(row)
+        watch(share, result.error)
+        if brief:
+            polish.choose(moved < _STILL, residual)
+            continue
+        first = coarse is None and not exact
+        bound = _COARSE * limits.error if first else (1.0 if exact else 0.5) * limits.error
+        still = still + 1 if to_come < _STILL else 0
+        balanced = result.residual < limits.residual or not exact
+        over = balanced or still >= _LONG
+        quiet = quiet + 1 if to_come < bound and over and (whole or not stepper.definite) else 0
+        if stepper.polishes and limits.error < _VAGUE:
+            polish.choose(moved < (_NEAR if over else _STILL), residual)
+        if quiet < (1 if exact and residual < limits.residual else _QUIET):  # at a turn of its way forces are large
+            continue
+        if result.error <= limits.error:
+            result.settled = balanced
+            break
+        if exact:
+            continue
+        if 2 * stepper.substeps > limits.finest:
+            break
+        coarse, moves, drifts, quiet = result.state.positions, [], [], 0
+        stepper.substeps *= 2
+    if exact:
+        polish.end()
+    return result
+
+
+def _rms(moves: FloatArray) -> float:
+    return float(np.sqrt((moves**2).sum(axis=1).mean()))
+
+
+def _still_to_come(drifts: list[float]) -> float:
+    """Return the sum of the moves to come if they go on shrinking as the last four did [m]."""
+    if len(drifts) < 4:
+        return np.inf
+    last, before = max(drifts[-2:]), max(drifts[-4:-2])
+    shrink = min(np.sqrt(last / before), _SLOWEST) if before > 0.0 else 0.0
+    return float(last * max(shrink / (1.0 - shrink), 1.0))

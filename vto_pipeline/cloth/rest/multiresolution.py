@@ -1,0 +1,171 @@
+"""Coarse to fine: a garment first comes to rest on coarser meshes, where steps are cheap.
+
+A step costs more than in proportion to the vertices, and a fine mesh has as far to go as a coarse one. So what is a
+matter of the way (the body growing, riding along, falling into place) is done once, on the coarsest mesh. Each finer
+one starts from where the one before lies and has no more to settle than what that one could not show: smaller folds,
+and the stiffness of its own triangles. After Zhang, Dumas, Fei, Jacobson, James & Kaufman 2022, "Progressive simulation
+for cloth quasistatics".
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import NamedTuple
+
+from vto_pipeline.cloth.drape_config import DrapeConfig
+from vto_pipeline.cloth.dynamics.stepper import Stepper
+from vto_pipeline.cloth.model.build import ClothModel, at_rest, build
+from vto_pipeline.cloth.rest.coarsening import Coarser, coarser
+from vto_pipeline.cloth.rest.convergence import Settling
+from vto_pipeline.cloth.rest.phases import REST, ROUGH, Phases
+from vto_pipeline.cloth.simulation import default_skin
+from vto_pipeline.errors import GarmentError, InputError
+from vto_pipeline.model.body import MovingBody
+from vto_pipeline.model.cloth import TraceRow
+from vto_pipeline.model.fabric import Fabric
+from vto_pipeline.model.garment import Garment
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+
+_FEWER = 4  # times fewer vertices on the next coarser mesh: edges twice as long
+_FIRST = 0.5  # of the progress, and of the time there is: the coarser meshes
+
+
+class Reached(NamedTuple):
+    """How a garment came to rest on one mesh.
+
+    Args:
+        model: The cloth.
+        phases: What it went through.
+        stepper: The cloth among its colliders.
+        settling: How it went.
+        before: What it went through on coarser meshes.
+    """
+
+    model: ClothModel
+    phases: Phases
+    stepper: Stepper
+    settling: Settling
+    before: tuple[Phases, ...] = ()
+
+
+def come_to_rest(
+    garment: Garment, body: MovingBody, fabric: Fabric, config: DrapeConfig, job: Job, deadline: float
+) -> Reached:
+    """Return the garment at rest on the body as it ends; the trace begins with those of the coarser meshes.
+
+    Args:
+        garment: Where it starts, about the body as it begins.
+        body: What it lies on.
+        fabric: What it is made of.
+        config: All settings.
+        job: For progress, findings and what was left out.
+        deadline: `time.perf_counter` at which to stop settling.
+
+    Raises:
+        InputError, ConfigError: as `build` and `Stepper.prepare`.
+        DivergedError: positions are no longer finite.
+    """
+    model = build(garment.mesh, garment.rest, fabric, materials=config, job=job)
+    return _Descent(garment, model, fabric, config, job).reach(body, deadline)
+
+
+class _Descent:
+    """The way of one garment down its meshes, coarsest first."""
+
+    def __init__(self, garment: Garment, model: ClothModel, fabric: Fabric, config: DrapeConfig, job: Job) -> None:
+        self._began = time.perf_counter()
+        self._garment = garment
+        self._model = model
+        self._fabric = fabric
+        self._config = config
+        self._job = job
+        skin_mm = 1e3 * default_skin(model.edge_length) if config.skin_mm is None else config.skin_mm
+        self._rough = config.model_copy(update={"skin_mm": skin_mm, "clear_rounds": 0})  # a finer mesh will see to that
+        self._coarser = _coarser_ones(garment, config.coarsen_above, job)
+
+    def reach(self, body: MovingBody, deadline: float) -> Reached:
+        """Return the garment at rest on its own mesh."""
+        trace: list[TraceRow] = []
+        before: tuple[Phases, ...] = ()
+        start = self._coarser[-1].garment if self._coarser else self._garment
+        for level in range(len(self._coarser), 0, -1):
+            now = time.perf_counter()
+            finer = self._coarser[level - 2].garment if level > 1 else self._garment
+            found = self._rest_on(level, start, body, now + _FIRST * (deadline - now))
+            if found is None:
+                self._coarser.pop()
+                start = finer
+                continue
+            trace += found.settling.trace
+            before += (found.phases,)
+            self._job.note(
+                f"first came to rest on {len(start.mesh.vertices)} vertices: {time.perf_counter() - now:.1f} s, "
+                f"{found.stepper.steps} steps"
+            )
+            there = self._coarser[level - 1].finer(found.settling.state.positions)
+            start = Garment(TriangleMesh(there, finer.mesh.faces), finer.rest)
+            body = MovingBody(body.keyframes[-1:], body.faces)
+        reached = self._rest_on(0, start, body, deadline)
+        assert reached is not None  # only coarser ones are given up
+        reached.settling.trace[:0] = trace
+        return reached._replace(before=before)
+
+    def _rest_on(self, level: int, garment: Garment, body: MovingBody, deadline: float) -> Reached | None:
+        """Return the garment at rest on one mesh: 0 is its own, the last the coarsest.
+
+        None where that is coarser and too coarse to be freed from the body: between large triangles that pass through
+        it, layers would be wedged, and never come to rest.
+        """
+        model, config, job = self._model, self._config, self._job
+        if level > 0:
+            config, job = self._rough, self._part(level)
+            model = build(garment.mesh, garment.rest, self._fabric, materials=config)
+        phases = Phases(model, garment.rest, self._fabric, config, job)
+        first = TriangleMesh(body.keyframes[0], body.faces)
+        state = phases.free(at_rest(garment.mesh.vertices))
+        if level == len(self._coarser):  # the others start outside the body, but for corners that edges have cut
+            state = phases.free(phases.grow(state, first), first)
+            if level > 0 and phases.left > 0:
+                self._job.leave_out(
+                    f"coming to rest on {len(model.mass)} vertices first",
+                    f"too coarse to clear the body: {phases.left} pairs of triangles still intersect",
+                )
+                return None
+        collider = phases.collider(body, TriangleMesh(state.positions, model.faces))
+        stepper = phases.stepper(model, collider, config.damping)
+        stepper.prepare(state.positions)
+        job.note(f"{stepper.choice.method}, {stepper.substeps} steps per 1/60 s: {stepper.choice.reason}")
+        state = phases.ride(state, stepper, collider, body.final)
+        before = time.perf_counter() - self._began
+        settling = phases.settle(state, stepper, body.final, deadline, (ROUGH,) if level > 0 else (ROUGH, REST))
+        settling.trace = [replace(row, seconds=before + row.seconds, level=level) for row in settling.trace]
+        if level > 0:  # what matters in the end warns again
+            self._job.notes += [f"on {len(model.mass)} vertices: {text}" for text in job.warnings]
+        return Reached(model, phases, stepper, settling)
+
+    def _part(self, level: int) -> Job:
+        """Return a job whose progress is a part of the first half of the whole one's."""
+        count, whole = len(self._coarser), self._job
+
+        def progress(done: float, text: str) -> None:
+            whole.progress(_FIRST * (count - level + done) / count, f"on a coarser mesh: {text}")
+
+        return Job(progress, whole.scratch, whole.seed, whole.force_all)
+
+
+def _coarser_ones(garment: Garment, most: int, job: Job) -> list[Coarser]:
+    """Return coarser garments, each of a quarter of the vertices of the last, until one has no more than `most`."""
+    made: list[Coarser] = []
+    what = "coming to rest on a coarser mesh first"
+    while (count := len(garment.mesh.vertices)) > most:
+        try:
+            made.append(coarser(garment, count // _FEWER))
+        except (InputError, GarmentError) as error:
+            job.leave_out(what, f"{count} vertices cannot be reduced to {count // _FEWER}: {error.problem}")
+            return made
+        garment = made[-1].garment
+    if not made:
+        job.leave_out(what, f"{count} vertices; it pays off above {most} (coarsen_above)")
+    return made

@@ -1,0 +1,186 @@
+"""The phases of a drape: freeing, growing the body, moving along with it, settling."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from vto_pipeline.cloth.collision.self_collision.tally import Tally, tell
+from vto_pipeline.cloth.drape_config import DrapeConfig
+from vto_pipeline.cloth.dynamics.body_motion import PacedBody, covered_way, ride
+from vto_pipeline.cloth.dynamics.stepper import Stepper
+from vto_pipeline.cloth.model.build import ClothModel, ClothState, at_rest, without_gravity
+from vto_pipeline.cloth.placement.body_growth import growing
+from vto_pipeline.cloth.placement.clear_body import clear_of_body
+from vto_pipeline.cloth.placement.collision_free_start import free_start
+from vto_pipeline.cloth.rest.convergence import SettleLimits, Settling, settle
+from vto_pipeline.cloth.simulation import default_skin
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.model.body import MovingBody
+from vto_pipeline.model.cloth import TraceRow
+from vto_pipeline.model.fabric import Fabric
+from vto_pipeline.model.garment import RestShape
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+
+ROUGH, REST = (5e-3, 10.0), (0.0, 1.0)
+"""How nearly cloth comes to rest: the error at least [m], and times the left-over force that are enough.
+
+Roughly, to see where it lies across the body, or for a finer mesh to go on; and as is asked."""
+
+_TURNS = 5  # of coming to rest and being cleared
+_LONG = 0.5  # steps per 1/60 s on the way to rest: backward Euler takes the more motion out, the longer they are
+_CALM = 20.0  # 1/s: velocities fade this fast while the body grows, where the way does not matter
+
+
+class Phases:
+    """What the phases of one drape share.
+
+    Args:
+        model: The cloth.
+        rest: Its shape without forces.
+        fabric: What it is made of.
+        config: All settings.
+        job: For progress, findings and what was left out.
+
+    Attributes:
+        left: Pairs of triangles that still met after it was last freed.
+    """
+
+    def __init__(self, model: ClothModel, rest: RestShape, fabric: Fabric, config: DrapeConfig, job: Job) -> None:
+        self._model = model
+        self._rest = rest
+        self._fabric = fabric
+        self._friction = fabric.friction if config.friction is None else config.friction
+        self._skin = default_skin(model.edge_length) if config.skin_mm is None else 1e-3 * config.skin_mm
+        self._config = config
+        self._job = job
+        self.left = 0
+        self._crossed = np.zeros(len(model.mass), np.bool_)
+        self._tallies: list[Tally] = []
+        self._colliders: list[PacedBody] = []
+
+    def free(self, state: ClothState, body: TriangleMesh | None = None) -> ClothState:
+        """Return the cloth where it crosses neither itself nor the body; where it could not be freed, it may go on."""
+        if not self._config.self_collision:
+            return state
+        start = free_start(
+            state.positions, self._model.faces, self._rest.positions, self._fabric.thickness, self._job, body
+        )
+        self.left, self._crossed = start.left, start.crossed
+        if start.pairs == 0:
+            return state
+        return replace(state, positions=start.positions, velocities=np.zeros_like(state.velocities))
+
+    def collider(self, body: MovingBody, cloth: TriangleMesh) -> PacedBody:
+        """Return the body, which moves as fast as it may about the cloth."""
+        seconds = covered_way(body, cloth) / self._config.body_speed
+        return PacedBody(body, seconds, self._friction, self._job)
+
+    def stepper(self, model: ClothModel, collider: PacedBody, damping: float) -> Stepper:
+        """Return the cloth among its colliders."""
+        made = Stepper(
+            model,
+            [collider],
+            np.full(len(model.mass), self._skin),
+            self._config,
+            damping=damping,
+            max_speed=self._config.max_speed,
+            crossed=self._crossed,
+            force_all=self._job.force_all,
+        )
+        self._colliders.append(collider)
+        if made.self_contact is not None:
+            self._tallies.append(made.self_contact.tally)
+        return made
+
+    def grow(self, state: ClothState, body: TriangleMesh) -> ClothState:
+        """Return the cloth outside the body."""
+        mesh = TriangleMesh(state.positions, self._model.faces)
+        depth = -float(SurfaceDistance(body).signed(mesh.vertices).distance.min())
+        what = "growing the body inside the garment"
+        if depth <= 1e-3 * self._config.grow_above_mm:
+            self._job.leave_out(what, f"no cloth is deeper inside than {1e3 * max(depth, 0):.1f} mm")
+            return state
+        self._job.progress(0.05, what)
+        growth = growing(body, mesh, self._job)
+        state = at_rest(growth.garment.vertices)
+        collider = self.collider(growth.body, growth.garment)
+        stepper = self.stepper(without_gravity(self._model), collider, _CALM)
+        grown = ride(stepper, state, collider, self._skin, lambda done: self._job.progress(0.05 + 0.25 * done, what))
+        return at_rest(grown.positions)
+
+    def ride(self, state: ClothState, stepper: Stepper, collider: PacedBody, body: TriangleMesh) -> ClothState:
+        """Return the cloth after the body's motion."""
+        what = "moving along with the body"
+        if collider.ends == 0.0:
+            self._job.leave_out(what, "the body is at rest")
+            return state
+        at_full_pace = collider.ends
+        state = ride(stepper, state, collider, self._skin, lambda done: self._job.progress(0.3 + 0.2 * done, what))
+        self._job.note(
+            f"the body took {collider.ends:.2f} s to change, in simulated time; {at_full_pace:.2f} s unslowed"
+        )
+        return self.free(state, body)
+
+    def settle(
+        self,
+        state: ClothState,
+        stepper: Stepper,
+        body: TriangleMesh,
+        deadline: float,
+        passes: Sequence[tuple[float, float]] = (ROUGH, REST),
+    ) -> Settling:
+        """Return the cloth at rest and clear of the body, or as near to it as allowed.
+
+        Args:
+            state: Where to begin.
+            stepper: The cloth among its colliders.
+            body: Where it is now.
+            deadline: `time.perf_counter` at which to stop.
+            passes: How nearly, for each coming to rest; what was pushed off the body does so again.
+        """
+
+        def watch(done: float, error: float) -> None:
+            known = f"{1e3 * error:.2f} mm of motion predicted" if np.isfinite(error) else "falling into place"
+            self._job.progress(0.5 + 0.4 * done, f"settling: {known}")
+
+        limits = SettleLimits(
+            error=1e-3 * self._config.target_error_mm,
+            residual=self._config.target_residual,
+            seconds=self._config.settle_seconds,
+            finest=self._config.finest,
+            deadline=deadline,
+            lowest=float(body.vertices[:, 1].min()),
+        )
+        stepper.prepare(state.positions)
+        if self._config.substeps is None and stepper.rests_exactly:
+            stepper.substeps = min(stepper.substeps, _LONG)
+        trace: list[TraceRow] = []
+        began = time.perf_counter()
+        for turn in range(_TURNS):
+            error, times = passes[min(turn, len(passes) - 1)]
+            enough = replace(limits, error=max(error, limits.error), residual=times * limits.residual)
+            spent = time.perf_counter() - began
+            settling = settle(stepper, state, enough, watch)
+            trace += [replace(row, seconds=spent + row.seconds) for row in settling.trace]
+            self._job.progress(0.9, "clearing the body")
+            state, crossing = clear_of_body(stepper, settling.state, self._model.faces, body, self._config.clear_rounds)
+            lies_clear = state is settling.state
+            settling.state, settling.trace = state, trace
+            if not lies_clear:  # nobody has looked at it since it was moved
+                settling.settled, settling.error = False, np.inf
+            if len(crossing) > 0 and self._config.clear_rounds > 0:  # nor will waiting clear it
+                break
+            if lies_clear and turn + 1 >= len(passes):
+                break
+        return settling
+
+    def account(self, before: Sequence[Phases] = ()) -> None:
+        """Tell what keeping the cloth apart took, and what was left out of it, here and on coarser meshes before."""
+        every = (*before, self)
+        tallies = [tally for one in every for tally in one._tallies]
+        tell(tallies, [collider for one in every for collider in one._colliders], self._job)

@@ -1,0 +1,96 @@
+"""The last steps to rest: growing steps with the exact stiffness, while no cloth is about to buckle."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vto_pipeline.cloth.dynamics.methods import FRAME
+from vto_pipeline.cloth.dynamics.stepper import Stepper
+
+LOOK = 0.1  # s of cloth time between looks
+LONGEST = 1.0  # s: inertia holds nothing back in a step of that length that cloth still waits for
+_LONGER = 4.0  # times, the next step while the system is positive definite
+_ASIDE = 10.0  # times the left-over force at its begin, at first: what is soft comes first, at the expense of the stiff
+_FALLS = 0.5  # times that after each look
+_SLIGHT = 0.1  # of the left-over force that is enough: less is no sign of going astray
+_SHORTER = 64.0  # times shorter than usual, at most, where cloth is about to buckle
+_FEW = 3  # of these steps to a look: it is the way that matters there, not the time it takes
+
+
+class Polish:
+    """Chooses the steps of a cloth that comes to rest.
+
+    With inertia gone a step with the exact stiffness is one of Newton's method (pseudo-transient continuation; Kelley &
+    Keyes 1998), which may also lead away, where contacts or wrinkles are other at its end than at its begin. So what is
+    left of the force has to fall from look to look, if not from the first one on (a watchdog; Chamberlain et al. 1982);
+    a step that leaves more is not taken, unless it is as short as usual: that is no guess, but cloth on its way. Forces
+    grow so where it falls out of a place it was not stable in, and stays at, all but still, with the usual stiffness.
+
+    Where the system is not positive definite in steps as long as usual, they are shorter until it is. The usual
+    stiffness leaves out what makes cloth buckle: with it, a fold that is about to only creeps, and never comes to rest.
+
+    Args:
+        stepper: The cloth among its colliders, prepared; its steps are changed.
+        enough: Left-over force, as a share of weight, at which cloth counts as in balance.
+    """
+
+    def __init__(self, stepper: Stepper, enough: float) -> None:
+        self._stepper = stepper
+        self._usual = stepper.substeps
+        self._enough = enough
+        self._most = np.inf
+        self._tried = False
+
+    @property
+    def span(self) -> float:
+        """Cloth time until the next look [s]."""
+        stepper = self._stepper
+        if stepper.polishes and stepper.substeps > self._usual:
+            return _FEW * stepper.step
+        return max(LOOK, stepper.step)
+
+    @property
+    def whole(self) -> bool:
+        """Whether the last step went all the way there was to go, of a cloth that is stable there."""
+        return self._stepper.definite and self._stepper.step >= LONGEST
+
+    def goes_astray(self, residual: float) -> bool:
+        """Return whether the last step was a long one, and led away from rest; if so the next ones are shorter."""
+        if not self._stepper.definite or residual <= self._most or self._stepper.substeps >= self._usual:
+            return False
+        self._shorten()
+        return True
+
+    def choose(self, near: bool, residual: float) -> None:
+        """Choose the next steps: with the exact stiffness, longer while that will do, else shorter.
+
+        Args:
+            near: Whether it is worth trying.
+            residual: Left-over force now.
+        """
+        stepper = self._stepper
+        if stepper.definite and residual > self._most:
+            self._most = _ASIDE * residual
+        elif stepper.definite:
+            self._most = max(_FALLS * self._most, _SLIGHT * self._enough)
+            if residual < self._enough or stepper.substeps > self._usual:
+                stepper.substeps = max(stepper.substeps / _LONGER, FRAME / LONGEST)
+        elif stepper.substeps < self._usual:
+            self._shorten()
+        else:
+            self._most = _ASIDE * max(residual, _SLIGHT * self._enough)
+            if not near:
+                stepper.substeps = self._usual
+            elif self._tried:
+                stepper.substeps = min(_LONGER * stepper.substeps, _SHORTER * self._usual)
+            self._tried = near
+            stepper.polish(near)
+
+    def _shorten(self) -> None:
+        self._stepper.substeps = min(_LONGER * self._stepper.substeps, self._usual)
+        self._stepper.polish(True)
+
+    def end(self) -> None:
+        """Go back to the usual steps."""
+        self._stepper.substeps = self._usual
+        self._stepper.polish(False)

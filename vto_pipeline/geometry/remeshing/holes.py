@@ -1,0 +1,136 @@
+"""Fill holes so that the filling continues the slope and curvature around it.
+
+Liepa 2003, "Filling holes in meshes": triangulate, refine to the density of the rim, fair. The fairing solves the
+biharmonic equation on the filling with the rings of faces around it held.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vto_pipeline.errors import GarmentError
+from vto_pipeline.geometry.laplace import extend
+from vto_pipeline.geometry.remeshing.isotropic import isotropic
+from vto_pipeline.geometry.remeshing.repair import is_manifold
+from vto_pipeline.geometry.remeshing.subdivide import split_long_edges
+from vto_pipeline.geometry.remeshing.triangulate import triangulate_loop
+from vto_pipeline.geometry.topology import edges, face_normals, half_edges, submesh
+from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.mesh import TriangleMesh
+
+RINGS = 3
+"""Rings of faces around a hole that give the filling its slope and curvature."""
+
+
+@dataclass(frozen=True)
+class Rim:
+    """The boundary that a filling is joined to.
+
+    Args:
+        loop: Vertices in the order of the filling, that is against the boundary, shape (L,).
+        normals: Unit normal of the face beyond the edge from vertex i to i + 1, zero where there is none, shape (L, 3).
+    """
+
+    loop: IntArray
+    normals: FloatArray
+
+
+def fill_holes(mesh: TriangleMesh, walks: list[IntArray]) -> TriangleMesh:
+    """Return the mesh with some of its boundary loops filled; old vertices and faces keep their indices.
+
+    Args:
+        mesh: A manifold mesh; colours go on smoothly too.
+        walks: Of its `boundary_walks`, those to fill.
+
+    Raises:
+        GarmentError: no filling leaves the mesh manifold.
+    """
+    if not walks:
+        return mesh
+    start, normals = half_edges(mesh)[:, 0], face_normals(mesh)
+    rims = [Rim(np.roll(start[walk], -1)[::-1], normals[walk[::-1] // 3]) for walk in walks]
+    return _fair(_sew_in(mesh, rims), mesh)
+
+
+def fill_bay(mesh: TriangleMesh, shore: IntArray, mouth: FloatArray) -> TriangleMesh:
+    """Return the mesh with a bay of its boundary filled up to a line across its mouth.
+
+    Args:
+        mesh: A manifold mesh; the line takes the colours of its ends.
+        shore: Consecutive half-edges of one of its `boundary_walks`.
+        mouth: Inner points of the line, from the start of the shore to its end [m], shape (M, 3).
+
+    Raises:
+        GarmentError: no filling leaves the mesh manifold.
+    """
+    halves, normals = half_edges(mesh), face_normals(mesh)
+    end_of = np.where(np.arange(len(mouth)) < len(mouth) / 2, halves[shore[0], 0], halves[shore[-1], 1])
+    colors = None if mesh.colors is None else np.vstack([mesh.colors, mesh.colors[end_of]])
+    widened = TriangleMesh(np.vstack([mesh.vertices, mouth]), mesh.faces, colors)
+    new = len(mesh.vertices) + np.arange(len(mouth))
+    loop = np.concatenate([[halves[shore[-1], 1]], halves[shore[::-1], 0], new]).astype(np.int32)
+    rim = Rim(loop, np.vstack([normals[shore[::-1] // 3], np.zeros((len(mouth) + 1, 3))]))
+    return _fair(_sew_in(widened, [rim]), widened)
+
+
+def _sew_in(mesh: TriangleMesh, rims: list[Rim]) -> TriangleMesh:
+    """Return mesh and flat fillings as one, the fillings' vertices and faces last."""
+    rim_edges = _edges_among(mesh, np.concatenate([rim.loop for rim in rims]))
+    vertices, faces, count = [mesh.vertices], [mesh.faces], len(mesh.vertices)
+    for rim in rims:
+        points = mesh.vertices[rim.loop]
+        patch = TriangleMesh(points, triangulate_loop(points, rim.normals, _taken_chords(rim.loop, rim_edges)))
+        patch = _refine(patch, float(np.linalg.norm(points - np.roll(points, -1, axis=0), axis=1).mean()))
+        new = patch.vertices[len(points) :]
+        faces.append(np.concatenate([rim.loop, count + np.arange(len(new))]).astype(np.int32)[patch.faces])
+        vertices.append(new)
+        count += len(new)
+    joined = TriangleMesh(np.vstack(vertices), np.vstack(faces))
+    if not is_manifold(joined):
+        raise GarmentError(f"filling {len(rims)} holes left the mesh non-manifold", hint="clean the rims first")
+    return joined
+
+
+def _edges_among(mesh: TriangleMesh, vertices: IntArray) -> IntArray:
+    """Return the edges with both ends in a set of vertices."""
+    member = np.zeros(len(mesh.vertices), dtype=bool)
+    member[vertices] = True
+    pair = edges(mesh)
+    return pair[member[pair].all(axis=1)]
+
+
+def _taken_chords(loop: IntArray, pair: IntArray) -> NDArray[np.bool_]:
+    """Return which places of a loop are already joined by an edge of the mesh, shape (L, L)."""
+    order = np.argsort(loop)
+    at = np.minimum(np.searchsorted(loop[order], pair), len(loop) - 1)
+    ours = (loop[order][at] == pair).all(axis=1)
+    i, j = order[at[ours]].T
+    taken = np.zeros((len(loop), len(loop)), dtype=bool)
+    taken[i, j] = taken[j, i] = True
+    return taken
+
+
+def _refine(patch: TriangleMesh, edge: float) -> TriangleMesh:
+    """Return the patch in triangles of about one edge length; its rim vertices stay first and unmoved."""
+    split = split_long_edges(patch, 4.0 / 3.0 * edge)
+    if len(split.vertices) == len(patch.vertices):
+        return patch
+    return isotropic(split, edge, 5, features=None, project=False)
+
+
+def _fair(joined: TriangleMesh, mesh: TriangleMesh) -> TriangleMesh:
+    """Move the new vertices onto the biharmonic surface through the rings around them."""
+    is_new = np.arange(len(joined.vertices)) >= len(mesh.vertices)
+    near = np.zeros(len(joined.vertices), dtype=bool)
+    near[joined.faces[len(mesh.faces) :]] = True
+    for _ in range(RINGS):
+        near[joined.faces[near[joined.faces].any(axis=1)]] = True
+    around, source = submesh(joined, np.all(near[joined.faces], axis=1))
+    known = mesh.vertices if mesh.colors is None else np.hstack([mesh.vertices, mesh.colors])
+    values = np.vstack([known, np.zeros((int(is_new.sum()), known.shape[1]))])
+    values[source] = extend(around, values[source], is_new[source], order=2)
+    colors = None if mesh.colors is None else np.clip(np.rint(values[:, 3:]), 0, 255).astype(np.uint8)
+    return TriangleMesh(values[:, :3], joined.faces, colors)

@@ -1,0 +1,115 @@
+"""Span a closed loop of points by triangles between its own points.
+
+Liepa 2003, "Filling holes in meshes", section 3, after Barequet and Sharir 1995: by dynamic programming a triangulation
+whose worst fold is small, and of equals the smallest. It is the best one when a flat one exists, else near it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from vto_pipeline.errors import GarmentError
+from vto_pipeline.model.arrays import FloatArray, IntArray
+
+LONGEST = 2000
+"""Points of the longest loop: the work grows with the third power of it."""
+
+TIE = 1e-9
+"""Folds that differ by less are equal."""
+
+
+def triangulate_loop(points: FloatArray, rim_normals: FloatArray, forbidden: NDArray[np.bool_]) -> IntArray:
+    """Return triangles over a loop, running as the loop does, shape (L - 2, 3).
+
+    Args:
+        points: The loop in order [m], shape (L, 3).
+        rim_normals: Unit normal of the face beyond the edge from point i to i + 1, turned so that it agrees with the
+            new faces, shape (L, 3).
+        forbidden: Chords that may not be used, symmetric, shape (L, L).
+
+    Raises:
+        GarmentError: the loop is too long, or every triangulation needs a forbidden chord.
+    """
+    count = len(points)
+    if count > LONGEST:
+        raise GarmentError(f"a hole has {count} edges; the most is {LONGEST}", hint="remesh to longer edges")
+    fold, split = _best_splits(points, rim_normals, forbidden)
+    if not np.isfinite(fold[0, count - 1]):
+        raise GarmentError(f"a hole of {count} edges cannot be filled without doubling an edge of the mesh")
+    return _collect(split)
+
+
+@njit(cache=True)
+def _normal(points, i, k, j):  # type: ignore[no-untyped-def]
+    """Return the unit normal of a triangle, zero if it has no area, and its area. Scalars, for speed."""
+    ux, uy, uz = points[k, 0] - points[i, 0], points[k, 1] - points[i, 1], points[k, 2] - points[i, 2]
+    vx, vy, vz = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1], points[j, 2] - points[i, 2]
+    x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    length = np.sqrt(x * x + y * y + z * z)
+    if length == 0.0:
+        return 0.0, 0.0, 0.0, 0.0
+    return x / length, y / length, z / length, 0.5 * length
+
+
+@njit(cache=True)
+def _fold(x, y, z, normal):  # type: ignore[no-untyped-def]
+    """Return one less the cosine between two unit normals."""
+    return 1.0 - (x * normal[0] + y * normal[1] + z * normal[2])
+
+
+@njit(cache=True)
+def _best_splits(points, rim_normals, forbidden):  # type: ignore[no-untyped-def]
+    """Return the worst fold (1 - cosine) of the best span of i..j, and the point k that it puts on the chord ij."""
+    count = len(points)
+    fold = np.zeros((count, count))
+    area = np.zeros((count, count))
+    split = np.full((count, count), -1, np.int32)
+    normal = np.zeros((count, count, 3))
+    for i in range(count - 1):
+        normal[i, i + 1] = rim_normals[i]
+    for span in range(2, count):
+        for i in range(count - span):
+            j = i + span
+            last = span == count - 1
+            best_fold, best_area, best = np.inf, np.inf, -1
+            if last or not forbidden[i, j]:
+                for k in range(i + 1, j):
+                    worst = max(fold[i, k], fold[k, j])
+                    if worst > best_fold or worst == np.inf:
+                        continue
+                    x, y, z, own_area = _normal(points, i, k, j)
+                    worst = max(worst, max(_fold(x, y, z, normal[i, k]), _fold(x, y, z, normal[k, j])))
+                    if last:
+                        worst = max(worst, _fold(x, y, z, rim_normals[j]))
+                    total = area[i, k] + area[k, j] + own_area
+                    if worst < best_fold - TIE or (worst < best_fold + TIE and total < best_area):
+                        best_fold, best_area, best = worst, total, k
+            fold[i, j], area[i, j], split[i, j] = best_fold, best_area, best
+            if best >= 0:
+                x, y, z, _ = _normal(points, i, best, j)
+                normal[i, j, 0], normal[i, j, 1], normal[i, j, 2] = x, y, z
+    return fold, split
+
+
+@njit(cache=True)
+def _collect(split):  # type: ignore[no-untyped-def]
+    """Return the triangles of the best span of the whole loop."""
+    count = len(split)
+    faces = np.empty((count - 2, 3), np.int32)
+    stack = np.empty((2 * count, 2), np.int32)
+    stack[0, 0], stack[0, 1] = 0, count - 1
+    open_spans, filled = 1, 0
+    while open_spans > 0:
+        open_spans -= 1
+        i, j = stack[open_spans]
+        if j - i < 2:
+            continue
+        k = split[i, j]
+        faces[filled, 0], faces[filled, 1], faces[filled, 2] = i, k, j
+        filled += 1
+        stack[open_spans, 0], stack[open_spans, 1] = i, k
+        stack[open_spans + 1, 0], stack[open_spans + 1, 1] = k, j
+        open_spans += 2
+    return faces

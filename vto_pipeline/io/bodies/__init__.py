@@ -1,0 +1,6 @@
+"""Files about bodies.
+
+measurements, size_letters: tapes, sizes, silhouettes, landmarks
+avatars: the avatar's archive
+skinned, smpl, makehuman: bodies with a skeleton, made by others
+"""

@@ -1,0 +1,7 @@
+"""glTF 2.0 and GLB.
+
+document: chunks, buffers and accessors, checked against the bytes
+read, skin: triangles of a scene; skeletons at rest
+draco: compressed meshes, unpacked
+write: parts with normals, colours, textures and materials
+"""

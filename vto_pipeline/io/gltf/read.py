@@ -1,0 +1,149 @@
+"""The triangles of a glTF scene, in world coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vto_pipeline.errors import FormatError
+from vto_pipeline.io.arrays import Arrays
+from vto_pipeline.io.gltf.document import GltfDocument, open_gltf
+from vto_pipeline.io.gltf.draco import unpack_draco
+from vto_pipeline.io.gltf.skin import Skin, read_skin, read_weights
+from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.numerics.srgb import encode_srgb
+
+_TRIANGLES = 4
+_NODES = 10_000  # visits: a node may be reached by many parents in a broken file
+
+
+def parse_gltf(name: str) -> Arrays:
+    """Read the triangles of the default scene; morph targets, textures and animations are ignored.
+
+    A skinned part stands as its skeleton at rest holds it.
+
+    Args:
+        name: Path of a .gltf or .glb file.
+
+    Returns:
+        vertices (V, 3), placed by their nodes; faces (F, 3); colors (V, 3) uint8, where every part has them; notes.
+        Where every part hangs on one skin also joint_names, joints (J, 3), parents (J,), weights (V, J).
+
+    Raises:
+        FormatError: the file breaks the format, or has no triangles.
+    """
+    document = unpack_draco(open_gltf(Path(name)))
+    vertices, faces, notes = [], [], []
+    colors: list[np.ndarray] = []
+    count = 0
+    worlds = dict(_placed_nodes(document))
+    skins: dict[int, Skin] = {}
+    weights: list[np.ndarray] = []
+    for index, transform in worlds.items():
+        node = document.item("nodes", index)
+        if "mesh" not in node:
+            continue
+        skin = skins.setdefault(node["skin"], read_skin(document, node["skin"], worlds)) if "skin" in node else None
+        for primitive in document.item("meshes", node["mesh"]).get("primitives", []):
+            if primitive.get("mode", _TRIANGLES) != _TRIANGLES:
+                notes.append("ignored a part that is not a list of triangles")
+                continue
+            points, triangles, color = _primitive(document, primitive)
+            if skin is None:
+                if np.linalg.det(transform[:3, :3]) < 0:  # a mirror turns the triangles inside out
+                    triangles = triangles[:, ::-1]
+                points = points @ transform[:3, :3].T + transform[:3, 3]
+            else:  # the node's own transform does not count
+                shares = read_weights(document, primitive.get("attributes", {}), len(points), len(skin.joints))
+                points = skin.place(points, shares)
+                weights.append(shares)
+            vertices.append(points)
+            faces.append(triangles + count)
+            colors += [] if color is None else [color]
+            count += len(points)
+    if not faces:
+        raise FormatError("the scene has no triangles", where=name)
+    if len(faces) > 1:
+        notes.append(f"joined {len(faces)} parts into one mesh")
+    arrays: Arrays = {"vertices": np.concatenate(vertices), "faces": np.concatenate(faces)}
+    if len(colors) == len(faces):
+        arrays["colors"] = np.concatenate(colors)
+    if len(skins) == 1 and len(weights) == len(faces):
+        (skin,) = skins.values()
+        arrays |= {
+            "joint_names": np.array(skin.names, dtype=np.str_),
+            "joints": skin.joints,
+            "parents": skin.parents,
+            "weights": np.concatenate(weights),
+        }
+    return {**arrays, "notes": np.array(notes, dtype=np.str_)}
+
+
+def _primitive(
+    document: GltfDocument, primitive: Mapping[str, Any]
+) -> tuple[FloatArray, np.ndarray, np.ndarray | None]:
+    """Points (V, 3), triangles (F, 3) and colours (V, 3) or None, of one primitive."""
+    where = str(document.path)
+    attributes = primitive.get("attributes", {})
+    points = document.accessor(attributes.get("POSITION")).astype(np.float64)
+    if points.shape[1] != 3:
+        raise FormatError(f"positions have {points.shape[1]} coordinates", where=where)
+    if "indices" in primitive:
+        indices = document.accessor(primitive["indices"]).astype(np.int64).ravel()
+    else:
+        indices = np.arange(len(points))
+    if len(indices) % 3:
+        raise FormatError(f"{len(indices)} indices do not form whole triangles", where=where)
+    if indices.min() < 0 or indices.max() >= len(points):  # here, since joined to other parts it would look valid
+        raise FormatError(f"face index {indices.max()} is outside 0..{len(points) - 1}", where=where)
+    color = None
+    if "COLOR_0" in attributes:
+        values = document.accessor(attributes["COLOR_0"])[:, :3]
+        if values.shape != points.shape:
+            raise FormatError(f"{len(values)} colours for {len(points)} vertices", where=where)
+        color = encode_srgb(values)  # glTF keeps vertex colours linear
+    return points, indices.reshape(-1, 3), color
+
+
+def _placed_nodes(document: GltfDocument) -> Iterator[tuple[int, FloatArray]]:
+    """Index and world transform (4, 4) of every node of the default scene."""
+    scenes = document.items("scenes")
+    if scenes:
+        roots = document.item("scenes", document.json.get("scene", 0)).get("nodes", [])
+    else:
+        roots = list(range(len(document.items("nodes"))))
+    stack: list[tuple[Any, FloatArray, tuple[Any, ...]]] = [(root, np.eye(4), ()) for root in reversed(roots)]
+    visits = 0
+    while stack:
+        index, above, path = stack.pop()
+        visits += 1
+        if index in path or visits > _NODES:
+            raise FormatError("the nodes form a loop, or there are too many", where=str(document.path))
+        node = document.item("nodes", index)
+        world = above @ _local(node, document.path)
+        yield index, world
+        stack += [(child, world, (*path, index)) for child in reversed(node.get("children", []))]
+
+
+def _local(node: Mapping[str, Any], path: Path) -> FloatArray:
+    """A node's own transform, from its matrix or its translation, rotation (x, y, z, w) and scale."""
+    try:
+        if "matrix" in node:
+            return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+        x, y, z, w = np.array(node.get("rotation", (0, 0, 0, 1)), dtype=np.float64)
+        rotation = np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+        local = np.eye(4)
+        local[:3, :3] = rotation * np.array(node.get("scale", (1, 1, 1)), dtype=np.float64).reshape(3)
+        local[:3, 3] = np.array(node.get("translation", (0, 0, 0)), dtype=np.float64).reshape(3)
+    except (TypeError, ValueError) as e:
+        raise FormatError(f"cannot parse a node's transform: {e}", where=str(path)) from None
+    return local

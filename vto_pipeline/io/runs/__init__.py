@@ -1,0 +1,5 @@
+"""The files of a run.
+
+artifacts: the table of all artifacts, their names and how they are kept
+garments, traces: labels, openings, rest shapes; error against run time
+"""

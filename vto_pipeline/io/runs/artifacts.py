@@ -1,0 +1,250 @@
+"""The table of artifacts that a run reads or writes, with file, reader and writer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from vto_pipeline.errors import InputError
+from vto_pipeline.io import clouds, meshes
+from vto_pipeline.io.bodies import avatars
+from vto_pipeline.io.bodies import measurements as bodies
+from vto_pipeline.io.bodies.makehuman import BASE
+from vto_pipeline.io.captures import cameras
+from vto_pipeline.io.captures.depth import read_depth_frames
+from vto_pipeline.io.captures.images import SUFFIXES
+from vto_pipeline.io.captures.photos import read_photos
+from vto_pipeline.io.documents import read_json, write_json
+from vto_pipeline.io.fabrics import read_fabric
+from vto_pipeline.io.files import check_file, listed, replacing
+from vto_pipeline.io.gltf.write import read_glb, write_glb
+from vto_pipeline.io.runs import garments, traces
+from vto_pipeline.model.artifact import ArtifactKind
+from vto_pipeline.model.body import Avatar
+from vto_pipeline.model.job import Job
+
+_PAGE_BYTES = 200_000_000
+
+
+def _given_only(path: Path, value: Any) -> None:
+    raise TypeError(f"{path.name} is an input and is never written")
+
+
+def _told(read: Callable[..., Any]) -> Callable[[Path, Job], Any]:
+    """Return a reader that takes its job as second argument, from one that takes it by name."""
+    return lambda path, job: read(path, job=job)
+
+
+def _with_unit(read: Callable[..., Any]) -> Callable[[Any], Any]:
+    """A reader of {file: path, unit: cm}."""
+
+    def read_mapping(source: Any) -> Any:
+        if not isinstance(source, Mapping) or not {"file"} <= set(source) <= {"file", "unit"}:
+            raise InputError(f"got {source!r}; expected a path, or a mapping such as {{file: shirt.obj, unit: cm}}")
+        return read(Path(source["file"]), unit=source.get("unit"))
+
+    return read_mapping
+
+
+def _holds_pictures(folder: Path) -> bool:
+    return bool(listed(folder, SUFFIXES))
+
+
+def _write_page(path: Path, page: str) -> None:
+    with replacing(path) as beside:
+        beside.write_text(page, encoding="utf-8")
+
+
+def _read_page(path: Path) -> str:
+    return check_file(Path(path), {".html"}, _PAGE_BYTES).read_text(encoding="utf-8")
+
+
+def _write_avatar_mesh(path: Path, avatar: Avatar) -> None:
+    meshes.write_ply(path, avatar.mesh)
+
+
+def _leaf(name: str, about: str, read: Callable[..., Any], **more: Any) -> ArtifactKind:
+    """Return an artifact that only a user can give; it has no file in a run."""
+    return ArtifactKind(name, "", about, read, _given_only, **more)
+
+
+def _role_kinds(role: str, prefix: str) -> tuple[ArtifactKind, ...]:
+    """Return the artifacts of scanning one role; the garment's files have no prefix."""
+
+    def made(name: str, filename: str, about: str, read: Any, write: Any, **more: Any) -> ArtifactKind:
+        return ArtifactKind(f"{role}_{name}", prefix + filename, f"{role}: {about}", read, write, **more)
+
+    def mesh_kind(name: str, about: str) -> ArtifactKind:
+        return _leaf(
+            f"{role}_{name}",
+            f"{role}: {about}",
+            meshes.read_mesh,
+            receive=_told(meshes.read_mesh),
+            inline=_with_unit(meshes.read_mesh),
+            in_folder=lambda folder: (folder / BASE).is_file(),
+        )
+
+    return (
+        _leaf(
+            f"{role}_photos",
+            f"{role}: photos from many sides",
+            read_photos,
+            receive=_told(read_photos),
+            in_folder=_holds_pictures,
+        ),
+        _leaf(
+            f"{role}_depth",
+            f"{role}: frames of a depth camera",
+            read_depth_frames,
+            receive=_told(read_depth_frames),
+            in_folder=lambda folder: (folder / "depth").is_dir(),
+        ),
+        _leaf(
+            f"{role}_cloud",
+            f"{role}: point cloud of a scanner",
+            clouds.read_cloud,
+            receive=_told(clouds.read_cloud),
+            inline=_with_unit(clouds.read_cloud),
+        ),
+        mesh_kind("mesh", "finished mesh"),
+        _leaf(
+            f"{role}_measurements",
+            f"{role}: tape measurements",
+            bodies.read_measurements,
+            inline=bodies.read_measurements,
+        ),
+        made("sparse", "sparse.npz", "cameras and points up to scale", cameras.read_sparse, cameras.write_sparse),
+        made("cameras", "cameras.json", "posed photos", cameras.read_cameras, cameras.write_cameras),
+        made("points", "points.ply", "points that the photos share", clouds.read_own_cloud, meshes.write_ply),
+        made("depth_maps", "depth_maps.npz", "depth per photo", cameras.read_depth_maps, cameras.write_depth_maps),
+        made(
+            "trajectory", "trajectory.json", "poses of depth frames", cameras.read_trajectory, cameras.write_trajectory
+        ),
+        made(
+            "surface",
+            "surface.ply",
+            "scanned surface",
+            meshes.read_own_mesh,
+            meshes.write_ply,
+            receive=_told(meshes.read_mesh),
+            inline=_with_unit(meshes.read_mesh),
+            in_folder=lambda folder: (folder / BASE).is_file(),
+        ),
+    )
+
+
+def _mesh(name: str, filename: str, about: str) -> ArtifactKind:
+    return ArtifactKind(name, filename, about, meshes.read_own_mesh, meshes.write_ply)
+
+
+def _json(name: str, filename: str, about: str) -> ArtifactKind:
+    return ArtifactKind(name, filename, about, read_json, write_json)
+
+
+ARTIFACTS: tuple[ArtifactKind, ...] = (
+    *_role_kinds("garment", ""),
+    *_role_kinds("mannequin", "mannequin_"),
+    *_role_kinds("body", "body_"),
+    _leaf(
+        "body_silhouettes",
+        "body: front and side pictures",
+        bodies.read_silhouettes,
+        inline=bodies.read_silhouettes,
+        in_folder=_holds_pictures,
+    ),
+    _leaf("fabric", "preset name, fabric file, or its keys inline", read_fabric, inline=read_fabric),
+    ArtifactKind(
+        "garment_placement",
+        "garment_placement.json",
+        "mannequin_from_surface, a 4x4 transform",
+        lambda path: cameras.read_matrix(path, "mannequin_from_surface").reshape(4, 4),
+        lambda path, value: write_json(path, {"mannequin_from_surface": value}),
+    ),
+    ArtifactKind(
+        "labels", "labels.npz", "vertices that are garment, and seen", garments.read_labels, garments.write_labels
+    ),
+    _mesh("garment_shell", "shell.ply", "the garment cut out of the surface"),
+    _mesh("garment", "garment.ply", "open shell: real openings kept, scan holes filled"),
+    ArtifactKind(
+        "observed",
+        "observed.npz",
+        "garment vertices that a sensor saw",
+        garments.read_observed,
+        garments.write_observed,
+    ),
+    ArtifactKind("openings", "openings.json", "neck, hem, cuffs", garments.read_openings, garments.write_openings),
+    _mesh("sim_mesh", "sim_mesh.ply", "the garment remeshed for simulation"),
+    ArtifactKind(
+        "rest_shape", "rest_shape.npz", "the cloth without forces", garments.read_rest_shape, garments.write_rest_shape
+    ),
+    ArtifactKind(
+        "worn_rest",
+        "worn_rest.npz",
+        "the rest shape that is draped: the garment's own, or regraded",
+        garments.read_rest_shape,
+        garments.write_rest_shape,
+    ),
+    ArtifactKind(
+        "source_avatar",
+        "source_avatar.npz",
+        "the template fitted to the source body",
+        avatars.read_avatar,
+        avatars.write_avatar,
+        receive=lambda path, job: avatars.receive_avatar(path),
+    ),
+    ArtifactKind(
+        "body_avatar",
+        "body_avatar.npz",
+        "the template fitted to the body mesh",
+        avatars.read_avatar,
+        avatars.write_avatar,
+    ),
+    ArtifactKind(
+        "fitted_avatar",
+        "fitted_avatar.npz",
+        "the customer as fitted",
+        avatars.read_avatar,
+        avatars.write_avatar,
+        receive=lambda path, job: avatars.receive_avatar(path),
+    ),
+    ArtifactKind(
+        "avatar",
+        "avatar.npz",
+        "the customer, posed",
+        avatars.read_avatar,
+        avatars.write_avatar,
+        previews=(("avatar.ply", _write_avatar_mesh),),
+    ),
+    ArtifactKind(
+        "measurements",
+        "measurements.json",
+        "the avatar's measurements",
+        bodies.read_measurements,
+        bodies.write_measurements,
+    ),
+    ArtifactKind(
+        "landmarks", "landmarks.json", "the avatar's landmarks", bodies.read_landmarks, bodies.write_landmarks
+    ),
+    ArtifactKind(
+        "collider",
+        "collider.npz",
+        "the body that the garment is draped on",
+        garments.read_collider,
+        garments.write_collider,
+    ),
+    _mesh("draped", "draped.ply", "the simulation mesh at rest"),
+    _json("audit", "audit.json", "checks of the drape, independent of the solver"),
+    ArtifactKind("trace", "trace.csv", "error against run time", traces.read_trace, traces.write_trace),
+    ArtifactKind("render_mesh", "render_mesh.glb", "garment and avatar to look at", read_glb, write_glb),
+    _json("fit_report", "fit_report.json", "ease, strain and contact per zone"),
+    ArtifactKind(
+        "fit_maps",
+        "fit_maps.npz",
+        "stretch, strain, pressure, clearance and ease on the draped mesh",
+        garments.read_fit_maps,
+        garments.write_fit_maps,
+    ),
+    ArtifactKind("page", "page.html", "everything on one page", _read_page, _write_page),
+)
+"""Every artifact, in the order of the pipeline."""

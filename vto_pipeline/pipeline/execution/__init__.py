@@ -1,0 +1,7 @@
+"""Running a plan.
+
+run: each stage from the cache, or made, recorded and published
+key, digest, store: what decides a result, and where it is kept
+folder, out, final: the folder of a run and what is published there
+record, cost, listener: run.json, wall time and memory, progress
+"""

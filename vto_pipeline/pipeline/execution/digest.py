@@ -1,0 +1,62 @@
+"""Content digests: of files, folders, values in a document, and the package's own source."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import vto_pipeline
+
+_SOURCE = {".py", ".yaml", ".html", ".js", ".css", ".csv", ".npz"}
+
+
+def digest_file(path: Path) -> str:
+    """SHA-256 of a file's bytes, in hex."""
+    state = hashlib.sha256()
+    with path.open("rb") as stream:
+        while block := stream.read(1 << 20):
+            state.update(block)
+    return state.hexdigest()
+
+
+def digest_path(path: Path) -> str:
+    """Digest of a file (its type and bytes) or of a folder (names and bytes of its visible files)."""
+    if path.is_dir():
+        files = sorted(p for p in path.rglob("*") if p.is_file())
+        names = [(p, p.relative_to(path)) for p in files]
+        return digest_value({n.as_posix(): digest_file(p) for p, n in names if not _hidden(n)})
+    return digest_value([path.suffix.lower(), digest_file(path)])
+
+
+def digest_value(value: Any) -> str:
+    """Digest of plain data; a path inside it counts by its content, not its name."""
+    text = json.dumps(_without_paths(value), sort_keys=True, ensure_ascii=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+@cache
+def code_identity() -> str:
+    """The package's version; in a development checkout a digest of its source, so that every edit counts."""
+    package = Path(vto_pipeline.__file__).parent
+    if not (package.parent / "pyproject.toml").is_file():
+        return vto_pipeline.__version__
+    files = sorted(p for p in package.rglob("*") if p.suffix in _SOURCE)
+    return digest_value({p.relative_to(package).as_posix(): digest_file(p) for p in files})
+
+
+def _hidden(name: Path) -> bool:
+    return any(part.startswith(".") for part in name.parts)
+
+
+def _without_paths(value: Any) -> Any:
+    if isinstance(value, Path):
+        return {"content": digest_path(value)}
+    if isinstance(value, Mapping):
+        return {str(key): _without_paths(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_paths(item) for item in value]
+    return value

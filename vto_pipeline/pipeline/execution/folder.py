@@ -1,0 +1,87 @@
+"""A run's folder: locked by one run at a time, and never a folder with other content."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from vto_pipeline.errors import ConfigError, InputError
+
+_LOCK = ".lock"
+RECORD = "run.json"
+
+
+def is_run(folder: Path) -> bool:
+    """Whether a folder was made by a run."""
+    return (folder / _LOCK).is_file() or (folder / RECORD).is_file()
+
+
+@contextmanager
+def claimed(folder: Path, inputs: Iterable[Path] = ()) -> Iterator[None]:
+    """Create a run's folder if needed, and lock it.
+
+    The lock is the operating system's, so that a killed run leaves none.
+
+    Args:
+        folder: RUN.
+        inputs: Files that must not lie in it.
+
+    Raises:
+        ConfigError: it cannot be made or written to, holds other things or an input, or another run works in it.
+    """
+    try:
+        _check(folder, inputs)
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = (folder / _LOCK).open("a+", encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(
+            f"the run's folder cannot be made or written to: {error.strerror}",
+            where=str(folder),
+            hint="give another folder with -o",
+        ) from None
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            lock.seek(0)
+            raise ConfigError(
+                f"another run is using this folder (process {lock.read().strip() or 'unknown'})",
+                where=str(folder),
+                hint="wait for it to end, or give another folder with -o",
+            ) from None
+        lock.truncate(0)
+        lock.write(str(os.getpid()))
+        lock.flush()
+        yield
+
+
+def existing_run(folder: Path) -> Path:
+    """The folder, if it was made by a run that got as far as writing its record.
+
+    Raises:
+        InputError: it was not.
+    """
+    if not (folder / RECORD).is_file():
+        raise InputError("not a run folder: it has no run.json", where=str(folder))
+    return folder
+
+
+def _check(folder: Path, inputs: Iterable[Path]) -> None:
+    if folder.exists() and not folder.is_dir():
+        raise ConfigError("the run's folder is a file", where=str(folder), hint="give another folder with -o")
+    if folder.is_dir() and any(folder.iterdir()) and not is_run(folder):
+        raise ConfigError(
+            "the folder is not empty and holds no run",
+            where=str(folder),
+            hint="nothing was written; give a new folder with -o",
+        )
+    for path in inputs:
+        if path.resolve().is_relative_to(folder.resolve()):
+            raise ConfigError(
+                f"the input {path} lies in the run's own folder, where it could be overwritten",
+                where=str(folder),
+                hint="give another folder with -o",
+            )

@@ -1,0 +1,105 @@
+"""run.json: what happened to every stage, and why. Rewritten after each stage."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import vto_pipeline
+from vto_pipeline.io.documents import write_json
+from vto_pipeline.model.job import Job
+from vto_pipeline.pipeline.execution.cost import Meter, machine, thread_count
+from vto_pipeline.pipeline.execution.key import versions
+from vto_pipeline.pipeline.given import Given
+from vto_pipeline.pipeline.plan import Plan
+from vto_pipeline.pipeline.request import Request
+
+
+@dataclass
+class StageRecord:
+    """One stage of a run.
+
+    Args:
+        name: The stage.
+        status: "planned", "ran", "cached", "left_out" or "failed".
+        reason: Why it was left out, or how it failed.
+        seconds, peak_mb: Wall time [s] and largest memory [MB]; of the run that made it where cached.
+        metrics: Figures it measured.
+        notes, warnings: What it said; a warning is a verdict on a poor result.
+        left_out: Parts of its work that this data did not need: (what, reason).
+        key: Of its result.
+    """
+
+    name: str
+    status: str = "planned"
+    reason: str = ""
+    seconds: float = 0.0
+    peak_mb: float = 0.0
+    metrics: dict[str, Any] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    left_out: list[Any] = field(default_factory=list)
+    key: str = ""
+
+    def take(self, job: Job, meter: Meter) -> None:
+        """Copy a job's messages, metrics and cost."""
+        self.seconds, self.peak_mb = meter.seconds(), meter.peak_mb()
+        self.metrics, self.notes, self.warnings = plain(job.metrics), list(job.notes), list(job.warnings)
+        self.left_out = [list(pair) for pair in job.left_out]
+
+    def recall(self, stored: Mapping[str, Any]) -> None:
+        """Copy what was stored with a cached result."""
+        for name in ("seconds", "peak_mb", "metrics", "notes", "warnings", "left_out"):
+            setattr(self, name, stored[name])
+
+
+class RunRecord:
+    """All of run.json, kept in step with the run."""
+
+    def __init__(self, path: Path, request: Request, plan: Plan) -> None:
+        self._path, self._meter = path, Meter()
+        uses = sorted({name for step in plan.steps for name in step.stage.uses})
+        self.stages = {step.stage.name: StageRecord(step.stage.name) for step in plan.steps}
+        for name, reason in plan.left_out.items():
+            self.stages[name] = StageRecord(name, "left_out", reason)
+        self._head = {
+            "schema": 1,
+            "versions": {"vto-pipeline": vto_pipeline.__version__, **versions(uses)},
+            "machine": machine(),
+            "threads": thread_count(),
+            "wanted": list(request.want),
+            "given": {artifact: _given(one) for artifact, one in request.given.items()},
+            "seed": request.seed,
+        }
+
+    def as_dict(self) -> dict[str, Any]:
+        """What run.json holds."""
+        stages = [asdict(stage) for stage in self.stages.values()]
+        return {**self._head, "stages": stages, "seconds": self._meter.seconds()}
+
+    def save(self) -> None:
+        """Write run.json, whole or not at all."""
+        write_json(self._path, self.as_dict())
+
+
+def plain(value: Any) -> Any:
+    """Return the value in JSON form: arrays become lists; values that are not finite become null."""
+    return json.loads(json.dumps(value, default=_listed), parse_constant=lambda _: None)
+
+
+def _listed(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, Path):
+        return str(value)
+    raise TypeError(f"a metric of type {type(value).__name__} has no JSON form")
+
+
+def _given(one: Given) -> dict[str, Any]:
+    name = "path" if isinstance(one.source, Path) else "value"
+    return {"key": one.key, name: plain(one.source)}

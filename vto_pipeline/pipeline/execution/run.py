@@ -1,0 +1,174 @@
+"""Running a plan: each stage from its cached result, or made, recorded and published."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from vto_pipeline.errors import ComputationError, VtoError
+from vto_pipeline.model.job import Job
+from vto_pipeline.pipeline.catalogue import Catalogue
+from vto_pipeline.pipeline.execution.cost import Meter
+from vto_pipeline.pipeline.execution.digest import digest_path, digest_value
+from vto_pipeline.pipeline.execution.final import make_final
+from vto_pipeline.pipeline.execution.folder import RECORD, claimed
+from vto_pipeline.pipeline.execution.key import result_key
+from vto_pipeline.pipeline.execution.listener import Listener
+from vto_pipeline.pipeline.execution.out import Out, write_value
+from vto_pipeline.pipeline.execution.record import RunRecord, StageRecord
+from vto_pipeline.pipeline.execution.store import Result, Store
+from vto_pipeline.pipeline.plan import Plan, Step
+from vto_pipeline.pipeline.request import Request
+
+
+def run(
+    request: Request,
+    plan: Plan,
+    catalogue: Catalogue,
+    folder: Path,
+    *,
+    force_all: bool = False,
+    listener: Listener | None = None,
+) -> dict[str, Any]:
+    """Run a plan in a folder, resuming from the results of earlier runs.
+
+    Args:
+        request: What is given.
+        plan: What to do.
+        catalogue: The tables.
+        folder: RUN; made if need be.
+        force_all: Leave nothing out, for comparing.
+        listener: Receives how it goes.
+
+    Returns:
+        What run.json holds.
+
+    Raises:
+        ConfigError: the folder is in use, or is no run's folder.
+        InputError: something given cannot be read.
+        ComputationError: a stage failed; its partial result is under RUN/out/partial.
+    """
+    with claimed(folder, [path for one in request.given.values() for path in one.paths]):
+        runner = _Run(request, plan, catalogue, folder, force_all, listener or Listener())
+        return runner.run_all()
+
+
+class _Run:
+    """One run in progress."""
+
+    def __init__(
+        self, request: Request, plan: Plan, catalogue: Catalogue, folder: Path, force_all: bool, listener: Listener
+    ) -> None:
+        self.request, self.plan, self.catalogue = request, plan, catalogue
+        self.force_all, self.listener = force_all, listener
+        self.store = Store(folder / "cache")
+        self.out = Out(folder / "out", catalogue)
+        self.record = RunRecord(folder / RECORD, request, plan)
+        self.results: dict[str, Result] = {}
+        self.given_digests: dict[str, str] = {}
+
+    def run_all(self) -> dict[str, Any]:
+        """Run all stages in order; the final ones also after a failure, so that there is a page."""
+        self.store.sweep()
+        self.out.open()
+        self.record.save()
+        steps = list(enumerate(self.plan.steps, start=1))
+        try:
+            for number, step in steps:
+                if not step.stage.final:
+                    self._guard(number, step)
+        except ComputationError:
+            self._finals([(n, s) for n, s in steps if s.stage.final and not s.stage.needs])
+            raise
+        else:
+            self._finals([(n, s) for n, s in steps if s.stage.final])
+        finally:
+            self.out.tidy()
+        return self.record.as_dict()
+
+    def _guard(self, number: int, step: Step) -> None:
+        """Run one stage and record how it ends."""
+        record = self.record.stages[step.stage.name]
+        try:
+            self._do(number, step, record)
+        except VtoError as error:
+            error.where = error.where or f"stage {step.stage.name}"
+            record.status, record.reason = "failed", error.problem
+            if isinstance(error, ComputationError) and error.partial:
+                self.out.put_partial(error.partial)
+            raise
+        finally:
+            self.record.save()
+            self.listener.ended(number, len(self.plan.steps), record)
+
+    def _do(self, number: int, step: Step, record: StageRecord) -> None:
+        name = step.stage.name
+        digests = {artifact: self._digest(artifact) for artifact in step.inputs}
+        record.key = result_key(step, digests, self.request.seed, self.force_all)
+        result = self.store.find(name, record.key)
+        if result is None:
+            self.listener.started(number, len(self.plan.steps), step.stage)
+            result = self._make(step, record)
+            record.status = "ran"
+        else:
+            record.recall(result.record)
+            record.status = "cached"
+        record.reason = result.record["reason"]
+        if record.reason:
+            record.status = "left_out"
+        mine = [artifact for artifact in step.stage.makes if self.plan.makers.get(artifact) == name]
+        self.results.update(dict.fromkeys(mine, result))
+        self.out.publish(result, mine)
+
+    def _make(self, step: Step, record: StageRecord) -> Result:
+        """Read the inputs, call the stage, write what it returns."""
+        name, meter = step.stage.name, Meter()
+        with self.store.making(name) as unfinished, self.store.making(name) as scratch:
+            job = Job(self.listener.progress, scratch, self.request.seed, self.force_all)
+            try:
+                outputs, reason = self._call(step, job)
+            finally:
+                record.take(job, meter)
+            for artifact in step.stage.makes:
+                write_value(self.catalogue.kind(artifact), outputs[artifact], unfinished)
+            record.take(job, meter)
+            files = {artifact: self.catalogue.kind(artifact).filename for artifact in step.stage.makes}
+            return self.store.finish(unfinished, name, record.key, files, asdict(record) | {"reason": reason})
+
+    def _call(self, step: Step, job: Job) -> tuple[dict[str, Any], str]:
+        """Outputs by artifact, and the reason if the stage was skipped."""
+        inputs = {artifact: self._read(artifact, job) for artifact in step.inputs}
+        skip = None if self.force_all else step.stage.skip
+        reason = skip(inputs) if skip is not None else None
+        if reason:
+            return {made: inputs[source] for made, source in step.stage.passes.items()}, reason
+        outputs = dict(step.stage.run(inputs, step.settings, job))
+        if set(outputs) != set(step.stage.makes):
+            raise TypeError(f"stage {step.stage.name} returned {sorted(outputs)}, promised {sorted(step.stage.makes)}")
+        return outputs, ""
+
+    def _finals(self, steps: list[tuple[int, Step]]) -> None:
+        for number, step in steps:
+            record, meter = self.record.stages[step.stage.name], Meter()
+            self.listener.started(number, len(self.plan.steps), step.stage)
+            job = Job(self.listener.progress, None, self.request.seed, self.force_all)
+            make_final(step.stage, step.settings, self.out, self.request.given, self.record.as_dict(), job)
+            record.take(job, meter)
+            record.status = "ran"
+            self.listener.ended(number, len(self.plan.steps), record)
+        self.record.save()
+
+    def _read(self, artifact: str, job: Job) -> Any:
+        """Return an input's value, always read from its file, so that a resumed run computes with the same bits."""
+        if artifact in self.results:
+            return self.catalogue.kind(artifact).read(self.results[artifact].path(artifact))
+        return self.request.given[artifact].read(job)
+
+    def _digest(self, artifact: str) -> str:
+        if artifact in self.results:
+            return self.results[artifact].digest(artifact)
+        if artifact not in self.given_digests:
+            source = self.request.given[artifact].source
+            self.given_digests[artifact] = digest_path(source) if isinstance(source, Path) else digest_value(source)
+        return self.given_digests[artifact]

@@ -1,0 +1,91 @@
+"""Results on disk: a folder with a manifest written last and renamed into place. No manifest, no result."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from vto_pipeline.io.documents import write_json
+from vto_pipeline.pipeline.execution.digest import digest_file
+
+_MANIFEST = "manifest.json"
+_UNFINISHED = ".unfinished-"
+
+
+@dataclass(frozen=True)
+class Result:
+    """A stored result of a stage.
+
+    Args:
+        folder: Where its files lie.
+        outputs: Artifact -> file name.
+        digests: File name -> SHA-256, for outputs and previews.
+        record: What was said and measured when it was made.
+    """
+
+    folder: Path
+    outputs: Mapping[str, str]
+    digests: Mapping[str, str]
+    record: Mapping[str, Any]
+
+    def path(self, artifact: str) -> Path:
+        """File of an artifact."""
+        return self.folder / self.outputs[artifact]
+
+    def digest(self, artifact: str) -> str:
+        """Content digest of an artifact."""
+        return self.digests[self.outputs[artifact]]
+
+
+class Store:
+    """All results of one run folder, by stage and key."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def find(self, stage: str, key: str) -> Result | None:
+        """A finished result, or None."""
+        folder = self.folder / stage / key
+        try:
+            manifest = json.loads((folder / _MANIFEST).read_text(encoding="utf-8"))
+            whole = all((folder / name).stat().st_size == size for name, size in manifest["sizes"].items())
+        except (FileNotFoundError, ValueError):
+            return None
+        return Result(folder, manifest["outputs"], manifest["digests"], manifest["record"]) if whole else None
+
+    @contextmanager
+    def making(self, stage: str) -> Iterator[Path]:
+        """A folder to make a result in; gone afterwards unless `finish` moved it."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        folder = Path(tempfile.mkdtemp(prefix=f"{_UNFINISHED}{stage}-", dir=self.folder))
+        try:
+            yield folder
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    def finish(
+        self, unfinished: Path, stage: str, key: str, outputs: Mapping[str, str], record: Mapping[str, Any]
+    ) -> Result:
+        """Seal a folder: digest its files, write the manifest, rename it into place."""
+        files = sorted(path for path in unfinished.iterdir())
+        digests = {path.name: digest_file(path) for path in files}
+        sizes = {path.name: path.stat().st_size for path in files}
+        manifest = {"outputs": dict(outputs), "digests": digests, "sizes": sizes, "record": dict(record)}
+        write_json(unfinished / _MANIFEST, manifest)
+        folder = self.folder / stage / key
+        folder.parent.mkdir(exist_ok=True)
+        shutil.rmtree(folder, ignore_errors=True)  # what `find` did not accept
+        os.replace(unfinished, folder)
+        return Result(folder, dict(outputs), digests, dict(record))
+
+    def sweep(self) -> None:
+        """Remove what interrupted runs left."""
+        for folder in self.folder.glob(f"{_UNFINISHED}*"):
+            shutil.rmtree(folder, ignore_errors=True)

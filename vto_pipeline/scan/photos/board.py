@@ -1,0 +1,52 @@
+"""Find the corners of a ChArUco board in photos."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vto_pipeline.errors import InputError
+from vto_pipeline.io.captures.images import read_image
+from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.frames import CharucoBoard, PhotoSet
+
+
+def board_corners(board: CharucoBoard) -> FloatArray:
+    """Inner chess corners in the world that the board defines: floor y = 0, +X along the columns, centre at the origin.
+
+    Seen from above with the first marker at the upper left, +X is right and +Z down, so +Y points at the camera.
+
+    Returns:
+        [m], shape ((columns - 1) (rows - 1), 3), in the order of OpenCV's corner ids.
+    """
+    z, x = np.meshgrid(np.arange(1, board.rows), np.arange(1, board.columns), indexing="ij")
+    flat = np.stack([x - board.columns / 2, np.zeros_like(x, dtype=float), z - board.rows / 2], axis=-1)
+    corners: FloatArray = flat.reshape(-1, 3) * board.square_m
+    return corners
+
+
+def detect_board(photos: PhotoSet, names: tuple[str, ...]) -> list[tuple[IntArray, FloatArray]]:
+    """Detect the board's corners in the named photos.
+
+    Returns:
+        Per photo: corner ids (K,), and pixels (K, 2), of which there may be none.
+
+    Raises:
+        InputError: OpenCV knows no such dictionary of markers.
+    """
+    import cv2
+
+    board = photos.board
+    assert board is not None
+    if not hasattr(cv2.aruco, board.dictionary):
+        raise InputError(f"{board.dictionary} is not a dictionary of OpenCV", hint="for example DICT_4X4_250")
+    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, board.dictionary))
+    pattern = cv2.aruco.CharucoBoard((board.columns, board.rows), board.square_m, board.marker_m, dictionary)
+    detector = cv2.aruco.CharucoDetector(pattern)
+    paths = {path.name: path for path in photos.paths}
+    found = []
+    for name in names:
+        pixels, ids, _, _ = detector.detectBoard(cv2.cvtColor(read_image(paths[name]), cv2.COLOR_RGB2GRAY))
+        none = ids is None or pixels is None
+        identity = np.empty(0, np.int32) if none else np.asarray(ids, np.int32).ravel()
+        found.append((identity, np.empty((0, 2)) if none else np.asarray(pixels, float).reshape(-1, 2)))
+    return found

@@ -1,0 +1,115 @@
+"""SIFT features of photos and their verified matches, in a COLMAP database."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from itertools import combinations
+from pathlib import Path
+
+from pydantic import Field
+
+from vto_pipeline.io.captures.images import read_image_size
+from vto_pipeline.model.camera import Intrinsics
+from vto_pipeline.model.frames import PhotoSet
+from vto_pipeline.model.settings import Config
+
+GUESSED_FOCAL = 1.2
+"""COLMAP's guess where EXIF says nothing, in longer sides of the picture."""
+
+SURE, FAINT = 0.0067, 0.0015
+"""Contrast a SIFT feature must have: the usual, and for plain fabric."""
+
+
+class FeatureConfig(Config):
+    """Settings of features and matching."""
+
+    max_side_px: int = Field(default=2400, ge=200, le=10_000, description="Larger photos are scaled down to this [px]")
+    max_features: int = Field(default=8192, ge=100, le=50_000, description="Features kept per photo")
+    all_pairs_up_to: int = Field(default=60, ge=2, le=1000, description="Photos up to which all pairs are matched")
+    window: int = Field(
+        default=8, ge=1, le=100, description="Above that, photos are matched up to this far in order, and at doublings"
+    )
+
+
+def detect(photos: PhotoSet, database: Path, contrast: float, config: FeatureConfig) -> list[int]:
+    """Find SIFT features (Lowe 2004) in every photo.
+
+    The photos are entered in the database before the features: entered by the extractor's threads, they would be
+    numbered in the order these happen to end, and nothing after would be reproducible.
+
+    Args:
+        photos: Photos; those with the same starting intrinsics share one camera.
+        database: New file.
+        contrast: SIFT's peak threshold.
+        config: Settings.
+
+    Returns:
+        Features per photo.
+    """
+    import pycolmap
+
+    folder = photos.paths[0].parent
+    pycolmap.Database.open(str(database)).close()
+    for (width, height, known), names in _groups(photos).items():
+        reader = pycolmap.ImageReaderOptions(camera_model="SIMPLE_RADIAL")
+        if known is not None:
+            reader.camera_params = f"{known.fx},{known.cx + 0.5},{known.cy + 0.5},{known.k1}"
+        else:
+            reader.camera_params = f"{GUESSED_FOCAL * max(width, height)},{width / 2},{height / 2},0"
+        pycolmap.import_images(database, folder, pycolmap.CameraMode.SINGLE, names, reader)
+    options = pycolmap.FeatureExtractionOptions(max_image_size=config.max_side_px, use_gpu=False)
+    options.sift.max_num_features = config.max_features
+    options.sift.peak_threshold = contrast
+    names = [path.name for path in photos.paths]
+    pycolmap.extract_features(database, folder, names, extraction_options=options, device=pycolmap.Device.cpu)
+    with pycolmap.Database.open(str(database)) as opened:
+        counts = {image.name: opened.num_keypoints_for_image(image.image_id) for image in opened.read_all_images()}
+    return [counts[name] for name in names]
+
+
+def match(photos: PhotoSet, database: Path, config: FeatureConfig, seed: int) -> int:
+    """Match features between photos and keep what a two-view geometry explains.
+
+    Args:
+        photos: Photos.
+        database: Holds their features.
+        config: Settings.
+        seed: Of the RANSAC.
+
+    Returns:
+        Number of matched pairs.
+    """
+    import pycolmap
+
+    pairs = database.with_name("pairs.txt")
+    pairs.write_text("".join(f"{a} {b}\n" for a, b in _pairs([path.name for path in photos.paths], config)))
+    verification = pycolmap.TwoViewGeometryOptions()
+    verification.ransac.random_seed = seed
+    pycolmap.match_image_pairs(
+        database,
+        pycolmap.FeatureMatchingOptions(use_gpu=False),
+        pycolmap.ImportedPairingOptions(match_list_path=pairs),
+        verification,
+        device=pycolmap.Device.cpu,
+    )
+    with pycolmap.Database.open(str(database)) as opened:
+        _, inliers = opened.read_two_view_geometry_num_inliers()
+        return sum(count > 0 for count in inliers)
+
+
+def _groups(photos: PhotoSet) -> dict[tuple[int, int, Intrinsics | None], list[str]]:
+    """Names of photos that were taken by the same camera, as far as EXIF and size tell."""
+    groups = defaultdict(list)
+    for path, known in zip(photos.paths, photos.intrinsics, strict=True):
+        groups[(*read_image_size(path), known)].append(path.name)
+    return dict(groups)
+
+
+def _pairs(names: list[str], config: FeatureConfig) -> list[tuple[str, str]]:
+    """Every pair of a small set; of a large one, near ones in the order round the circle, and those 2^k apart."""
+    count = len(names)
+    if count <= config.all_pairs_up_to:
+        return list(combinations(names, 2))
+    steps = {*range(1, config.window + 1), *(2**k for k in range(count.bit_length() - 1))}
+    chosen = {tuple(sorted((i, (i + step) % count))) for i in range(count) for step in steps}
+    return [(names[i], names[j]) for i, j in sorted(chosen)]

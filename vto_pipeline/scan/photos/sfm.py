@@ -1,0 +1,137 @@
+"""Camera poses and sparse points from photos, up to scale."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from vto_pipeline.errors import ScanError
+from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.camera import CameraSet, Intrinsics
+from vto_pipeline.model.frames import PhotoSet
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import PointCloud
+from vto_pipeline.model.settings import Config
+from vto_pipeline.scan.photos.features import FAINT, SURE, FeatureConfig, detect, match
+from vto_pipeline.scan.photos.mapping import MIN_PHOTOS, map_photos
+from vto_pipeline.scan.upright import upright_from_scan
+
+ADVICE = (
+    "There is too little texture, or photos are too far apart. Put a printed mat or newspaper under the object. "
+    "Project or chalk a pattern on plain fabric. Take photos 10 to 15 degrees apart, or use a depth camera."
+)
+
+
+class SfmConfig(Config):
+    """Settings of structure from motion."""
+
+    features: FeatureConfig = Field(default_factory=FeatureConfig, description="Features and matching")
+    enough_features: int = Field(1000, ge=50, le=20_000, description="With fewer per photo, fainter ones are used")
+    max_error_px: float = Field(2.0, gt=0.1, le=10, description="Largest mean error of a sparse point [px]")
+    min_views: int = Field(3, ge=2, le=10, description="Photos that must have seen a sparse point")
+
+
+def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[CameraSet, PointCloud]:
+    """Estimate the camera pose of each photo.
+
+    Args:
+        photos: Photos, all in one folder.
+        config: Settings.
+        job: Notified of photos that could not be placed.
+
+    Returns:
+        Cameras and sparse points in a frame of arbitrary scale, roughly upright; the points' normals are the mean
+        direction towards the photos that saw them.
+
+    Raises:
+        ScanError: fewer than 3 photos could be placed.
+    """
+    import pycolmap
+
+    pycolmap.logging.minloglevel = pycolmap.logging.FATAL.value
+    pycolmap.set_random_seed(job.seed)
+    with tempfile.TemporaryDirectory(dir=job.scratch) as scratch:
+        job.progress(0.0, "features")
+        counts = detect(photos, Path(scratch) / "sure.db", SURE, config.features)
+        database = Path(scratch) / "sure.db"
+        if np.median(counts) < config.enough_features:
+            job.note(f"only {int(np.median(counts))} features in the median photo: looking for fainter ones")
+            database = Path(scratch) / "faint.db"
+            counts = detect(photos, database, FAINT, config.features)
+        job.progress(0.3, f"matching {len(photos.paths)} photos")
+        pairs = match(photos, database, config.features, job.seed)
+        job.progress(0.7, f"placing cameras, {pairs} matched pairs")
+        model = map_photos(database, photos.paths[0].parent, len(photos.paths), job.seed)
+    names = [path.name for path in photos.paths]
+    if model is None or model.num_reg_images() < MIN_PHOTOS:
+        each = ", ".join(f"{name} {count}" for name, count in zip(names, counts, strict=True))
+        few = f"fewer than {MIN_PHOTOS} of {len(names)} photos could be placed"
+        problem = f"{few} ({pairs} pairs match); features per photo: {each}"
+        raise ScanError(problem, where=str(photos.paths[0].parent), hint=ADVICE)
+    cameras, cloud = _upright(*_values(model, names, config))
+    if cameras.unregistered:
+        lost = ", ".join(f"{name} ({counts[names.index(name)]} features)" for name in cameras.unregistered)
+        job.warn(f"{len(cameras.unregistered)} of {len(names)} photos could not be placed: {lost}. {ADVICE}")
+    job.measure(
+        registered=len(cameras.names),
+        photos=len(names),
+        matched_pairs=pairs,
+        features_median=int(np.median(counts)),
+        sparse_points=len(cloud.points),
+        reprojection_px=round(float(model.compute_mean_reprojection_error()), 3),
+    )
+    return cameras, cloud
+
+
+def _values(model: Any, names: list[str], config: SfmConfig) -> tuple[CameraSet, PointCloud]:
+    """Our cameras and points from a pycolmap Reconstruction, in the order of the names and of the points' ids."""
+    placed = {image.name: image for image in model.images.values() if image.has_pose}
+    registered = tuple(name for name in names if name in placed)
+    poses = np.tile(np.eye(4), (len(registered), 1, 1))
+    for pose, name in zip(poses, registered, strict=True):
+        pose[:3] = placed[name].cam_from_world().inverse().matrix()
+    intrinsics = tuple(_intrinsics(model.cameras[placed[name].camera_id]) for name in registered)
+    unregistered = tuple(name for name in names if name not in placed)
+    centers = {placed[name].image_id: pose[:3, 3] for name, pose in zip(registered, poses, strict=True)}
+    points, normals, colors = [], [], []
+    for index in sorted(model.points3D):
+        point = model.points3D[index]
+        viewers = sorted({element.image_id for element in point.track.elements})
+        if point.error > config.max_error_px or len(viewers) < config.min_views:
+            continue
+        towards = np.array([centers[viewer] for viewer in viewers]) - point.xyz
+        mean = (towards / np.linalg.norm(towards, axis=1, keepdims=True)).mean(0)
+        points.append(point.xyz)
+        normals.append(mean / np.linalg.norm(mean))
+        colors.append(point.color)
+    if not points:
+        raise ScanError(f"no sparse point was seen by {config.min_views} photos", hint=ADVICE)
+    cameras = CameraSet(registered, intrinsics, poses, metric=False, unregistered=unregistered)
+    return cameras, PointCloud(np.array(points), np.array(normals), np.array(colors))
+
+
+def _intrinsics(camera: Any) -> Intrinsics:
+    """COLMAP counts pixels from the corner of the first one, we from its centre."""
+    focal, cx, cy, k1 = camera.params
+    return Intrinsics(camera.width, camera.height, focal, focal, cx - 0.5, cy - 0.5, k1)
+
+
+def _upright(cameras: CameraSet, cloud: PointCloud) -> tuple[CameraSet, PointCloud]:
+    return moved(cameras, cloud, upright_from_scan(cameras.world_from_cam, cloud.points), metric=False)
+
+
+def moved(
+    cameras: CameraSet, cloud: PointCloud, transform: FloatArray, *, scale: float = 1.0, metric: bool
+) -> tuple[CameraSet, PointCloud]:
+    """Cameras and points after scaling about the origin and then a rigid transform, shape (4, 4)."""
+    rotation, shift = transform[:3, :3], transform[:3, 3]
+    poses = np.tile(np.eye(4), (len(cameras.names), 1, 1))
+    poses[:, :3, :3] = rotation @ cameras.world_from_cam[:, :3, :3]
+    poses[:, :3, 3] = scale * cameras.world_from_cam[:, :3, 3] @ rotation.T + shift
+    normals = None if cloud.normals is None else cloud.normals @ rotation.T
+    placed = CameraSet(cameras.names, cameras.intrinsics, poses, metric, cameras.unregistered)
+    return placed, PointCloud(scale * cloud.points @ rotation.T + shift, normals, cloud.colors)

@@ -1,0 +1,157 @@
+"""Dense depth from posed photos: semi-global matching of neighbours, consensus, and a check across photos."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from vto_pipeline.errors import InputError, ScanError
+from vto_pipeline.io.captures.images import read_image
+from vto_pipeline.model.camera import CameraSet, Intrinsics
+from vto_pipeline.model.frames import DepthMaps, PhotoSet
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import PointCloud
+from vto_pipeline.model.settings import Config
+from vto_pipeline.scan.photos.consistency import agreeing_views, consensus
+from vto_pipeline.scan.photos.disparity import MatchConfig, match_pair
+from vto_pipeline.scan.photos.neighbours import choose_pairs, visibility
+from vto_pipeline.scan.photos.rectify import View, rectify
+
+
+class StereoConfig(Config):
+    """Settings of dense stereo."""
+
+    max_side_px: int = Field(1000, ge=200, le=6000, description="Photos are scaled down to this longer side [px]")
+    neighbours: int = Field(5, ge=1, le=12, description="Photos that each photo is matched with")
+    min_shared_points: int = Field(12, ge=3, le=1000, description="Sparse points that two matched photos share")
+    range_margin: float = Field(0.1, ge=0, le=1, description="Search beyond the sparse points [share of extent]")
+    consensus_tolerance: float = Field(0.003, gt=0, le=0.1, description="Relative difference of depths that agree")
+    consensus_needed: int = Field(2, ge=1, le=12, description="Neighbours of a photo that must agree on a depth")
+    check_tolerance: float = Field(0.002, gt=0, le=0.1, description="The same between maps of different photos")
+    check_views: int = Field(2, ge=0, le=12, description="Other photos that must have measured the same point")
+    match: MatchConfig = Field(default_factory=MatchConfig, description="Settings of the matcher")
+
+
+def estimate_depth_maps(
+    photos: PhotoSet, cameras: CameraSet, cloud: PointCloud, config: StereoConfig, job: Job
+) -> DepthMaps:
+    """Measure the depth of each posed photo.
+
+    Args:
+        photos: The photos' files.
+        cameras: Poses of those that were registered.
+        cloud: Sparse points in the same frame; they choose the neighbours and the range of depths.
+        config: Settings.
+        job: Receives progress, pair by pair.
+
+    Returns:
+        Depth maps of all registered photos, most pixels of which are 0 = unknown outside the object.
+
+    Raises:
+        InputError: a camera names a photo that is not there.
+        ScanError: no two photos share enough of the surface, or no depth is agreed on.
+    """
+    views = _load(photos, cameras, config.max_side_px)
+    seen = visibility(cameras, cloud)
+    pairs = choose_pairs(cameras, cloud, seen, config.neighbours, config.min_shared_points)
+    if not pairs:
+        hint = "photos about 15 degrees apart work best; is there texture?"
+        raise ScanError(f"no two of {len(views)} photos share {config.min_shared_points} sparse points", hint=hint)
+    pinholes = tuple(_undistorted(view.camera) for view in views)
+    merged = DepthMaps(cameras.names, pinholes, cameras.world_from_cam, _merge(views, pairs, cloud, seen, config, job))
+    checked = _check(merged, pairs, config, job)
+    measured, kept = int((merged.depth > 0).sum()), int((checked > 0).sum())
+    if kept == 0:
+        hint = "is the fabric plain? add a print, a speckle pattern or projected light, or use a depth camera"
+        raise ScanError(f"no depth is confirmed by {config.check_views + 1} photos", hint=hint)
+    blind = [name for name, depth in zip(cameras.names, checked, strict=True) if not depth.any()]
+    if blind:
+        job.warn(f"no depth in {len(blind)} of {len(views)} photos: {', '.join(blind)}")
+    job.measure(pairs=len(pairs), depth_pixels=kept, consistent_share=round(kept / measured, 3))
+    return replace(merged, depth=checked)
+
+
+def _load(photos: PhotoSet, cameras: CameraSet, max_side: int) -> list[View]:
+    import cv2
+
+    paths = {path.name: path for path in photos.paths}
+    views = []
+    for name, camera, pose in zip(cameras.names, cameras.intrinsics, cameras.world_from_cam, strict=True):
+        if name not in paths:
+            raise InputError(f"there is a camera but no photo for {name}", where=str(photos.paths[0].parent))
+        gray: Any = cv2.cvtColor(read_image(paths[name]), cv2.COLOR_RGB2GRAY)
+        scale = min(1.0, max_side / max(gray.shape))
+        if scale < 1:
+            size = (round(gray.shape[1] * scale), round(gray.shape[0] * scale))
+            gray = cv2.resize(gray, size, interpolation=cv2.INTER_AREA)
+            camera = scaled(camera, *size)
+        views.append(View(gray, camera, pose))
+    return views
+
+
+def scaled(camera: Intrinsics, width: int, height: int) -> Intrinsics:
+    """The same camera with another number of pixels."""
+    x, y = width / camera.width, height / camera.height
+    cx, cy = (camera.cx + 0.5) * x - 0.5, (camera.cy + 0.5) * y - 0.5
+    return Intrinsics(width, height, camera.fx * x, camera.fy * y, cx, cy, camera.k1)
+
+
+def _undistorted(camera: Intrinsics) -> Intrinsics:
+    return Intrinsics(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy)
+
+
+def _merge(
+    views: list[View],
+    pairs: list[tuple[int, int]],
+    cloud: PointCloud,
+    seen: NDArray[np.bool_],
+    config: StereoConfig,
+    job: Job,
+) -> NDArray[np.float32]:
+    """Match all pairs and merge the findings of each photo's neighbours, shape (C, H, W)."""
+    height, width = max(v.gray.shape[0] for v in views), max(v.gray.shape[1] for v in views)
+    merged = np.zeros((len(views), height, width), dtype=np.float32)
+    waiting = np.bincount(np.array(pairs).ravel(), minlength=len(views))
+    found: list[list[tuple[float, NDArray[np.float32]]]] = [[] for _ in views]
+
+    def work(pair: tuple[int, int]) -> tuple[float, NDArray[np.float32], NDArray[np.float32]]:
+        first, second = views[pair[0]], views[pair[1]]
+        frame = rectify(first, second, cloud.points[seen[pair[0]] & seen[pair[1]]], config.range_margin)
+        return ((frame.focal * frame.baseline) ** 2, *match_pair(first, second, frame, config.match))
+
+    for done, ((i, j), (weight, *maps)) in enumerate(_in_order(work, pairs)):
+        for index, depth in ((i, maps[0]), (j, maps[1])):
+            found[index].append((weight, depth))
+            waiting[index] -= 1
+            if waiting[index] == 0:
+                depths, weights = np.stack([d for _, d in found[index]]), np.array([w for w, _ in found[index]])
+                agreed = consensus(depths, weights, config.consensus_tolerance, config.consensus_needed)
+                merged[index, : agreed.shape[0], : agreed.shape[1]] = agreed
+                found[index] = []
+        job.progress(0.9 * (done + 1) / len(pairs), f"pair {done + 1} of {len(pairs)}")
+    return merged
+
+
+def _in_order(work: Callable[[Any], Any], pairs: list[tuple[int, int]]) -> Iterator[tuple[tuple[int, int], Any]]:
+    """Run pairs on all cores and give the results in the order of the pairs, so that sums are reproducible."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        yield from zip(pairs, pool.map(work, pairs), strict=True)
+
+
+def _check(merged: DepthMaps, pairs: list[tuple[int, int]], config: StereoConfig, job: Job) -> NDArray[np.float32]:
+    """Depths that enough other photos confirm, shape (C, H, W)."""
+    checked = np.zeros_like(merged.depth)
+    for i, depth in enumerate(merged.depth):
+        others = sorted({a + b - i for a, b in pairs if i in (a, b)})
+        if others:
+            votes = agreeing_views(merged, i, others, config.check_tolerance)
+            checked[i] = np.where(votes >= config.check_views, depth, 0)
+        job.progress(0.9 + 0.1 * (i + 1) / len(checked), f"checking photo {i + 1} of {len(checked)}")
+    return checked
