@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.measuring.measuring_levels import find_levels
 from vto_pipeline.avatar.scan.bust_points import toward_bust_points
-from vto_pipeline.avatar.scan.misfit_correlation import likeness
+from vto_pipeline.avatar.scan.misfit_correlation import morans_i
 from vto_pipeline.avatar.scan.tangential_slide import slide_along_surface
 from vto_pipeline.avatar.template.template import membership
 from vto_pipeline.model.body import Avatar, Measurements
@@ -33,19 +33,19 @@ def test_a_slide_keeps_to_a_ball() -> None:
     assert moved[np.abs(vertices[:, 1]) < 0.01].mean() > 0.9 * shift[0, 1]
 
 
-def test_likeness_tells_shape_from_noise() -> None:
+def test_morans_i_tells_shape_from_noise() -> None:
     """On a plane: the correlation of independent noise is 0, that of a wave is the mean of its own cosine."""
     rng = np.random.default_rng(3)
     points = np.column_stack([rng.uniform(0.0, 1.0, (10_000, 2)), np.zeros(10_000)])
     up = np.tile([0.0, 0.0, 1.0], (len(points), 1))
     noise = rng.normal(0.0, 1e-3, len(points))
-    assert abs(likeness(points, up, noise)) < 0.03  # 30,000 pairs: one part in 170 is the standard error
+    assert abs(morans_i(points, up, noise)) < 0.03  # 30,000 pairs: one part in 170 is the standard error
     wave = 1e-3 * np.sin(2 * np.pi * points[:, 0] / 0.1)
     lag = np.array([[r * np.cos(a) for r in np.linspace(0.012, 0.020, 20)] for a in np.linspace(0, np.pi, 60)])
     share = np.tile(np.linspace(0.012, 0.020, 20), (60, 1))
     expected = (np.cos(2 * np.pi * lag / 0.1) * share).sum() / share.sum()
-    assert_allclose(likeness(points, up, wave), expected, rtol=0, atol=0.03)
-    assert np.isnan(likeness(points[:1], up[:1], wave[:1]))
+    assert_allclose(morans_i(points, up, wave), expected, rtol=0, atol=0.03)
+    assert np.isnan(morans_i(points[:1], up[:1], wave[:1]))
 
 
 def test_legs_show_their_levels(body: Avatar) -> None:

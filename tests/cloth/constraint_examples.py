@@ -2,12 +2,12 @@
 
 import numpy as np
 from cloth_scenes import sheet
-from vto_pipeline.cloth.constraints.points.mass_spring import bending_springs, membrane_springs
 
 from vto_pipeline.cloth.constraints.bending.bend_friction import bend_friction
 from vto_pipeline.cloth.constraints.bending.hinge import bend, hinge_angles, solid_hinges
 from vto_pipeline.cloth.constraints.bending.isometric import isometric_bend
 from vto_pipeline.cloth.constraints.bending.shape_operator import shape_operator
+from vto_pipeline.cloth.constraints.mass_spring import bending_springs, membrane_springs
 from vto_pipeline.cloth.constraints.membrane.curve import curve
 from vto_pipeline.cloth.constraints.membrane.green import green
 from vto_pipeline.cloth.constraints.membrane.strain_friction import strain_friction
