@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vto_pipeline.numerics.linear.block_matrix import BlockMatrix
 
 
-class Pieces(NamedTuple):
+class ClothComponents(NamedTuple):
     """Connected pieces of the cloth.
 
     Args:
@@ -23,7 +23,7 @@ class Pieces(NamedTuple):
     held: NDArray[np.bool_]
 
 
-def pieces(matrix: BlockMatrix, held: NDArray[np.bool_]) -> Pieces | None:
+def free_components(matrix: BlockMatrix, held: NDArray[np.bool_]) -> ClothComponents | None:
     """Return the pieces of a cloth, None if all are held somewhere."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
@@ -32,7 +32,7 @@ def pieces(matrix: BlockMatrix, held: NDArray[np.bool_]) -> Pieces | None:
     ones = np.ones(len(matrix.columns), np.int8)
     of = connected_components(csr_array((ones, matrix.columns, matrix.starts), shape=(count, count)))[1]
     pinned = np.bincount(of, held) > 0
-    return None if pinned.all() else Pieces(of, pinned)
+    return None if pinned.all() else ClothComponents(of, pinned)
 
 
 @njit(cache=True, error_model="numpy")
