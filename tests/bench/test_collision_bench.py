@@ -15,7 +15,7 @@ from vto_pipeline.bench.collision.penetration import penetration
 from vto_pipeline.bench.collision.sheets import folded_twice, funnel, square, stacked
 from vto_pipeline.bench.plots.collision_plot import draw_collision
 from vto_pipeline.cloth import Box, Capsule, MeshCollider, Moving, Path, Plane, Sphere, Trajectory
-from vto_pipeline.cloth.collision.self_collision.tally import Tally
+from vto_pipeline.cloth.collision.self_collision.counters import CollisionCounters
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.topology import edges
 from vto_pipeline.model.mesh import TriangleMesh
@@ -150,10 +150,10 @@ def test_left_out_compares_with_all_of_it(monkeypatch):
         shift = np.zeros_like(self.rest)
         shift[3] = [0.0, 3e-5, 4e-5] if settings.get("force_all") else [0.0, 0.0, 0.0]
         if self.name.startswith("hang"):
-            tally = Tally(asked=8, out_of_reach=8)
+            counters = CollisionCounters(asked=8, out_of_reach=8)
         else:
-            tally = Tally(asked=8, out_of_reach=3, searched=5, impacts=6, impacts_known=2)
-        return Trajectory(self.rest + shift, 0.0 * self.rest, {"self_contact": tally.as_report()})
+            counters = CollisionCounters(asked=8, out_of_reach=3, searched=5, impacts=6, impacts_known=2)
+        return Trajectory(self.rest + shift, 0.0 * self.rest, {"self_contact": counters.as_report()})
 
     monkeypatch.setattr(ContactScene, "run", run)
     rows = list(left_out.left_out_rows(True, Watch()))

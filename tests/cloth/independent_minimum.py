@@ -13,7 +13,7 @@ from scipy.sparse.linalg import splu
 
 from vto_pipeline.cloth.judge.audit import JUST
 from vto_pipeline.cloth.judge.gap import gaps_within
-from vto_pipeline.cloth.judge.residual import Weave
+from vto_pipeline.cloth.judge.residual import ElasticEnergies
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.units import GRAVITY
 
@@ -37,7 +37,7 @@ class Cloth:
     """
 
     def __init__(self, mesh, rest, fabric, body=None, skin=None, pinned=()):
-        self.weave = Weave(mesh, rest, fabric)
+        self.weave = ElasticEnergies(mesh, rest, fabric)
         self.start = mesh.vertices
         count = len(mesh.vertices)
         held, lying = np.zeros(count, bool), np.zeros(count, bool)

@@ -11,7 +11,7 @@ from unclean_bodies import doubled, fine_box, flipped, soup, together
 import vto_pipeline.cloth.dynamics.stepper
 from vto_pipeline.cloth import MeshCollider, simulate
 from vto_pipeline.cloth.collision.body.contacts import BodyCollider
-from vto_pipeline.cloth.collision.response.projected_gauss_seidel import hold_apart
+from vto_pipeline.cloth.collision.response.projected_gauss_seidel import separate_pairs
 from vto_pipeline.cloth.collision.self_collision.self_contact import SelfContact
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.mesh import TriangleMesh
@@ -118,7 +118,7 @@ def tetrahedron():
 
 def test_a_tip_below_a_face_is_one_pair_at_its_distance():
     cloth = wall(3e-4)
-    pairs = contact(cloth, tetrahedron()).near(cloth.vertices, cloth.vertices.copy(), 0.0)
+    pairs = contact(cloth, tetrahedron()).find_pairs(cloth.vertices, cloth.vertices.copy(), 0.0)
     assert len(pairs.key) == 1
     assert_allclose(pairs.normal[0], [0, -1, 0], rtol=0, atol=1e-12)  # from the face to the tip
     way = np.einsum("s,sk->k", pairs.weights[0], cloth.vertices[pairs.vertices[0]]) + pairs.fixed[0]
@@ -136,29 +136,29 @@ def test_an_edge_across_an_edge_is_one_pair(along):
         [[0, 2, 3], [0, 3, 1], [0, 1, 5], [0, 5, 4], [0, 4, 2], [1, 3, 5], [2, 4, 5], [2, 5, 3]],
     )
     roof = TriangleMesh(roof.vertices, trimesh.Trimesh(roof.vertices, roof.faces).faces)
-    pairs = contact(strip, roof).near(strip.vertices, strip.vertices.copy(), 0.0)
+    pairs = contact(strip, roof).find_pairs(strip.vertices, strip.vertices.copy(), 0.0)
     assert len(pairs.key) == 1
     assert_allclose(pairs.normal[0], [0, 1, 0], rtol=0, atol=1e-12)
     below = strip.vertices - [0, 6e-4, 0]  # inside: planes lead it out
-    assert len(contact(strip, roof).near(below, below.copy(), 0.0).key) == 0
+    assert len(contact(strip, roof).find_pairs(below, below.copy(), 0.0).key) == 0
 
 
 def test_a_face_that_a_tip_has_come_through_is_free_to_go_back():
     cloth, back = wall(-3e-4), wall(5e-3).vertices
     held = contact(cloth, tetrahedron())
-    assert len(held.near(cloth.vertices, cloth.vertices.copy(), 0.0).key) == 0
-    assert_array_equal(held.safe(cloth.vertices, back)[0][:, 1], back[:, 1])
+    assert len(held.find_pairs(cloth.vertices, cloth.vertices.copy(), 0.0).key) == 0
+    assert_array_equal(held.collision_free(cloth.vertices, back)[0][:, 1], back[:, 1])
 
 
 @pytest.mark.parametrize("speed", [-0.01, -0.3, -50.0])
 def test_no_move_goes_through_a_tip(speed):
     cloth = wall(2e-3)
     held = contact(cloth, tetrahedron())
-    there, met = held.safe(cloth.vertices, cloth.vertices + np.array([0.0, speed, 0.0]))
+    there, met = held.collision_free(cloth.vertices, cloth.vertices + np.array([0.0, speed, 0.0]))
     assert not crosses(there, cloth.faces, tetrahedron())
     assert 0.0 < there[:, 1].max() < 1.9e-3  # a tenth of the way is left, at most; and it did go
     assert len(met.key) > 0
-    assert held.tally.shortened == 3
+    assert held.counters.shortened == 3
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -172,7 +172,7 @@ def test_safe_moves_among_many_bodies_cross_nothing(seed):
     x = cloth.vertices - [0.2, 0.0, 0.2]
     wanted = x + np.array([0.0, -0.3, 0.0]) + random.normal(scale=0.05, size=x.shape)
     assert crosses(wanted, cloth.faces, balls)
-    there, _ = contact(cloth, balls).safe(x, wanted)
+    there, _ = contact(cloth, balls).collision_free(x, wanted)
     for share in (0.3, 0.7, 1.0):
         assert not crosses(x + share * (there - x), cloth.faces, balls)
     assert np.linalg.norm(there - x, axis=1).mean() > 0.02  # it does go
@@ -182,23 +182,23 @@ def test_a_body_far_away_changes_nothing():
     cloth, far = wall(0.0), moved(tetrahedron(), 0, -5.0, 0)
     held = contact(cloth, far)
     wanted = cloth.vertices + np.array([0.1, -0.2, 0.3])
-    there, met = held.safe(cloth.vertices, wanted)
+    there, met = held.collision_free(cloth.vertices, wanted)
     assert_array_equal(there, wanted)
-    assert len(met.key) == held.tally.impacts == 0
+    assert len(met.key) == held.counters.impacts == 0
 
 
 def test_a_moving_tip_is_foreseen_and_carries_what_it_would_meet():
     cloth = wall(4e-3)
     rising = keyframes(tetrahedron(), (0, 0, 0), (0.001, 0.006, 0))
     held = contact(cloth, rising, seconds=0.01)
-    held.at(0.0, 0.01)
-    pairs = held.near(cloth.vertices, cloth.vertices.copy(), 0.01)
+    held.set_time_span(0.0, 0.01)
+    pairs = held.find_pairs(cloth.vertices, cloth.vertices.copy(), 0.01)
     assert len(pairs.key) == 1
     assert_allclose(pairs.carried[0], [-0.001, -0.006, 0], rtol=0, atol=1e-12)  # weight 1 on the body, moved against
     assert_allclose(pairs.fixed[0], [0.001, 0.006, 0], rtol=0, atol=1e-12)
-    there, met = held.safe(cloth.vertices, cloth.vertices.copy())
+    there, met = held.collision_free(cloth.vertices, cloth.vertices.copy())
     assert len(met.key) == 1
-    assert held.tally.uncut == 0
+    assert held.counters.uncut == 0
     assert not crosses(there, cloth.faces, TriangleMesh(rising.keyframes[-1], rising.faces))
     assert there[:, 1].max() < 4e-3 + 6e-3  # as far as needed, no farther than the tip
 
@@ -208,9 +208,9 @@ def test_where_bodies_close_on_cloth_it_is_said_and_what_rests_is_not_crossed():
     body = together(tetrahedron(), roof)
     risen = body.vertices + np.where(np.arange(len(body.vertices)) < 4, 0.006, 0.0)[:, None] * [0, 1, 0]
     held = contact(cloth, MovingBody(np.stack([body.vertices, risen]), body.faces), seconds=0.01)
-    held.at(0.0, 0.01)
-    there, _ = held.safe(cloth.vertices, cloth.vertices.copy())
-    assert held.tally.uncut > 0
+    held.set_time_span(0.0, 0.01)
+    there, _ = held.collision_free(cloth.vertices, cloth.vertices.copy())
+    assert held.counters.uncut > 0
     assert not crosses(there, cloth.faces, roof)
 
 
@@ -218,9 +218,9 @@ def test_where_bodies_close_on_cloth_it_is_said_and_what_rests_is_not_crossed():
 def test_a_moving_tip_lifts_a_face_and_takes_it_along_if_it_is_rough(rough):
     cloth = wall(1e-3)
     held = contact(cloth, keyframes(tetrahedron(), (0, 0, 0), (0.002, 0.003, 0)), seconds=0.01, friction=rough)
-    held.at(0.0, 0.01)
+    held.set_time_span(0.0, 0.01)
     x = cloth.vertices.copy()
-    hold_apart(held.near(x, x, 0.01), np.ones(3), cloth.vertices, x)
+    separate_pairs(held.find_pairs(x, x, 0.01), np.ones(3), cloth.vertices, x)
     if rough == 0.0:
         assert_allclose(x[:, [0, 2]], cloth.vertices[:, [0, 2]], rtol=0, atol=1e-15)
     else:  # the place of the face over the tip has gone with it
@@ -249,7 +249,7 @@ def test_an_unclean_body_is_held_like_a_clean_one(mend):
 def test_what_lies_inside_a_body_holds_nothing():
     hidden = together(fine_box((0.2, 0.2, 0.2), edge=0.1), moved(tetrahedron(), 0, 0.05, 0))
     cloth = wall(0.051)
-    assert len(contact(cloth, hidden).near(cloth.vertices, cloth.vertices.copy(), 0.0).key) == 0
+    assert len(contact(cloth, hidden).find_pairs(cloth.vertices, cloth.vertices.copy(), 0.0).key) == 0
 
 
 def test_the_same_bits_with_one_thread_and_two():

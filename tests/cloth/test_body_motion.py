@@ -5,7 +5,7 @@ import pytest
 from cloth_scenes import ball, fabric, tube
 from numpy.testing import assert_allclose
 
-from vto_pipeline.cloth.dynamics.body_motion import PacedBody, covered_way, ride
+from vto_pipeline.cloth.dynamics.body_motion import VariableSpeedBody, body_travel, run_body_motion
 from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
 from vto_pipeline.cloth.model.build import at_rest, build
 from vto_pipeline.model.body import MovingBody
@@ -22,12 +22,12 @@ def radius_at(body, time):
 
 
 def test_a_change_of_pace_neither_jumps_nor_loses_its_way():
-    body = PacedBody(swelling(0.1, 0.2), 2.0, 0.3)
+    body = VariableSpeedBody(swelling(0.1, 0.2), 2.0, 0.3)
     assert_allclose([radius_at(body, t) for t in (0.0, 0.5, 2.0)], [0.1, 0.125, 0.2], rtol=1e-12)
-    body.set_pace(0.5, 0.5)  # three quarters of the way at half the pace
+    body.set_speed(0.5, 0.5)  # three quarters of the way at half the pace
     assert_allclose(body.ends, 3.5, rtol=1e-12)
     assert_allclose([radius_at(body, t) for t in (0.5, 1.5, 3.5, 9.0)], [0.125, 0.15, 0.2, 0.2], rtol=1e-12)
-    body.set_pace(1.5, 1.0)
+    body.set_speed(1.5, 1.0)
     assert_allclose(body.ends, 2.5, rtol=1e-12)
     assert_allclose([radius_at(body, t) for t in (1.5, 2.0, 2.5)], [0.15, 0.175, 0.2], rtol=1e-12)
 
@@ -37,7 +37,7 @@ def test_the_way_is_that_of_the_body_near_the_cloth():
     far = np.where(mesh.vertices[:, 1:2] < -0.05, [0.0, -0.5, 0.0], [0.02, 0.0, 0.0])
     body = MovingBody(np.stack([mesh.vertices, mesh.vertices + far]), mesh.faces)
     cap = tube(0.11, 0.05, 36, 5, base=0.12)
-    assert_allclose(covered_way(body, cap), 0.02, rtol=1e-9)
+    assert_allclose(body_travel(body, cap), 0.02, rtol=1e-9)
 
 
 @pytest.mark.parametrize("deep", [5e-4, 1.0])
@@ -45,9 +45,9 @@ def test_the_body_waits_for_cloth_that_is_deep_in_it_and_ends_as_it_should(deep)
     """A ball swells by a fifth in a twentieth of a second, far faster than a tube in it is led out."""
     mesh = tube(0.092, 0.05, 48, 5, base=-0.025)  # up to 8 mm inside the ball
     model = build(mesh, RestShape(mesh.vertices), fabric())
-    body, done = PacedBody(swelling(0.1, 0.12), 0.15, 0.3), []
+    body, done = VariableSpeedBody(swelling(0.1, 0.12), 0.15, 0.3), []
     stepper = Stepper(model, [body], np.full(len(mesh.vertices), 2e-3), StepConfig(recovery_speed=0.05), damping=5.0)
-    state = ride(stepper, at_rest(mesh.vertices), body, deep, done.append)
+    state = run_body_motion(stepper, at_rest(mesh.vertices), body, deep, done.append)
     assert_allclose(state.time, body.ends, rtol=1e-9)
     assert body.ends > 0.2 if deep < 1.0 else body.ends == pytest.approx(0.15)
     assert done[-1] == 1.0
@@ -55,7 +55,7 @@ def test_the_body_waits_for_cloth_that_is_deep_in_it_and_ends_as_it_should(deep)
 
 
 def test_depth_is_that_of_the_deepest_vertex_inside():
-    body = PacedBody(swelling(0.1), 0.0, 0.3)
+    body = VariableSpeedBody(swelling(0.1), 0.0, 0.3)
     ring = TriangleMesh(tube(0.094, 0.002, 48, 3, base=-0.001).vertices, tube(0.094, 0.002, 48, 3).faces)
     model = build(ring, RestShape(ring.vertices), fabric())
     assert body.depth(0.0, ring.vertices) == 0.0  # nothing is known before contacts are found

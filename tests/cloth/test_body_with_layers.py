@@ -6,7 +6,7 @@ import trimesh
 from cloth_scenes import ball, moved, tube
 from numpy.testing import assert_allclose
 
-from vto_pipeline.cloth.outfit.body_with_layers import dressed
+from vto_pipeline.cloth.outfit.body_with_layers import wrap_in_surface
 from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -25,7 +25,7 @@ def holds(mesh, points):
 
 
 def solid(*given):
-    made = dressed(*given)
+    made = wrap_in_surface(*given)
     mesh = trimesh.Trimesh(made.vertices, made.faces, process=False)
     assert mesh.is_watertight
     assert mesh.volume > 0.0  # outward

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from vto_pipeline import cloth
 from vto_pipeline.cloth.collision.body.contacts import BodyCollider
-from vto_pipeline.cloth.collision.contacts import Round
+from vto_pipeline.cloth.collision.contacts import ContactSpan
 from vto_pipeline.errors import InputError
 from vto_pipeline.model.body import MovingBody
 
@@ -17,7 +17,7 @@ QUATERNION = tuple(Rotation.from_rotvec(TURN).as_quat())
 
 
 def a_round(count, *, travel=10.0, skin=2e-3, move=None, seconds=1 / 60):
-    return Round(0.0, seconds, travel, np.full(count, skin), 0.5, move)
+    return ContactSpan(0.0, seconds, travel, np.full(count, skin), 0.5, move)
 
 
 def gaps(found, points):

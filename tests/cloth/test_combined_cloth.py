@@ -7,13 +7,13 @@ import pytest
 from cloth_scenes import ball, fabric, moved, sheet, tube
 from numpy.testing import assert_allclose, assert_array_equal
 
-from vto_pipeline.cloth.collision.contacts import Round
+from vto_pipeline.cloth.collision.contacts import ContactSpan
 from vto_pipeline.cloth.constraints.sweep import add_forces
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.dynamics.residual import elastic_energy
 from vto_pipeline.cloth.dynamics.stepper import Stepper
 from vto_pipeline.cloth.model.build import at_rest, build
-from vto_pipeline.cloth.outfit.combined_cloth import WornOn, join
+from vto_pipeline.cloth.outfit.combined_cloth import MultiFrictionBody, combine_garments
 from vto_pipeline.model.garment import Garment, RestShape
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -37,7 +37,7 @@ def test_energies_forces_and_masses_are_those_of_each_alone():
         layer("one", crumpled(one, 0), stiff, one.vertices),
         layer("two", crumpled(two, 1), soft, two.vertices, rest_angles=True),
     ]
-    joined = join(layers, DrapeConfig())
+    joined = combine_garments(layers, DrapeConfig())
     alone = [build(each.garment.mesh, each.garment.rest, each.fabric) for each in layers]
     x = joined.mesh.vertices
     energies = [elastic_energy(model, each.garment.mesh.vertices) for model, each in zip(alone, layers, strict=True)]
@@ -60,7 +60,7 @@ def test_one_cloth_slides_down_another_with_the_geometric_mean_of_their_friction
     patch = sheet(7, 7, 0.1, 0.1, upright=False)
     patch = moved(patch, 0.15, 3e-4, 0.25)
     cloths = [replace(fabric(bending=1e-4), friction=friction) for friction in (lower, upper)]
-    joined = join([layer("floor", floor, cloths[0]), layer("patch", patch, cloths[1])], DrapeConfig())
+    joined = combine_garments([layer("floor", floor, cloths[0]), layer("patch", patch, cloths[1])], DrapeConfig())
     held = joined.model.inverse_mass.copy()
     held[joined.vertices[0]] = 0.0
     slope, seconds = np.arctan(0.6), 0.05
@@ -77,9 +77,9 @@ def test_each_vertex_touches_the_body_with_its_own_friction():
     body = ball(0.2, levels=4)
     cloth = tube(0.201, 0.1, 24, 7, base=-0.05)
     friction = np.where(np.arange(len(cloth.vertices)) % 3 == 0, 0.2, 0.7)
-    span = Round(0.0, 0.01, 5e-3, np.full(len(friction), 2e-3), 0.5)
-    found = WornOn(body, friction, Job()).contacts(cloth.vertices, span)
-    plain = WornOn(body, np.full(len(friction), 0.5), Job()).contacts(cloth.vertices, span)
+    span = ContactSpan(0.0, 0.01, 5e-3, np.full(len(friction), 2e-3), 0.5)
+    found = MultiFrictionBody(body, friction, Job()).contacts(cloth.vertices, span)
+    plain = MultiFrictionBody(body, np.full(len(friction), 0.5), Job()).contacts(cloth.vertices, span)
     assert_array_equal(found.active.sum(axis=0), plain.active[0])  # once each, where there is contact at all
     assert plain.active.sum() > 100
     of_vertex = found.friction[found.active.argmax(axis=0)]

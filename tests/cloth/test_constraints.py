@@ -7,7 +7,7 @@ from numba import njit
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from vto_pipeline.cloth.collision.contacts import nothing
+from vto_pipeline.cloth.collision.contacts import empty_contacts
 from vto_pipeline.cloth.constraints import KINDS
 from vto_pipeline.cloth.constraints.sweep import add_damping_forces, add_forces, linearised, multipliers, project
 from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
@@ -198,7 +198,7 @@ def test_a_sheet_at_a_point_opens():
     """Threads without length take some direction, all the same one; so the sheet comes back to its size."""
     data = EXAMPLES["stretch"]
     solver = Xpbd(model_of((data,), np.full(20, 0.01), gravity=(0.0, 0.0, 0.0)), sweeps=20, damping=5.0)
-    ended = solver.advance(at_rest(np.zeros((20, 3))), nothing(20), 1e-3, 2000)
+    ended = solver.advance(at_rest(np.zeros((20, 3))), empty_contacts(20), 1e-3, 2000)
     assert energy(np.zeros((20, 3)), data) > 10.0
     assert energy(ended.positions, data) < 1e-6
 

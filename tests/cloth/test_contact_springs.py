@@ -5,7 +5,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from vto_pipeline.cloth.collision.response.active_set import no_contacts
-from vto_pipeline.cloth.collision.response.contact_springs import add_contacts, contact_energy, linked_contacts, revise
+from vto_pipeline.cloth.collision.response.contact_springs import (
+    add_contacts,
+    contact_energy,
+    linked_contacts,
+    update_active_set,
+)
 from vto_pipeline.numerics.linear.block_matrix import BlockMatrix
 
 COUNT, STEP = 6, 1e-7
@@ -23,7 +28,7 @@ def contacts(sliding, seed=1):
     made.friction[:], made.pushing[:], made.sliding[:] = 0.4, True, sliding
     made.force[:] = rng.uniform(0.5, 1.0, 5)
     made.level[:] = 1e-3
-    for part in (made.grip, made.rub, made.trial):
+    for part in (made.initial_friction, made.friction_force, made.trial):
         part[:] = along(made, rng.normal(size=(5, 3)))
     made.carried[:] = 1e-4 * rng.normal(size=(5, 3))
     return made
@@ -89,12 +94,12 @@ def test_what_slides_has_the_tangent_of_coulombs_force():
     x = 1e-2 * rng.normal(size=(COUNT, 3))
     y = x + 1e-3 * rng.normal(size=(COUNT, 3))
     solved(made, x, y)  # sets the springs
-    cling, hold = made.cling[:, None], (made.friction * made.force)[:, None]
-    made.trial[:] = made.grip - cling * slips(made, x, y)
+    cling, hold = made.tangential_stiffness[:, None], (made.friction * made.force)[:, None]
+    made.trial[:] = made.initial_friction - cling * slips(made, x, y)
     assert (np.linalg.norm(made.trial, axis=1) > 2.0 * hold[:, 0]).all()
 
     def coulomb(there):
-        trial = made.grip - cling * slips(made, x, there)
+        trial = made.initial_friction - cling * slips(made, x, there)
         return hold * unit(trial)
 
     matrix, _ = solved(made, x, y)
@@ -103,7 +108,7 @@ def test_what_slides_has_the_tangent_of_coulombs_force():
             step = np.zeros_like(x)
             step[i, d] = 1e-9
             change = (coulomb(y + step) - coulomb(y - step))[i] / 2e-9
-            normal = made.spring[i] * made.normal[i] * made.normal[i, d]
+            normal = made.normal_stiffness[i] * made.normal[i] * made.normal[i, d]
             assert_allclose(normal - change, matrix[3 * i : 3 * i + 3, 3 * i + d], rtol=1e-5, atol=1e-3)
 
 
@@ -114,16 +119,16 @@ def test_friction_is_the_trial_or_the_limit_in_its_direction(seed):
     x = 1e-2 * rng.normal(size=(COUNT, 3))
     y = x + 1e-3 * rng.normal(size=(COUNT, 3))
     solved(made, x, y)
-    gap = np.einsum("kw,kwd,kd->k", made.weights, y[made.vertices], made.normal) - made.level - made.lift
-    trial = made.grip - made.cling[:, None] * slips(made, x, y)
-    revise(made, x, y, 0.0)
+    gap = np.einsum("kw,kwd,kd->k", made.weights, y[made.vertices], made.normal) - made.level - made.rest_offset
+    trial = made.initial_friction - made.tangential_stiffness[:, None] * slips(made, x, y)
+    update_active_set(made, x, y, 0.0)
     touches = gap <= 0.0
     assert 0 < touches.sum() < 5 or seed > 0
     assert (made.pushing == touches).all()
-    assert_allclose(made.force[touches], (-made.spring * gap)[touches], rtol=1e-12)
+    assert_allclose(made.force[touches], (-made.normal_stiffness * gap)[touches], rtol=1e-12)
     limit = made.friction * made.force
     size = np.linalg.norm(trial, axis=1)
     wanted = trial * np.minimum(1.0, limit / size)[:, None]
-    assert_allclose(made.rub[touches], wanted[touches], rtol=1e-12, atol=1e-15)
-    assert (made.rub[~touches] == 0.0).all()
+    assert_allclose(made.friction_force[touches], wanted[touches], rtol=1e-12, atol=1e-15)
+    assert (made.friction_force[~touches] == 0.0).all()
     assert not (made.sliding & (size <= limit) & touches).any()

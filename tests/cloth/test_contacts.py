@@ -11,7 +11,7 @@ from unclean_bodies import doubled, fine_box, flipped, from_box, slit, soup, tog
 
 from vto_pipeline import cloth
 from vto_pipeline.cloth.collision.body.contacts import BodyCollider
-from vto_pipeline.cloth.collision.contacts import Round
+from vto_pipeline.cloth.collision.contacts import ContactSpan
 from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
 from vto_pipeline.cloth.model.build import at_rest, build
 from vto_pipeline.model.body import MovingBody
@@ -146,7 +146,7 @@ def test_contact_planes_ride_on_a_turning_body():
     shift = np.array([0.1, 0.2, 0.3])
     body = MovingBody(np.stack([block.vertices, block.vertices @ turn + shift]), block.faces)
     points = np.random.default_rng(0).uniform(-0.25, 0.25, (200, 3)) * [1, 0.4, 1]  # on all sides, edges and corners
-    span = Round(0.0, 1.0, 0.05, np.full(200, 2e-3), 0.5)
+    span = ContactSpan(0.0, 1.0, 0.05, np.full(200, 2e-3), 0.5)
     found = BodyCollider(body, 1.0, 0.3).contacts(points, span)
     near = found.active[0]
     assert near.all()
@@ -166,7 +166,7 @@ TORSO, ARM, AT = (0.3, 0.6, 0.2), (0.5, 0.1, 0.1), (0.25, 0.1, 0.013)
 def asked(mesh, points, job=None, skin=2e-3):
     """Distance from each contact plane [m], the point it goes through, and its normal."""
     collider = BodyCollider(MovingBody(mesh.vertices[None], mesh.faces), 0.0, 0.3, job)
-    found = collider.contacts(points, Round(0.0, 1.0, 0.05, np.full(len(points), skin), 0.5))
+    found = collider.contacts(points, ContactSpan(0.0, 1.0, 0.05, np.full(len(points), skin), 0.5))
     assert found.active.all()
     point, normal = found.point[0, :, 0], found.normal[0, :, 0]
     return np.einsum("ij,ij->i", points - point, normal), point, normal
@@ -265,7 +265,7 @@ def test_a_moving_body_is_looked_through_anew_when_it_comes_to_rest():
     points = np.random.default_rng(4).uniform((-0.25, -0.4, -0.2), (0.6, 0.4, 0.2), (2000, 3))
     wanted = np.minimum(from_box(points, TORSO), from_box(points, ARM, AT))
     for start in (0.0, 0.5, 1.0, 1.5):
-        found = collider.contacts(points, Round(start, start + 0.1, 0.05, np.full(len(points), 2e-3), 0.5))
+        found = collider.contacts(points, ContactSpan(start, start + 0.1, 0.05, np.full(len(points), 2e-3), 0.5))
     gap = np.einsum("ij,ij->i", points - found.point[0, :, 0], found.normal[0, :, 0])
     near = found.active[0] & (wanted > 0)
     assert_allclose(gap[near], wanted[near], rtol=0, atol=1e-12)

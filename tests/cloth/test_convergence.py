@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from vto_pipeline.cloth.constraints.points.spring import springs
 from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
 from vto_pipeline.cloth.model.build import at_rest, build, model_of
-from vto_pipeline.cloth.rest.convergence import SettleLimits, settle
+from vto_pipeline.cloth.rest.convergence import SettleLimits, relax_to_rest
 from vto_pipeline.cloth.rest.equilibrium import equilibrium
 from vto_pipeline.errors import FallenError
 from vto_pipeline.model.garment import RestShape
@@ -24,7 +24,7 @@ def pressed_springs(off):
 
 def test_what_buckles_slowly_is_not_called_at_rest():
     stepper, start = pressed_springs(1e-8)
-    found = settle(stepper, start, SettleLimits(1e-4, 0.01, 100.0, 320))
+    found = relax_to_rest(stepper, start, SettleLimits(1e-4, 0.01, 100.0, 320))
     assert found.settled
     lengths = np.linalg.norm(np.diff(found.state.positions, axis=0), axis=1)
     assert_allclose(lengths, 0.6, rtol=1e-4)  # free of force: nothing else bears it
@@ -35,7 +35,7 @@ def test_what_buckles_slowly_is_not_called_at_rest():
 
 def test_coarse_answers_are_not_waited_for():
     stepper, start = pressed_springs(1e-8)
-    found = settle(stepper, start, SettleLimits(4e-3, 0.01, 100.0, 320))
+    found = relax_to_rest(stepper, start, SettleLimits(4e-3, 0.01, 100.0, 320))
     assert found.settled
     assert found.error == 3e-3  # and told that it may be off by as much
     assert len(found.trace) < 20
@@ -49,7 +49,7 @@ def test_a_hanging_cloth_is_as_near_to_rest_as_it_says(target):
     ends = []
     for error in (target, target / 100.0):
         stepper = Stepper(model, [], np.full(144, 2e-3), StepConfig(), damping=5.0)
-        found = settle(stepper, at_rest(mesh.vertices), SettleLimits(error, 0.01, 60.0, 320))
+        found = relax_to_rest(stepper, at_rest(mesh.vertices), SettleLimits(error, 0.01, 60.0, 320))
         assert found.settled
         assert found.error <= error
         ends.append(found)
@@ -64,7 +64,7 @@ def test_what_steps_solved_in_part_falsify_is_promised_too(solver):
     model = build(mesh, RestShape(mesh.vertices), fabric(stretch=100.0, shear=50.0), pinned=[56, 63])
     start = mesh.vertices + np.outer(0.4 - mesh.vertices[:, 1], [0.0, 0.0, 0.05])
     stepper = Stepper(model, [], np.full(64, 2e-3), StepConfig(solver=solver, sweeps=1), damping=5.0)
-    found = settle(stepper, at_rest(start), SettleLimits(3e-3, 0.01, 60.0, 320))
+    found = relax_to_rest(stepper, at_rest(start), SettleLimits(3e-3, 0.01, 60.0, 320))
     assert found.settled
     assert found.error <= 3e-3
     true = equilibrium(model, found.state.positions).positions
@@ -74,8 +74,8 @@ def test_what_steps_solved_in_part_falsify_is_promised_too(solver):
 class Standing:
     """A cloth that does not move, with so much of its weight not in balance; its method has the exact rest."""
 
-    rests_exactly, polishes, definite, known = True, False, False, None
-    substeps, step, steps, bearing = 1.0, 0.1, 0, 7
+    has_exact_rest, can_use_exact_stiffness, was_positive_definite, contact_memory = True, False, False, None
+    substeps, step, steps, pushing_contacts = 1.0, 0.1, 0, 7
 
     def __init__(self, residual):
         self._residual = residual
@@ -83,7 +83,7 @@ class Standing:
     def prepare(self, positions):
         pass
 
-    def polish(self, on):
+    def use_exact_stiffness(self, on):
         pass
 
     def run(self, state, seconds):
@@ -96,20 +96,20 @@ class Standing:
 
 @pytest.mark.parametrize(("residual", "settled"), [(0.009, True), (0.011, False), (5.0, False)])
 def test_cloth_that_stands_still_out_of_balance_is_not_at_rest(residual, settled):
-    found = settle(Standing(residual), at_rest(np.zeros((4, 3))), SettleLimits(1e-3, 0.01, 60.0, 320))
+    found = relax_to_rest(Standing(residual), at_rest(np.zeros((4, 3))), SettleLimits(1e-3, 0.01, 60.0, 320))
     assert found.settled is settled
     assert found.error == 0.0
     assert len(found.trace) < 20  # waiting longer would bring nothing
-    assert f"a residual force of {residual:.2g} of a vertex's weight" in found.unrest
+    assert f"a residual force of {residual:.2g} of a vertex's weight" in found.not_settled_warning
 
 
 def test_steps_are_as_before_when_it_is_over():
     stepper, start = pressed_springs(1e-3)
-    found = settle(stepper, start, SettleLimits(1e-4, 0.01, 100.0, 320))
+    found = relax_to_rest(stepper, start, SettleLimits(1e-4, 0.01, 100.0, 320))
     assert found.settled
     assert stepper.substeps == stepper.choice.substeps
     stepper.run(found.state, 0.1)
-    assert not stepper.definite  # nor is the stiffness the exact one
+    assert not stepper.was_positive_definite  # nor is the stiffness the exact one
 
 
 def test_cloth_that_nothing_holds_has_fallen_off():
@@ -118,7 +118,7 @@ def test_cloth_that_nothing_holds_has_fallen_off():
     free = build(mesh, RestShape(mesh.vertices), fabric())
     lowest = float(mesh.vertices[:, 1].min()) - 1.0
     with pytest.raises(FallenError, match="nothing holds it"):
-        settle(
+        relax_to_rest(
             Stepper(free, [], np.full(len(free.mass), 1e-3), StepConfig()),
             at_rest(mesh.vertices),
             SettleLimits(1e-3, 0.01, 30.0, 320, lowest=lowest),
@@ -126,4 +126,6 @@ def test_cloth_that_nothing_holds_has_fallen_off():
     held = build(mesh, RestShape(mesh.vertices), fabric(), pinned=[0])
     stepper = Stepper(held, [], np.full(len(held.mass), 1e-3), StepConfig(), damping=5.0)
     off = 1e-6 * np.random.default_rng(0).standard_normal(mesh.vertices.shape)  # flat, it would stand on a saddle
-    assert settle(stepper, at_rest(mesh.vertices + off), SettleLimits(1e-3, 0.01, 30.0, 320, lowest=lowest)).settled
+    assert relax_to_rest(
+        stepper, at_rest(mesh.vertices + off), SettleLimits(1e-3, 0.01, 30.0, 320, lowest=lowest)
+    ).settled

@@ -6,10 +6,10 @@ from cloth_scenes import fabric
 from numpy.testing import assert_allclose
 
 from vto_pipeline.cloth.collision.body.contacts import BodyCollider
-from vto_pipeline.cloth.collision.contacts import Round
+from vto_pipeline.cloth.collision.contacts import ContactSpan
 from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
 from vto_pipeline.cloth.model.build import at_rest, build
-from vto_pipeline.cloth.outfit.combined_cloth import WornOn
+from vto_pipeline.cloth.outfit.combined_cloth import MultiFrictionBody
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.garment import RestShape
@@ -76,7 +76,7 @@ def flanks(body, points, rounds):
     collider = BodyCollider(MovingBody(body.vertices[None], body.faces), 0.0, 0.3)
     for shift in np.linspace(-0.003, 0.0, rounds):
         here = points + np.array([shift, 0.0, 0.0])
-        span = Round(0.0, 1 / 60, 5e-3, np.full(len(points), SKIN), 0.5)
+        span = ContactSpan(0.0, 1 / 60, 5e-3, np.full(len(points), SKIN), 0.5)
         found = collider.contacts(here, span)
     return found
 
@@ -110,7 +110,7 @@ def test_what_bulges_has_one_plane():
     rod = TriangleMesh(np.vstack([circle - half, circle + half]), np.vstack([low, high]).astype(np.int32))
     middle = 0.5 * side / np.tan(0.5 * turn)
     collider = BodyCollider(MovingBody(rod.vertices[None], rod.faces), 0.0, 0.3)
-    span = Round(0.0, 1 / 60, 5e-3, np.full(5, SKIN), 0.5)
+    span = ContactSpan(0.0, 1 / 60, 5e-3, np.full(5, SKIN), 0.5)
     for number, along in ((0, 0.0), (2, -0.45 * side)):
         angle = (number + 0.5) * turn
         out, round_it = np.array([np.cos(angle), 0.0, np.sin(angle)]), np.array([-np.sin(angle), 0.0, np.cos(angle)])
@@ -124,7 +124,7 @@ def test_what_was_touched_is_remembered_when_the_nearest_flank_changes():
     body = groove(np.radians(90.0))
     point = np.array([[0.0002, 0.0035, 0.0]])
     collider = BodyCollider(MovingBody(body.vertices[None], body.faces), 0.0, 0.3)
-    span = Round(0.0, 1 / 60, 5e-3, np.full(1, SKIN), 0.5)
+    span = ContactSpan(0.0, 1 / 60, 5e-3, np.full(1, SKIN), 0.5)
     first = []
     for x in (-0.0005, 0.0005, -0.0005, 0.0005):
         found = collider.contacts(point + np.array([x, 0.0, 0.0]), span)
@@ -135,10 +135,10 @@ def test_what_was_touched_is_remembered_when_the_nearest_flank_changes():
 def test_fabrics_of_different_friction_have_both_flanks():
     body = groove(np.radians(90.0))
     points = np.array([[0.0005, 0.003, 0.0], [0.0005, 0.003, 0.05], [0.0005, 0.003, -0.05]])
-    worn = WornOn(body, np.array([0.2, 0.5, 0.2]), Job())
+    worn = MultiFrictionBody(body, np.array([0.2, 0.5, 0.2]), Job())
     alone = BodyCollider(MovingBody(body.vertices[None], body.faces), 0.0, 0.3)
     for shift in np.linspace(-0.003, 0.0, 9):
-        span = Round(0.0, 1 / 60, 5e-3, np.full(3, SKIN), 0.5)
+        span = ContactSpan(0.0, 1 / 60, 5e-3, np.full(3, SKIN), 0.5)
         here = points + np.array([shift, 0.0, 0.0])
         found, wanted = worn.contacts(here, span), alone.contacts(here, span)
     assert wanted.active.sum() == 6

@@ -134,7 +134,7 @@ def test_what_cannot_be_untangled_is_told_with_places(monkeypatch):
         pairs = self_intersections(TriangleMesh(positions, faces))
         return Start(positions, len(pairs), len(pairs), meeting_vertices(pairs, faces, len(positions)))
 
-    monkeypatch.setattr(phases_module, "free_start", give_up)
+    monkeypatch.setattr(phases_module, "find_collision_free_start", give_up)
     quick = {"settle_seconds": 0.1, "place": "as_it_stands"}
     with pytest.raises(IntersectingError, match=r"the garment with itself still cross, near \(0\.1") as caught:
         drape(double_vest(through=0.03), pear(), fabric(bending=1e-5), quick)

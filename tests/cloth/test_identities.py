@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 
 from vto_pipeline.bench.cloth.closed_forms import ROOTS, growth_and_frequency, implicit_dumbbell
 from vto_pipeline.bench.cloth.integrators import KEEP_SPIN, dominant_root, dumbbell, oscillator, spin
-from vto_pipeline.cloth.collision.contacts import Round, nothing
+from vto_pipeline.cloth.collision.contacts import ContactSpan, empty_contacts
 from vto_pipeline.cloth.collision.shapes.colliders import Plane
 from vto_pipeline.cloth.constraints.points.spring import springs
 from vto_pipeline.cloth.integrators import INTEGRATORS
@@ -59,7 +59,7 @@ def soft_constraint(x, v, h, compliance, iterations):
 @pytest.mark.parametrize("h", XPBD_PAPER)
 def test_xpbd_on_one_spring_is_the_table(h, sweeps):
     for step, (x, v) in XPBD_PAPER[h].items():
-        end = Xpbd(spring_of_the_paper(), sweeps=sweeps).advance(stretched(), nothing(2), h, step)
+        end = Xpbd(spring_of_the_paper(), sweeps=sweeps).advance(stretched(), empty_contacts(2), h, step)
         assert_allclose(end.positions[1], [x, 0, 0], rtol=0, atol=1e-11)  # digits of the table
         assert_allclose(end.velocities[1], [v, 0, 0], rtol=0, atol=1e-10)
 
@@ -70,7 +70,7 @@ def test_xpbd_on_one_spring_is_the_table(h, sweeps):
 def test_one_spring_is_implicit_euler_with_and_without_damper(h, beta, name):
     """γ = c/(k h), c = β k, against the recursion (1 + h c/m + h² k/m) v₁ = v - h k/m (x - 1)."""
     k = 1e3
-    end = method_of(name, spring_of_the_paper(beta)).advance(stretched(), nothing(2), h, 50)
+    end = method_of(name, spring_of_the_paper(beta)).advance(stretched(), empty_contacts(2), h, 50)
     x, v = 1.5, 0.0
     for _ in range(50):
         v = (v - h * k * (x - 1.0)) / (1.0 + h * beta * k + h * h * k)
@@ -81,13 +81,13 @@ def test_one_spring_is_implicit_euler_with_and_without_damper(h, beta, name):
 
 def test_without_the_multiplier_term_the_identity_fails():
     h, alpha = 1 / 60, 1e-3
-    exact = method_of("backward_euler_newton", spring_of_the_paper()).advance(stretched(), nothing(2), h, 5)
+    exact = method_of("backward_euler_newton", spring_of_the_paper()).advance(stretched(), empty_contacts(2), h, 5)
     for iterations, low, high in ((1, 0.0, 1e-12), (2, 1e-2, 1.0), (10, 1e-2, 1.0)):
         x, v = 1.5, 0.0
         for _ in range(5):
             x, v = soft_constraint(x, v, h, alpha, iterations)
         assert low <= abs(x - exact.positions[1, 0]) < high
-    right = Xpbd(spring_of_the_paper(), sweeps=10).advance(stretched(), nothing(2), h, 5)
+    right = Xpbd(spring_of_the_paper(), sweeps=10).advance(stretched(), empty_contacts(2), h, 5)
     assert_allclose(right.positions, exact.positions, rtol=0, atol=EXACT)
 
 
@@ -101,7 +101,7 @@ def test_growth_and_frequency_of_an_oscillator(name, h_omega):
     xs = []
     for _ in range(44):  # after forty steps the second root of a two-step method is gone
         xs.append(state.positions[1, 0])
-        state = method.advance(state, nothing(2), h, 1)
+        state = method.advance(state, empty_contacts(2), h, 1)
     root = dominant_root(np.array(xs[-4:]))
     growth, frequency = growth_and_frequency("backward_euler" if name == "xpbd" else name, h_omega)
     assert_allclose(abs(root), growth, rtol=EXACT)
@@ -127,7 +127,7 @@ def test_decay_by_rayleigh_damping(name, term):
     model = oscillator(omega, mass=0.7, damping=beta)
     start = ClothState(np.array([[0, 0, 0], [0.6, 0, 0.8]]), np.zeros((2, 3)))
     steps = range(40, 44)
-    ends = [method_of(name, model, damping=alpha).advance(start, nothing(2), h, count) for count in steps]
+    ends = [method_of(name, model, damping=alpha).advance(start, empty_contacts(2), h, count) for count in steps]
     root = dominant_root(np.array([end.positions[1, 0] for end in ends]))
     exact = damped_root(name, h, omega, alpha + beta * omega**2)
     assert abs(ROOTS[name](1j * h * omega)) - abs(exact) > 0.01  # it does something
@@ -169,7 +169,7 @@ def test_spin_decay_of_a_dumbbell(name, h, left):
     model, start = dumbbell()
     method = method_of(name, model)
     steps = round(10 / h)
-    end = method.advance(start, nothing(2), h, steps)
+    end = method.advance(start, empty_contacts(2), h, steps)
     length = 1.0 / (1.0 - (2 * np.pi) ** 2 / 2e4)  # where the spring bears the turning masses
     r, u = implicit_dumbbell((length, 0.0), (0.0, 2 * np.pi * length), 1.0, 2e4, h, steps)
     exact = max(ITERATED.get(name, EXACT), 1e-13 * steps)  # rounding adds up
@@ -185,7 +185,7 @@ def test_spin_decay_of_a_rigid_dumbbell():
     angle = np.arctan(2 * np.pi * h)  # the first step leaves the circle along its tangent
     start = np.array([[-0.5, 0, 0], [0.5, 0, 0]])
     state = ClothState(start, 2 * np.pi * np.cross([0, 0, 1.0], start))
-    end = Xpbd(model).advance(state, nothing(2), h, steps)
+    end = Xpbd(model).advance(state, empty_contacts(2), h, steps)
     for _ in range(steps - 1):
         angle = np.arctan2(np.sin(angle), 2 - np.cos(angle))
     turning = np.cross(np.diff(end.positions, axis=0)[0], np.diff(end.velocities, axis=0)[0])[2]
@@ -199,7 +199,7 @@ def test_angular_momentum(name):
     h, steps = 1 / 480, 480
     model, start = dumbbell()
     start = ClothState(1.1 * start.positions, start.velocities)
-    end = method_of(name, model).advance(start, nothing(2), h, steps)
+    end = method_of(name, model).advance(start, empty_contacts(2), h, steps)
     change = spin(model, end)[2] / spin(model, start)[2] - 1.0
     if name in KEEP_SPIN:
         assert abs(change) < EXACT
@@ -217,7 +217,7 @@ def test_linear_momentum_is_conserved_to_rounding(name):
     rng = np.random.default_rng(5)
     start = ClothState(mesh.vertices + rng.normal(0, 5e-3, (30, 3)), rng.normal((0.5, -0.2, 0.7), 1, (30, 3)))
     method = method_of(name, model)
-    end = method.advance(start, nothing(30), 1e-4, 50)
+    end = method.advance(start, empty_contacts(30), 1e-4, 50)
     before, after = model.mass @ start.velocities, model.mass @ end.velocities
     scale = model.mass @ np.abs(start.velocities)
     exchanged = model.mass @ np.abs(end.velocities - start.velocities)
@@ -245,21 +245,21 @@ def test_hanging_chain(name):
     model, points, hanging, longer = chain(5)
     assert_allclose(-hanging[-1, 1] - 1.0, longer, rtol=1e-14)  # ρ g L²/(2Y), whatever the number of links
     method = method_of(name, model, **({"sweeps": 200} if name == "xpbd" else {}))
-    stays = method.advance(at_rest(hanging), nothing(6), 1e-3, 20)
+    stays = method.advance(at_rest(hanging), empty_contacts(6), 1e-3, 20)
     assert_allclose(stays.positions, hanging, rtol=0, atol=EXACT)
     if name == "xpbd":
-        settles = Xpbd(model, sweeps=200).advance(at_rest(points), nothing(6), 0.05, 300)
+        settles = Xpbd(model, sweeps=200).advance(at_rest(points), empty_contacts(6), 0.05, 300)
     elif name in (*IMPLICIT_EULER, "bdf2"):
-        settles = method_of(name, model, damping=12.0).advance(at_rest(points), nothing(6), 0.05, 150)
+        settles = method_of(name, model, damping=12.0).advance(at_rest(points), empty_contacts(6), 0.05, 150)
     else:  # explicit Euler needs h < α/ω²
-        settles = method_of(name, model, damping=30.0).advance(at_rest(points), nothing(6), 2e-3, 3000)
+        settles = method_of(name, model, damping=30.0).advance(at_rest(points), empty_contacts(6), 2e-3, 3000)
     assert_allclose(settles.positions, hanging, rtol=0, atol=EXACT)
 
 
 def test_conjugate_gradients_reach_the_minimum_where_steepest_descent_cannot():
     """On a linear chain of condition 1e4: 500 steps of steepest descent leave 50 mm."""
     model, points, _, _ = chain(60)
-    one, other = (method_of(name, model).advance(at_rest(points), nothing(61), 1.0, 1) for name in CONVERGED)
+    one, other = (method_of(name, model).advance(at_rest(points), empty_contacts(61), 1.0, 1) for name in CONVERGED)
     assert np.ptp(one.positions[:, 1] - points[:, 1]) > 0.01
     assert_allclose(other.positions, one.positions, rtol=0, atol=1e-6)  # where its steps end
 
@@ -278,7 +278,7 @@ def test_hanging_strip(name):
     exact = mesh.vertices.copy()
     s = -mesh.vertices[:, 1]
     exact[:, 1] = -s - density * 9.81 / stiffness * (length * s - s**2 / 2)
-    end = method_of(name, model, damping=5.0).advance(at_rest(mesh.vertices), nothing(3 * rows), 0.5, 80)
+    end = method_of(name, model, damping=5.0).advance(at_rest(mesh.vertices), empty_contacts(3 * rows), 0.5, 80)
     close = 10 * EXACT  # the step at which the iterations end
     assert_allclose(end.positions, exact, rtol=0, atol=close)
     assert_allclose(-end.positions[-1, 1] - length, density * 9.81 * length**2 / (2 * stiffness), rtol=0, atol=close)
@@ -295,7 +295,7 @@ def test_slide_down_an_incline(name):
         method = method_of(name, model)
         state = at_rest(np.zeros((1, 3)))
         for _ in range(steps):
-            span = Round(state.time, state.time + h, 0.5, np.zeros(1), 0.5)
+            span = ContactSpan(state.time, state.time + h, 0.5, np.zeros(1), 0.5)
             state = method.advance(state, plane.contacts(state.positions, span), h, 1)
         a = max(0.0, 9.81 * (np.sin(angle) - mu * np.cos(angle)))
         slid = a * h * h * steps * (steps + 1) / 2

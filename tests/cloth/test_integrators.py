@@ -8,7 +8,7 @@ from cloth_scenes import fabric, sheet
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-from vto_pipeline.cloth.collision.contacts import Round, nothing
+from vto_pipeline.cloth.collision.contacts import ContactSpan, empty_contacts
 from vto_pipeline.cloth.collision.shapes.colliders import Plane
 from vto_pipeline.cloth.constraints.points.attachment import attachments
 from vto_pipeline.cloth.integrators import INTEGRATORS
@@ -78,7 +78,7 @@ def test_order_of_convergence(name, damped):
     errors = []
     reference = exactly(ForceSystem(model, **settings), state, seconds)
     for steps in (160, 320):
-        end = method_of(name, model, **settings).advance(state, nothing(16), seconds / steps, steps)
+        end = method_of(name, model, **settings).advance(state, empty_contacts(16), seconds / steps, steps)
         assert_allclose(end.time, seconds, rtol=1e-12)  # rounding
         errors.append(np.abs(end.positions - reference).max())
     order = 1 if damped and name == "leapfrog" else ORDER[name]  # its damping is half a step late
@@ -128,7 +128,7 @@ def plate(coefficient, name, *, damping=0.0, h=0.01, seconds=1.0):
     mass = build(mesh, RestShape(mesh.vertices), fabric(density=0.15)).mass
     model = model_of((), mass, faces=mesh.faces)
     method = method_of(name, model, damping=damping, air=0.5 * 1.2 * coefficient)
-    end = method.advance(at_rest(mesh.vertices), nothing(12), h, round(seconds / h))
+    end = method.advance(at_rest(mesh.vertices), empty_contacts(12), h, round(seconds / h))
     assert_allclose(np.ptp(end.velocities, axis=0), 0.0, rtol=0, atol=1e-6)  # stays flat but for rounding
     return -end.velocities[:, 1].mean()
 
@@ -160,7 +160,7 @@ def test_a_method_with_memory_keeps_its_order_when_the_step_changes(name):
         method, now = method_of(name, model), state
         for share in (0.2, 0.5, 0.3):  # of the time, in different steps
             count = round(share * steps) * (2 if share == 0.5 else 1)
-            now = method.advance(now, nothing(16), share * 0.1 / count, count)
+            now = method.advance(now, empty_contacts(16), share * 0.1 / count, count)
         return np.abs(now.positions - reference).max()
 
     assert 1.7 < np.log2(error(100) / error(200)) < 2.6  # second order
@@ -172,9 +172,9 @@ def test_memory_does_not_leak_from_one_motion_into_another(name):
     _, other = flag()
     other = ClothState(other.positions[::-1].copy(), np.zeros((16, 3)))
     method = INTEGRATORS[name](model)
-    method.advance(other, nothing(16), 1e-3, 5)
-    again = method.advance(state, nothing(16), 1e-3, 5)
-    fresh = INTEGRATORS[name](model).advance(state, nothing(16), 1e-3, 5)
+    method.advance(other, empty_contacts(16), 1e-3, 5)
+    again = method.advance(state, empty_contacts(16), 1e-3, 5)
+    fresh = INTEGRATORS[name](model).advance(state, empty_contacts(16), 1e-3, 5)
     assert np.array_equal(again.positions, fresh.positions)
     assert np.array_equal(again.velocities, fresh.velocities)
 
@@ -184,8 +184,8 @@ def test_two_calls_are_one(name):
     damping = 0.0 if name == "leapfrog" else 1.0  # it damps by an older velocity within a call
     model, state = flag(rayleigh=1e-3 * damping)
     method = INTEGRATORS[name](model, damping=damping)
-    two = method.advance(method.advance(state, nothing(16), 1e-3, 4), nothing(16), 1e-3, 6)
-    one = INTEGRATORS[name](model, damping=damping).advance(state, nothing(16), 1e-3, 10)
+    two = method.advance(method.advance(state, empty_contacts(16), 1e-3, 4), empty_contacts(16), 1e-3, 6)
+    one = INTEGRATORS[name](model, damping=damping).advance(state, empty_contacts(16), 1e-3, 10)
     assert_allclose(two.positions, one.positions, rtol=0, atol=1e-14)  # Newton's first guess differs in nothing
     assert not np.array_equal(one.positions, state.positions)
 
@@ -197,7 +197,7 @@ def test_a_plane_stops_what_falls(name):
     state = at_rest(np.array([[0, 0.02, 0], [0.1, 0.05, 0.0]]))
     method = INTEGRATORS[name](model)
     for _ in range(40):
-        span = Round(state.time, state.time + 0.02, 0.1, np.zeros(2), 0.5)
+        span = ContactSpan(state.time, state.time + 0.02, 0.1, np.zeros(2), 0.5)
         state = method.advance(state, floor.contacts(state.positions, span), 0.005, 4)
     assert_allclose(state.positions, [[0, 0, 0], [0.1, 0, 0]], rtol=0, atol=1e-12)  # on the plane, to rounding
     assert np.abs(state.velocities).max() < 1.01 * 0.005 * GRAVITY  # what a step of gravity gives
@@ -208,7 +208,7 @@ def test_an_attachment_bears_a_cloth_that_nothing_else_holds(name):
     """What acts from outside must not be taken for an internal force, whose sum over the cloth is nothing."""
     points, target = np.array([[0.0, 0, 0], [0.2, 0, 0]]), np.array([[0.0, 0.1, 0], [0.2, 0.1, 0]])
     model = model_of((attachments([0, 1], target, points, [0.01, 0.02]),), np.array([0.5, 0.3]))
-    end = method_of(name, model, damping=20.0).advance(at_rest(points), nothing(2), 0.01, 400)
+    end = method_of(name, model, damping=20.0).advance(at_rest(points), empty_contacts(2), 0.01, 400)
     weight = model.mass * GRAVITY
     hanging = target - np.column_stack([[0, 0], weight * [0.01, 0.02], [0, 0]])
     assert_allclose(end.positions, hanging, rtol=0, atol=1e-10)  # 40 or more time constants; tolerance of Newton
@@ -219,7 +219,7 @@ def test_no_vertex_outruns_the_limit(name):
     model, state = flag()
     free = np.setdiff1d(np.arange(16), [0, 3])
     fast = ClothState(state.positions, 5.0 * state.velocities)
-    end = INTEGRATORS[name](model, max_speed=0.1).advance(fast, nothing(16), 1e-3, 10)
+    end = INTEGRATORS[name](model, max_speed=0.1).advance(fast, empty_contacts(16), 1e-3, 10)
     moved = np.linalg.norm(end.positions - fast.positions, axis=1)
     assert moved[free].max() > 0.5 * 0.1 * 0.01
     assert moved.max() <= 0.1 * 0.01 * (1 + 1e-12)  # ten steps of a millisecond; rounding
@@ -233,7 +233,7 @@ def test_rigid_constraints_are_refused(name):
         for data in model.constraints
     )
     with pytest.raises(ConfigError, match="stretch constraints.*rigid") as refused:
-        INTEGRATORS[name](replace(model, constraints=rigid)).advance(state, nothing(16), 1e-3, 1)
+        INTEGRATORS[name](replace(model, constraints=rigid)).advance(state, empty_contacts(16), 1e-3, 1)
     assert "xpbd" in refused.value.hint
 
 
@@ -245,9 +245,9 @@ def test_implicit_methods_stand_a_large_step():
     h = 1 / 30
     assert h * np.sqrt(1e5 / lightest) > 200.0
     for name in ("backward_euler", "backward_euler_newton", "imex", "ncg", "bdf2"):
-        end = INTEGRATORS[name](stiff, damping=5.0).advance(at_rest(mesh.vertices), nothing(36), h, 90)
+        end = INTEGRATORS[name](stiff, damping=5.0).advance(at_rest(mesh.vertices), empty_contacts(36), h, 90)
         assert_allclose(end.positions, mesh.vertices, rtol=0, atol=5e-3)  # a stiff sheet hangs as it was
     with np.errstate(all="ignore"):
         for name in EXPLICIT:
-            end = INTEGRATORS[name](stiff).advance(at_rest(mesh.vertices), nothing(36), h, 90)
+            end = INTEGRATORS[name](stiff).advance(at_rest(mesh.vertices), empty_contacts(36), h, 90)
             assert not np.abs(end.positions).max() < 1e3  # beyond the limit, as it must be

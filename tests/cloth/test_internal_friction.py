@@ -5,14 +5,14 @@ import pytest
 from cloth_scenes import sheet
 from numpy.testing import assert_allclose
 
-from vto_pipeline.cloth.collision.contacts import nothing
+from vto_pipeline.cloth.collision.contacts import empty_contacts
 from vto_pipeline.cloth.constraints.bending.bend_friction import bend_friction
 from vto_pipeline.cloth.constraints.bending.hinge import bend, solid_hinges
 from vto_pipeline.cloth.constraints.membrane.strain_friction import strain_friction
 from vto_pipeline.cloth.constraints.membrane.stretch import stretch
 from vto_pipeline.cloth.constraints.sweep import add_forces
 from vto_pipeline.cloth.model.build import ClothState, at_rest, build, model_of
-from vto_pipeline.cloth.model.internal_friction import own, recall, remember, slip
+from vto_pipeline.cloth.model.internal_friction import copy_sliders, restore_sliders, slip, with_own_sliders
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.solvers import SOLVERS
 from vto_pipeline.geometry.topology import hinges
@@ -42,7 +42,7 @@ def strip(moment=MOMENT):
     elastic = bend(hinges(STRIP), STRIP.vertices, None, fabric)
     stiffness = moment / SLIP * found.length**2 / found.area
     friction = bend_friction(found.vertices, STRIP.vertices, None, stiffness, moment * found.length)
-    return own(model_of((elastic, friction), np.ones(len(STRIP.vertices))))
+    return with_own_sliders(model_of((elastic, friction), np.ones(len(STRIP.vertices))))
 
 
 def energy(model, x):
@@ -115,14 +115,14 @@ def test_a_slip_moves_no_force():
     slip(x, model.constraints)
     add_forces(x, model.constraints, after)
     assert_allclose(after, before, rtol=0, atol=1e-14)
-    assert np.abs(remember(model)[0]).max() > 0.1
+    assert np.abs(copy_sliders(model)[0]).max() > 0.1
 
 
 def test_shear_runs_through_its_loop():
     mesh, shear, loss, slipped = sheet(2, 2, 0.1, 0.1), 100.0, 4.0, 0.01
     fabric = Fabric("square", 0.2, 3e-4, 1e3, 1e3, shear, 0, 0, 0, 0, 0.3)
     friction = strain_friction(mesh.faces, mesh.vertices, slipped, (0.0, 0.0, 0.5 * loss))
-    model = own(model_of((stretch(mesh.faces, mesh.vertices, fabric), friction), np.ones(4)))
+    model = with_own_sliders(model_of((stretch(mesh.faces, mesh.vertices, fabric), friction), np.ones(4)))
 
     def sheared(angle):
         return mesh.vertices @ np.array([[np.cos(angle), np.sin(angle), 0], [0, 1, 0], [0, 0, 1]])
@@ -143,7 +143,7 @@ def test_plastic_bending_yields_hardens_and_keeps_a_crease():
     fabric = Fabric("paper", 0.2, 3e-4, 1e3, 1e3, 100, 0, RIGIDITY, RIGIDITY, 0, 0.3)
     materials = Materials(yield_curvature=yields, hardening=hardening)
     built = build(STRIP, RestShape(STRIP.vertices), fabric, materials=materials)
-    model = own(model_of(built.constraints[:2], built.mass))  # without the membrane
+    model = with_own_sliders(model_of(built.constraints[:2], built.mass))  # without the membrane
     path = np.linspace(0.0, 20.0, 201)
     moments = cycled(model, path)
     expected = RIGIDITY * np.where(path < yields, path, yields + hardening * (path - yields))
@@ -162,11 +162,13 @@ def test_a_state_carries_what_its_cloth_remembers(solver):
     start = ClothState(rolled(8.0), np.zeros((10, 3)))
     clamped = model_of(model.constraints, model.mass, pinned=held, gravity=(0.0, 0.0, 0.0))
     method = SOLVERS[solver](clamped)
-    once = method.advance(start, nothing(10), 1e-3, 4)
+    once = method.advance(start, empty_contacts(10), 1e-3, 4)
     assert np.abs(once.sliders[0]).max() > 0.1
-    again = method.advance(start, nothing(10), 1e-3, 4)  # from the same state the same way, whatever came between
+    again = method.advance(
+        start, empty_contacts(10), 1e-3, 4
+    )  # from the same state the same way, whatever came between
     assert_allclose(again.positions, once.positions, rtol=0, atol=0)
-    two = method.advance(method.advance(start, nothing(10), 1e-3, 2), nothing(10), 1e-3, 2)
+    two = method.advance(method.advance(start, empty_contacts(10), 1e-3, 2), empty_contacts(10), 1e-3, 2)
     assert_allclose(two.positions, once.positions, rtol=0, atol=1e-15)
     assert np.abs(model.constraints[1].slider).max() == 0.0  # the model is as it was
 
@@ -174,9 +176,9 @@ def test_a_state_carries_what_its_cloth_remembers(solver):
 def test_a_state_without_memory_starts_at_rest():
     model = strip()
     slip(rolled(9.0), model.constraints)
-    assert np.abs(remember(model)[0]).max() > 0.1
-    recall(model, at_rest(rolled(0.0)).sliders)
-    assert np.abs(remember(model)[0]).max() == 0.0
+    assert np.abs(copy_sliders(model)[0]).max() > 0.1
+    restore_sliders(model, at_rest(rolled(0.0)).sliders)
+    assert np.abs(copy_sliders(model)[0]).max() == 0.0
 
 
 def test_folds_of_the_strip_are_what_they_are_said_to_be():

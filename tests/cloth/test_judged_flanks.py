@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import minimize, nnls
 
 from vto_pipeline.cloth.judge.audit import audit
-from vto_pipeline.cloth.judge.bearing import left_by_all, left_by_one
+from vto_pipeline.cloth.judge.bearing import residual_after_all_surfaces, residual_after_one_surface
 from vto_pipeline.cloth.judge.flanks import flanks
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.garment import RestShape
@@ -124,7 +124,10 @@ def drawn(seed, count):
 
 def test_flanks_without_friction_bear_what_nonnegative_least_squares_finds():
     forces, normals = drawn(2, 100)
-    left = [np.linalg.norm(left_by_all(force, normal, 0.0)) for force, normal in zip(forces, normals, strict=True)]
+    left = [
+        np.linalg.norm(residual_after_all_surfaces(force, normal, 0.0))
+        for force, normal in zip(forces, normals, strict=True)
+    ]
     wanted = [nnls(-normal.T, force)[1] for normal, force in zip(normals, forces, strict=True)]
     assert_allclose(left, wanted, rtol=0, atol=1e-9)
     assert 10 < (np.array(wanted) < 1e-9).sum() < 90
@@ -143,7 +146,7 @@ def test_flanks_leave_as_little_as_any_forces_within_their_cones(friction):
             one /= np.linalg.norm(one)
             rays += [-n + friction * (np.cos(a) * one + np.sin(a) * np.cross(n, one)) for a in turn]
         shares, least = nnls(np.array(rays).T, force)
-        found = np.linalg.norm(left_by_all(force, normal, friction))
+        found = np.linalg.norm(residual_after_all_surfaces(force, normal, friction))
         assert found <= least + 1e-9
         assert found >= least - shares.sum() * friction * (1.0 - np.cos(np.pi / 180)) - 1e-9
         borne += least < 1e-9
@@ -156,14 +159,14 @@ def test_a_wedge_slides_along_its_groove_where_its_flanks_do_not_hold_it(frictio
     outward = np.array([[-np.sin(tilt), np.cos(tilt), 0.0], [np.sin(tilt), np.cos(tilt), 0.0]])
     slope = friction / np.sqrt(np.cos(tilt) ** 2 - (friction * np.sin(tilt)) ** 2)  # steepest, in the groove's plane
     for along in (0.9 * slope, 1.1 * slope + 0.1):
-        left = left_by_all(np.array([0.0, -1.0, along]), outward, friction)
+        left = residual_after_all_surfaces(np.array([0.0, -1.0, along]), outward, friction)
         wanted = max(0.0, (along - slope) / np.hypot(1.0, slope))
         assert_allclose(np.linalg.norm(left), wanted, rtol=0, atol=1e-8)
 
 
 def test_one_flank_alone_bears_no_more_than_coulomb_allows():
     force = np.array([[0.0, -2.0, 1.0], [0.0, -2.0, 0.1], [0.0, 1.0, 1.0]])
-    left = left_by_one(force, np.tile([0.0, 1.0, 0.0], (3, 1)), 0.2)
+    left = residual_after_one_surface(force, np.tile([0.0, 1.0, 0.0], (3, 1)), 0.2)
     assert_allclose(left, [[0.0, 0.0, 0.6], [0.0, 0.0, 0.0], [0.0, 1.0, 1.0]], rtol=0, atol=1e-12)
 
 

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import vto_pipeline.cloth.outfit.layers as layers_module
 from vto_pipeline.bench.samples.garments.wardrobe import WARDROBE
 from vto_pipeline.bench.samples.garments.wearer import wearer
-from vto_pipeline.cloth.judge.order import outside
+from vto_pipeline.cloth.judge.order import outside_outer_garment
 from vto_pipeline.cloth.outfit.layers import drape_layers
 from vto_pipeline.errors import ConfigError, InputError, IntersectingError
 from vto_pipeline.geometry.intersections import intersecting_faces
@@ -57,7 +57,7 @@ def clean_and_in_order(outfit, body):
     meshes = list(outfit.meshes.values())
     for k, outer in enumerate(meshes):
         for inner in meshes[:k]:
-            assert len(outside(inner, outer, body)) == 0
+            assert len(outside_outer_garment(inner, outer, body)) == 0
 
 
 SHIRT, WAISTCOAT = vest("shirt"), vest("waistcoat", 0.112, 0.03, 0.17, stretch=600.0)
@@ -100,7 +100,9 @@ def test_the_order_is_the_one_asked_for(waistcoat_over_shirt):
     for found, above in ((outfit, 0), (waistcoat_over_shirt[0], 1)):
         shirt, waistcoat = found.meshes["shirt"], found.meshes["waistcoat"]
         order = [shirt, waistcoat] if above == 0 else [waistcoat, shirt]
-        assert len(outside(*order, pear())) > 150  # the other way about, most of what is covered is out of order
+        assert (
+            len(outside_outer_garment(*order, pear())) > 150
+        )  # the other way about, most of what is covered is out of order
 
 
 def test_runs_have_the_same_bits_and_leaving_nothing_out_changes_nothing(waistcoat_over_shirt):
@@ -138,7 +140,7 @@ def test_layers_that_end_the_wrong_way_about_are_told_with_places():
     ) as caught:
         drape_layers([SHIRT, WAISTCOAT], pear(), {**QUICK, "time_budget_s": 0.01})  # no time to put anything on
     partial = caught.value.partial
-    beyond = outside(partial["shirt_draped"], partial["waistcoat_draped"], pear())
+    beyond = outside_outer_garment(partial["shirt_draped"], partial["waistcoat_draped"], pear())
     assert partial["audit"]["out_of_order_vertices"] == len(beyond) > 100
     assert partial["audit"]["order_kept"] is False
 
@@ -156,8 +158,8 @@ def test_what_went_wrong_while_garments_were_put_on_is_told(monkeypatch):
         return Draped(garment.mesh, np.zeros_like(garment.mesh.vertices), None, (), {})
 
     monkeypatch.setattr(layers_module, "drape", drape)
-    monkeypatch.setattr(layers_module, "dressed", lambda body, worn: body)
-    monkeypatch.setattr(layers_module._Outfit, "_settle", lambda self, worn, seconds: worn)
+    monkeypatch.setattr(layers_module, "wrap_in_surface", lambda body, worn: body)
+    monkeypatch.setattr(layers_module._Outfit, "_relax_together", lambda self, worn, seconds: worn)
     job = Job()
     drape_layers([vest("shirt"), vest("waistcoat", 0.13, 0.03, 0.17)], pear(), QUICK, job)
     assert len(asked) == 2
@@ -175,7 +177,9 @@ def test_settings_are_checked():
 
 
 def test_what_crosses_at_the_end_is_told_with_places_and_every_garment(monkeypatch):
-    monkeypatch.setattr(layers_module, "dressed", lambda body, worn: body)  # the second is not put over the first
+    monkeypatch.setattr(
+        layers_module, "wrap_in_surface", lambda body, worn: body
+    )  # the second is not put over the first
     rough = {**QUICK, "self_collision": False, "settle_seconds": 0.3}
     with pytest.raises(IntersectingError, match="one garment and another still cross, near") as caught:
         drape_layers([vest("shirt"), vest("waistcoat", 0.112, 0.03, 0.17)], pear(), rough)

@@ -6,10 +6,10 @@ from cloth_scenes import fabric, sheet
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import eigh
 
-from vto_pipeline.cloth.collision.contacts import Round, gather
+from vto_pipeline.cloth.collision.contacts import ContactSpan, gather_contacts
 from vto_pipeline.cloth.collision.shapes.colliders import Sphere
 from vto_pipeline.cloth.constraints.points.spring import springs
-from vto_pipeline.cloth.dynamics.methods import FRAME, METHODS, choose, highest_frequency
+from vto_pipeline.cloth.dynamics.methods import FRAME, METHODS, choose_method, highest_frequency
 from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
 from vto_pipeline.cloth.model.build import ClothState, build, model_of
 from vto_pipeline.cloth.model.materials import Materials
@@ -41,7 +41,7 @@ def exact_frequency(model, x):
 
 def test_cloth_is_moved_by_newton_unless_somebody_says_otherwise():
     model, x = cloth()
-    choice = choose(model, x, None, None, None)
+    choice = choose_method(model, x, None, None, None)
     assert (choice.method, choice.substeps, choice.sweeps) == ("newton", 1, 1)
     assert "64 vertices" in choice.reason
     steps = int(choice.reason.split("explicit method ")[1].split()[0])
@@ -49,19 +49,19 @@ def test_cloth_is_moved_by_newton_unless_somebody_says_otherwise():
 
 
 def test_what_is_rigid_is_held_by_multipliers():
-    choice = choose(rods(0.0), ROD, None, None, None)
+    choice = choose_method(rods(0.0), ROD, None, None, None)
     assert choice.method == "xpbd"
     assert "rigid" in choice.reason
-    assert choose(rods(1e-9), ROD, None, None, None).method == "newton"
+    assert choose_method(rods(1e-9), ROD, None, None, None).method == "newton"
 
 
 @pytest.mark.parametrize("name", METHODS)
 def test_what_was_asked_for_is_taken(name):
     model, x = cloth()
-    choice = choose(model, x, name, 7, 5)
+    choice = choose_method(model, x, name, 7, 5)
     assert (choice.method, choice.substeps, choice.sweeps) == (name, 7, 5)
     assert choice.reason == "chosen by the user"
-    usual = choose(model, x, name, None, None)
+    usual = choose_method(model, x, name, None, None)
     assert usual.substeps >= 1
     assert usual.sweeps >= 1
 
@@ -69,17 +69,19 @@ def test_what_was_asked_for_is_taken(name):
 def test_no_such_method():
     model, x = cloth()
     with pytest.raises(ConfigError, match="magic.*allowed: newton, xpbd"):
-        choose(model, x, "magic", None, None)
+        choose_method(model, x, "magic", None, None)
 
 
 @pytest.mark.parametrize("name", EXPLICIT)
 def test_explicit_methods_ask_for_what_is_rigid_no_number_of_steps(name):
     """They refuse it when they run, in words; the choice must not fail before, in numbers."""
-    choice = choose(rods(0.0), ROD, name, None, None)
+    choice = choose_method(rods(0.0), ROD, name, None, None)
     assert choice.substeps >= 1
     method = METHODS[name](rods(0.0))
     with pytest.raises(ConfigError, match="rigid"):
-        method.advance(ClothState(ROD, np.zeros((3, 3))), gather([], ROD, Round(0, 1, 1, np.zeros(3), 1)), 1e-3, 1)
+        method.advance(
+            ClothState(ROD, np.zeros((3, 3))), gather_contacts([], ROD, ContactSpan(0, 1, 1, np.zeros(3), 1)), 1e-3, 1
+        )
 
 
 @pytest.mark.parametrize("stretch", [1.0, 300.0, 3e4])
@@ -100,27 +102,27 @@ def test_highest_frequency_of_a_spring_is_the_textbooks():
 def test_highest_frequency_at_its_ends():
     assert highest_frequency(rods(0.0), ROD) == np.inf
     assert highest_frequency(model_of((), np.ones(3)), np.zeros((3, 3))) == 0.0
-    assert choose(model_of((), np.ones(3)), np.zeros((3, 3)), "rk4", None, None).substeps == 1
+    assert choose_method(model_of((), np.ones(3)), np.zeros((3, 3)), "rk4", None, None).substeps == 1
 
 
 @pytest.mark.parametrize("name", EXPLICIT)
 def test_steps_of_explicit_methods_are_stable(name):
     """Beyond its limit a method grows by powers of ten."""
     model, x = cloth(6, 300.0, pinned=(0, 5))
-    choice = choose(model, x, name, None, None)
+    choice = choose_method(model, x, name, None, None)
     v = np.random.default_rng(1).normal(0.0, 0.05, x.shape)
     v[[0, 5]] = 0.0
     state = ClothState(x, v)
     if name == "explicit_euler":
         model, _ = cloth(6, 300.0, pinned=(0, 5), materials=Materials(rayleigh=1e-3))  # undamped, no step is stable
-    contacts = gather([], x, Round(0.0, 1.0, 1.0, np.zeros(36), 1.0))
+    contacts = gather_contacts([], x, ContactSpan(0.0, 1.0, 1.0, np.zeros(36), 1.0))
     after = METHODS[name](model).advance(state, contacts, FRAME / choice.substeps, 10 * choice.substeps)
     assert np.abs(after.velocities).max() < 5.0
     assert np.abs(after.positions - x).max() > 1e-3
 
 
 def test_there_is_an_end_to_the_steps():
-    assert choose(rods(1e-12), ROD, "rk4", None, None).substeps == 10000
+    assert choose_method(rods(1e-12), ROD, "rk4", None, None).substeps == 10000
 
 
 SLOW = {"projective": 1, "vertex_descent": 2}
@@ -140,8 +142,8 @@ def test_the_same_bits_with_one_thread_and_two(name):
         with limited_threads(threads):
             method, state = METHODS[name](model, sweeps=SLOW.get(name, 2)), start
             for _ in range(2):
-                span = Round(state.time, state.time + 2 * h, 0.02, np.full(count, 2e-3), 0.5)
-                state = method.advance(state, gather([ball], state.positions, span), h, 2)
+                span = ContactSpan(state.time, state.time + 2 * h, 0.02, np.full(count, 2e-3), 0.5)
+                state = method.advance(state, gather_contacts([ball], state.positions, span), h, 2)
             ends.append(state)
     assert_array_equal(ends[0].positions, ends[1].positions)
     assert_array_equal(ends[0].velocities, ends[1].velocities)

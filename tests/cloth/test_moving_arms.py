@@ -10,7 +10,7 @@ from ipc_judge import crosses, self_crosses
 from vto_pipeline.avatar.model.pose import morph, named_pose
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.cloth.drape import drape
-from vto_pipeline.cloth.dynamics.body_motion import ride
+from vto_pipeline.cloth.dynamics.body_motion import run_body_motion
 from vto_pipeline.cloth.judge.crossings import crossings_between
 from vto_pipeline.cloth.rest import phases
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
@@ -48,11 +48,11 @@ def watched(monkeypatch):
             return state
 
         stepper.run = looking
-        state = ride(stepper, state, body, deep, watch)
+        state = run_body_motion(stepper, state, body, deep, watch)
         del stepper.run
         return state
 
-    monkeypatch.setattr(phases, "ride", looked_at)
+    monkeypatch.setattr(phases, "run_body_motion", looked_at)
     return frames
 
 

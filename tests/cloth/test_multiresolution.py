@@ -9,7 +9,7 @@ from test_drape import double_vest, pear, vest
 
 import vto_pipeline.cloth.rest.multiresolution as levels_module
 from vto_pipeline.cloth.drape import drape
-from vto_pipeline.cloth.rest.coarsening import coarser
+from vto_pipeline.cloth.rest.coarsening import coarsen
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import boundary_loops, face_area_vectors
@@ -34,7 +34,7 @@ def worn():
 
 def test_the_same_garment_in_a_quarter_of_the_vertices():
     fine = worn()
-    coarse = coarser(fine, len(fine.mesh.vertices) // 4).garment
+    coarse = coarsen(fine, len(fine.mesh.vertices) // 4).garment
     laid = TriangleMesh(coarse.rest.positions, coarse.mesh.faces)
     assert 0.8 < 4 * len(laid.vertices) / len(fine.mesh.vertices) < 1.3
     assert area(laid) == pytest.approx(2 * np.pi * 0.115 * 0.2, rel=5e-3)  # of a cylinder; its polygons have less
@@ -47,17 +47,17 @@ def test_the_same_garment_in_a_quarter_of_the_vertices():
 
 def test_there_and_back():
     fine = worn()
-    coarse = coarser(fine, len(fine.mesh.vertices) // 4)
-    back = coarse.finer(coarse.garment.rest.positions)
+    coarse = coarsen(fine, len(fine.mesh.vertices) // 4)
+    back = coarse.prolong(coarse.garment.rest.positions)
     assert_allclose(back, fine.rest.positions, rtol=0, atol=1e-12)  # rounding only
     turn = Rotation.from_rotvec([1.0, -2.0, 0.5]).as_matrix()
     assert_allclose(
-        coarse.finer(coarse.garment.rest.positions @ turn.T + 1.0),
+        coarse.prolong(coarse.garment.rest.positions @ turn.T + 1.0),
         fine.rest.positions @ turn.T + 1.0,
         rtol=0,
         atol=1e-12,
     )
-    assert_allclose(coarse.finer(coarse.garment.mesh.vertices), fine.mesh.vertices, rtol=0, atol=5e-4)
+    assert_allclose(coarse.prolong(coarse.garment.mesh.vertices), fine.mesh.vertices, rtol=0, atol=5e-4)
 
 
 def test_a_drape_by_way_of_a_coarser_mesh():
@@ -92,7 +92,7 @@ def test_a_garment_that_cannot_be_made_coarser_is_draped_as_it_is(monkeypatch):
     def refuse(garment, vertices):
         raise GarmentError("remeshing broke the surface")
 
-    monkeypatch.setattr(levels_module, "coarser", refuse)
+    monkeypatch.setattr(levels_module, "coarsen", refuse)
     job = Job()
     found = drape(vest(), pear(), fabric(), {"settle_seconds": 0.1, "coarsen_above": 1000}, job)
     assert {row.level for row in found.trace} == {0}

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize, root
 
-from vto_pipeline.cloth.collision.contacts import Contacts, Round, gather, nothing
+from vto_pipeline.cloth.collision.contacts import Contacts, ContactSpan, empty_contacts, gather_contacts
 from vto_pipeline.cloth.collision.shapes.colliders import Plane, Sphere
 from vto_pipeline.cloth.constraints.points.spring import springs
 from vto_pipeline.cloth.constraints.sweep import add_damping_forces, add_forces
@@ -73,7 +73,7 @@ def test_a_step_of_many_iterations_ends_in_the_minimum(h):
     expected = by_scipy(model, state, h)
     far = np.abs(expected - state.positions - h * state.velocities - h * h * model.gravity)[4:].max()
     assert far > 1e-3  # forces have acted
-    after = Newton(model, sweeps=20).advance(state, nothing(16), h, 1)
+    after = Newton(model, sweeps=20).advance(state, empty_contacts(16), h, 1)
     assert_allclose(after.positions, expected, rtol=0, atol=1e-8)
     assert_allclose(after.velocities, (after.positions - state.positions) / h, rtol=0, atol=1e-12)
 
@@ -81,7 +81,7 @@ def test_a_step_of_many_iterations_ends_in_the_minimum(h):
 def test_one_iteration_is_near_it():
     model, state = stirred()
     expected = by_scipy(model, state, FRAME)
-    one = Newton(model).advance(state, nothing(16), FRAME, 1).positions
+    one = Newton(model).advance(state, empty_contacts(16), FRAME, 1).positions
     flight = state.positions + FRAME * state.velocities + FRAME**2 * model.gravity
     free = model.inverse_mass > 0.0
     assert np.linalg.norm((one - expected)[free]) < 0.5 * np.linalg.norm((flight - expected)[free])
@@ -91,8 +91,8 @@ def test_damped_steps_solve_their_equation():
     """M (y - x̃) / h² = f(y) - β K(y) (y - x) / h, by forces alone."""
     h = 1.0 / 240.0
     model, state = stirred(rayleigh=0.01)
-    plain = Newton(stirred()[0], sweeps=20).advance(state, nothing(16), h, 1).positions
-    found = Newton(model, sweeps=20).advance(state, nothing(16), h, 1).positions
+    plain = Newton(stirred()[0], sweeps=20).advance(state, empty_contacts(16), h, 1).positions
+    found = Newton(model, sweeps=20).advance(state, empty_contacts(16), h, 1).positions
     target = state.positions + h * state.velocities + h * h * model.gravity
 
     def left(y):
@@ -108,7 +108,7 @@ def test_damped_steps_solve_their_equation():
 def test_free_fall_is_exact():
     model, rest = cloth(6)
     v = np.broadcast_to([0.3, 1.0, -0.2], rest.shape)
-    after = Newton(model).advance(ClothState(rest, v), nothing(36), FRAME, 30)
+    after = Newton(model).advance(ClothState(rest, v), empty_contacts(36), FRAME, 30)
     fall = G * FRAME**2 * 30 * 31 / 2
     assert_allclose(after.positions - rest, 0.5 * v - [0.0, fall, 0.0], rtol=0, atol=1e-11)  # rounding of 30 steps
     assert_allclose(after.velocities, v - [0.0, 0.5 * G, 0.0], rtol=0, atol=1e-9)
@@ -118,13 +118,13 @@ def test_free_fall_is_exact():
 def test_velocities_fade_at_the_rate_given():
     model = model_of((), np.ones(3), gravity=(0.0, 0.0, 0.0))
     start = ClothState(np.zeros((3, 3)), np.ones((3, 3)))
-    after = Newton(model, damping=2.0).advance(start, nothing(3), FRAME, 30)
+    after = Newton(model, damping=2.0).advance(start, empty_contacts(3), FRAME, 30)
     assert_allclose(after.velocities, np.exp(-1.0), rtol=1e-12)
 
 
 def test_no_vertex_outruns_the_limit():
     model, state = stirred()
-    after = Newton(model, max_speed=0.1).advance(state, nothing(16), FRAME, 1)
+    after = Newton(model, max_speed=0.1).advance(state, empty_contacts(16), FRAME, 1)
     speed = np.linalg.norm(after.velocities, axis=1)
     assert_allclose(speed.max(), 0.1, rtol=1e-9)
 
@@ -132,7 +132,7 @@ def test_no_vertex_outruns_the_limit():
 def test_linear_momentum_is_kept():
     model, state = stirred(side=12, pinned=())
     before = model.mass @ state.velocities
-    after = Newton(model).advance(state, nothing(144), FRAME, 20)
+    after = Newton(model).advance(state, empty_contacts(144), FRAME, 20)
     scale = model.mass @ np.linalg.norm(state.velocities, axis=1)
     expected = before + model.mass.sum() * 20 * FRAME * model.gravity
     assert np.abs(after.velocities - state.velocities).max() > 0.5
@@ -143,8 +143,8 @@ def test_a_swinging_sheet_keeps_the_energy_that_backward_euler_keeps():
     model, rest = cloth(12, (0, 11), upright=False)
     ends, start = {}, at_rest(rest)
     for h in (FRAME, 0.25 * FRAME):
-        converged = INTEGRATORS["backward_euler_newton"](model).advance(start, nothing(144), h, round(0.2 / h))
-        ours = Newton(model).advance(start, nothing(144), h, round(0.2 / h))
+        converged = INTEGRATORS["backward_euler_newton"](model).advance(start, empty_contacts(144), h, round(0.2 / h))
+        ours = Newton(model).advance(start, empty_contacts(144), h, round(0.2 / h))
         lost = energy(model, start) - energy(model, converged)
         fallen = model.mass @ (start.positions - converged.positions)[:, 1] * G
         assert 0.01 * fallen < lost < 0.6 * fallen  # there is something to compare
@@ -158,7 +158,7 @@ def test_energy_is_never_above_the_start(h):
     model, state = stirred(side=10, pinned=(0, 9))
     method, highest = Newton(model), energy(model, state)
     for _ in range(40):
-        state = method.advance(state, nothing(100), h, 1)
+        state = method.advance(state, empty_contacts(100), h, 1)
         now = energy(model, state)
         assert now <= highest * (1.0 + 1e-9)
         highest = now
@@ -172,7 +172,7 @@ def test_a_stiff_rod_swings_as_a_pendulum():
     state, method = at_rest(x), Newton(model)
     path = []
     for _ in range(30):
-        state = method.advance(state, nothing(2), h, 1)
+        state = method.advance(state, empty_contacts(2), h, 1)
         path.append(state.positions[1])
     path = np.array(path)
     assert_allclose(np.linalg.norm(path, axis=1), length, rtol=1e-4)
@@ -188,8 +188,8 @@ def test_a_stiff_rod_swings_as_a_pendulum():
 
 
 def on_plane(state, normal, friction, *, h, skin=0.0):
-    span = Round(state.time, state.time + h, 0.05, np.full(len(state.positions), skin), 1.0)
-    return gather([Plane((0.0, 0.0, 0.0), tuple(normal), friction)], state.positions, span)
+    span = ContactSpan(state.time, state.time + h, 0.05, np.full(len(state.positions), skin), 1.0)
+    return gather_contacts([Plane((0.0, 0.0, 0.0), tuple(normal), friction)], state.positions, span)
 
 
 def slope_run(method, rest, slope, friction, h, steps):
@@ -274,12 +274,12 @@ def test_planes_never_pull(friction):
     state, method = ClothState(rest + 0.2 * RAISED, np.tile([0.0, -1.0, 0.0], (400, 1))), Newton(model)
     touched = rubbed = 0
     for _ in range(20):
-        span = Round(state.time, state.time + FRAME, 0.05, np.full(400, 2e-3), 1.0)
-        state = method.advance(state, gather([ball], state.positions, span), FRAME, 1)
+        span = ContactSpan(state.time, state.time + FRAME, 0.05, np.full(400, 2e-3), 1.0)
+        state = method.advance(state, gather_contacts([ball], state.positions, span), FRAME, 1)
         planes = method.active
         assert (planes.force >= 0.0).all()
         assert not planes.force[~planes.pushing].any()
-        rub, push = planes.rub[planes.pushing], planes.force[planes.pushing]
+        rub, push = planes.friction_force[planes.pushing], planes.force[planes.pushing]
         rubs = np.linalg.norm(rub, axis=1)
         assert (rubs <= friction * push * (1.0 + 1e-9)).all()  # Coulomb's cone
         assert (np.abs((rub * planes.normal[planes.pushing]).sum(axis=1)) <= 1e-9 * (1e-9 + push)).all()
@@ -313,7 +313,7 @@ def test_an_earlier_motion_does_not_leak_into_another():
     fresh = Newton(model).advance(state, contacts, FRAME, 2)
     method = Newton(model)
     method.advance(ClothState(state.positions[::-1].copy(), state.velocities - [0.0, 2.0, 0.0]), contacts, FRAME, 3)
-    again = method.advance(state, nothing(36), FRAME, 2)
-    assert_array_equal(again.positions, Newton(model).advance(state, nothing(36), FRAME, 2).positions)
+    again = method.advance(state, empty_contacts(36), FRAME, 2)
+    assert_array_equal(again.positions, Newton(model).advance(state, empty_contacts(36), FRAME, 2).positions)
     again = method.advance(state, contacts, FRAME, 2)
     assert_allclose(again.positions, fresh.positions, rtol=0, atol=1e-4)  # which planes push is guessed otherwise

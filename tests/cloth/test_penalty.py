@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import check_grad
 
 from vto_pipeline.cloth import Moving, Path, Plane, simulate
-from vto_pipeline.cloth.collision.contacts import Round, gather
+from vto_pipeline.cloth.collision.contacts import ContactSpan, gather_contacts
 from vto_pipeline.cloth.collision.response.penalty import Penalty
 from vto_pipeline.cloth.collision.self_collision.self_contact import SelfContact
 from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
@@ -38,9 +38,9 @@ def pressed(slide):
     mesh, count = two_sheets(2e-4)
     model = build(mesh, RestShape(mesh.vertices), FABRIC, gravity=(0.0, -GRAVITY, 0.0))
     x = mesh.vertices + np.random.default_rng(0).uniform(-2e-5, 2e-5, mesh.vertices.shape)
-    span = Round(0.0, 0.01, 0.01, np.full(len(x), 1e-4), 0.5)
-    contacts = gather([Plane((0, 0, 0), (0, 1, 0), 0.3)], x, span)
-    pairs = SelfContact(mesh.faces, model.reach, 0.3).near(x, x.copy(), 0.01)
+    span = ContactSpan(0.0, 0.01, 0.01, np.full(len(x), 1e-4), 0.5)
+    contacts = gather_contacts([Plane((0, 0, 0), (0, 1, 0), 0.3)], x, span)
+    pairs = SelfContact(mesh.faces, model.reach, 0.3).find_pairs(x, x.copy(), 0.01)
     assert len(pairs.key) > 20
     penalty = Penalty(model)
     y = x.copy()

@@ -9,7 +9,7 @@ from cloth_scenes import ball, fabric, sheet
 import vto_pipeline.cloth.rest.phases as module
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.model.build import at_rest, build
-from vto_pipeline.cloth.rest.convergence import Settling
+from vto_pipeline.cloth.rest.convergence import SettlingResult
 from vto_pipeline.cloth.rest.phases import Phases
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.job import Job
@@ -20,7 +20,7 @@ NONE, ONE = np.zeros((0, 2), np.int32), np.zeros((1, 2), np.int32)
 class Ready:
     """A cloth among its colliders, of which only the length of its steps is asked."""
 
-    rests_exactly, substeps = True, 1.0
+    has_exact_rest, substeps = True, 1.0
 
     def prepare(self, positions):
         pass
@@ -36,9 +36,11 @@ def ended(monkeypatch, clearings):
         moves, pairs = left.pop(0)
         return (replace(state, positions=state.positions + 0.001) if moves else state), pairs
 
-    monkeypatch.setattr(module, "settle", lambda stepper, state, limits, watch: Settling(state, True, 1e-4, 1e-3))
-    monkeypatch.setattr(module, "clear_of_body", clear)
-    found = Phases(model, rest, fabric(), DrapeConfig(), Job()).settle(
+    monkeypatch.setattr(
+        module, "relax_to_rest", lambda stepper, state, limits, watch: SettlingResult(state, True, 1e-4, 1e-3)
+    )
+    monkeypatch.setattr(module, "clear_body_crossings", clear)
+    found = Phases(model, rest, fabric(), DrapeConfig(), Job()).settle_and_clear(
         at_rest(mesh.vertices), Ready(), ball(0.3, levels=1), np.inf
     )
     assert not left
@@ -61,4 +63,4 @@ def test_what_the_last_clearing_moved_is_not_at_rest(monkeypatch, pairs):
     found = ended(monkeypatch, [(True, NONE)] * turns + [(True, pairs)])
     assert found.settled is False
     assert found.error == np.inf  # what was predicted was of another place
-    assert found.unrest == "not at rest, error unknown"
+    assert found.not_settled_warning == "not at rest, error unknown"

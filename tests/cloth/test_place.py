@@ -5,8 +5,8 @@ import pytest
 from cloth_scenes import moved, tube
 from numpy.testing import assert_allclose
 
-from vto_pipeline.cloth.placement.place import PlaceConfig, place
-from vto_pipeline.cloth.placement.voxel_fit import Cubes, quarter_turns
+from vto_pipeline.cloth.placement.place import PlaceConfig, find_placement
+from vto_pipeline.cloth.placement.voxel_fit import VoxelFit, quarter_turns
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.job import Job
@@ -47,7 +47,7 @@ def test_a_collar_goes_to_the_groove_it_was_made_for(flip):
     if flip:
         strayed = TriangleMesh(strayed.vertices, strayed.faces[:, ::-1])
     job = Job()
-    found = place(strayed, spool(), FINE, job).put(strayed.vertices)
+    found = find_placement(strayed, spool(), FINE, job).start_positions(strayed.vertices)
     assert_allclose(found[:, [0, 2]].mean(axis=0), 0.0, rtol=0, atol=0.012)  # one cube
     assert_allclose(found[:, 1].mean(), 0.6, rtol=0, atol=0.03)
     assert "garment moved by (-3" in job.notes[0]
@@ -55,14 +55,16 @@ def test_a_collar_goes_to_the_groove_it_was_made_for(flip):
 
 def test_a_garment_wider_than_the_body_is_centred():
     hoop = moved(tube(0.165, 0.4, 48, 12, base=0.05), 0.25, 0.0, -0.4)
-    found = place(hoop, spool(), FINE, Job()).put(hoop.vertices)
+    found = find_placement(hoop, spool(), FINE, Job()).start_positions(hoop.vertices)
     assert_allclose(found[:, [0, 2]].mean(axis=0), 0.0, rtol=0, atol=0.015)  # what play there is, and one cube
 
 
 def test_a_garment_that_stands_well_is_left_alone():
     collar = tube(0.09, 0.1, 36, 8, base=0.55)
     job = Job()
-    assert_allclose(place(collar, spool(), FINE, job).put(collar.vertices), collar.vertices, rtol=0, atol=0)
+    assert_allclose(
+        find_placement(collar, spool(), FINE, job).start_positions(collar.vertices), collar.vertices, rtol=0, atol=0
+    )
     assert job.notes == ["garment left where it stands: its place scores 100% of the best"]
 
 
@@ -72,11 +74,11 @@ def test_a_garment_that_stands_well_is_left_alone():
 def test_unit_and_axes_are_found_and_told(unit, metres, turn):
     worn, job = skirt(), Job()
     strayed = TriangleMesh(worn.vertices @ turn / metres, worn.faces)
-    placement = place(strayed, pear(), PlaceConfig(cube_mm=20), job)
-    found = placement.put(strayed.vertices)
+    placement = find_placement(strayed, pear(), PlaceConfig(cube_mm=20), job)
+    found = placement.start_positions(strayed.vertices)
     assert_allclose(found[:, 1], worn.vertices[:, 1], rtol=0, atol=0.01)  # half a cube
     assert_allclose(found[:, [0, 2]].mean(axis=0), 0.0, rtol=0, atol=0.01)
-    rest = placement.turned(strayed.vertices)
+    rest = placement.rest_positions(strayed.vertices)
     assert_allclose(np.ptp(rest, axis=0), np.ptp(worn.vertices, axis=0), rtol=1e-9)
     assert any(f"assumed to be in {unit}:" in note for note in job.notes) == (unit != "m")
     assert any(note.startswith("garment turned") for note in job.notes) == (turn[1, 1] != 1.0)
@@ -88,11 +90,13 @@ def test_a_garment_too_small_starts_around_the_body_and_that_is_told():
         rod.vertices * np.where(np.abs(rod.vertices[:, 1:2] - 0.5) > 0.499, [1e-3, 1, 1e-3], 1.0), rod.faces
     )
     small = tube(0.12, 0.4, 48, 21, base=0.3)  # the rod is a quarter too thick
-    placement = place(small, rod, PlaceConfig(cube_mm=15), job)
+    placement = find_placement(small, rod, PlaceConfig(cube_mm=15), job)
     assert 1.2 <= placement.stretch <= 1.5
-    start = TriangleMesh(placement.put(small.vertices), small.faces)
+    start = TriangleMesh(placement.start_positions(small.vertices), small.faces)
     assert (SurfaceDistance(rod).signed(start.vertices).distance > -0.015).all()  # a cube
-    assert_allclose(placement.turned(small.vertices), small.vertices, rtol=0, atol=0)  # it is as small as before
+    assert_allclose(
+        placement.rest_positions(small.vertices), small.vertices, rtol=0, atol=0
+    )  # it is as small as before
     assert job.warnings[0].startswith("too small")
 
 
@@ -106,14 +110,14 @@ def test_a_flat_sheet_goes_around_nothing(turn):
     points = np.column_stack([x.ravel(), np.full(x.size, 0.9), z.ravel()]) @ turn.T
     flat = TriangleMesh(points, np.vstack([np.column_stack([a, c, b]), np.column_stack([a, d, c])]))
     with pytest.raises(InputError, match="goes around nothing"):
-        place(flat, tube(0.15, 1.0, 64, 51), PlaceConfig(), Job())
-    assert place(flat, tube(0.15, 1.0, 64, 51), PlaceConfig(place="as_it_stands"), Job()).scale == 1.0
+        find_placement(flat, tube(0.15, 1.0, 64, 51), PlaceConfig(), Job())
+    assert find_placement(flat, tube(0.15, 1.0, 64, 51), PlaceConfig(place="as_it_stands"), Job()).scale == 1.0
 
 
 def test_a_garment_of_no_size_is_refused():
     speck = TriangleMesh(1e-9 * skirt().vertices, skirt().faces)
     with pytest.raises(InputError, match="longest side is .*times the body"):
-        place(speck, pear(), FINE, Job())
+        find_placement(speck, pear(), FINE, Job())
 
 
 def test_quarter_turns_are_the_rotations_of_a_cube_and_cubes_turn_like_meshes():
@@ -123,10 +127,10 @@ def test_quarter_turns_are_the_rotations_of_a_cube_and_cubes_turn_like_meshes():
         assert_allclose(turn @ turn.T, np.eye(3), rtol=0, atol=0)
         assert np.linalg.det(turn) == pytest.approx(1.0)
     worn = moved(skirt(), 0.037, 0.0, 0.021)
-    cubes = Cubes(worn, pear(), 0.02, 2.0)
+    cubes = VoxelFit(worn, pear(), 0.02, 2.0)
     for turn in turns[5::6]:
-        found = cubes.fill(turn)
+        found = cubes.best_placement(turn)
         turned = TriangleMesh(worn.vertices @ turn.T + found.shift, worn.faces)
-        anew = Cubes(turned, pear(), 0.02, 2.0).fill(np.eye(3))
+        anew = VoxelFit(turned, pear(), 0.02, 2.0).best_placement(np.eye(3))
         assert_allclose(anew.shift, 0.0, rtol=0, atol=0.021)  # a cube: the lattices differ by part of one
-        assert_allclose(anew.worth, found.worth, rtol=0, atol=0.05)
+        assert_allclose(anew.score, found.score, rtol=0, atol=0.05)

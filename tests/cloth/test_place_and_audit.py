@@ -17,11 +17,11 @@ from vto_pipeline.cloth.dynamics.residual import elastic_energy
 from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
 from vto_pipeline.cloth.judge.audit import audit
 from vto_pipeline.cloth.judge.gap import gaps_within
-from vto_pipeline.cloth.judge.residual import Weave, knows
+from vto_pipeline.cloth.judge.residual import ElasticEnergies, covers_all_energies
 from vto_pipeline.cloth.model.build import at_rest, build
 from vto_pipeline.cloth.model.materials import Materials
-from vto_pipeline.cloth.placement.body_growth import growing
-from vto_pipeline.cloth.placement.clear_body import clear_of_body
+from vto_pipeline.cloth.placement.body_growth import plan_body_growth
+from vto_pipeline.cloth.placement.clear_body import clear_body_crossings
 from vto_pipeline.cloth.rest_shape.from_hanging import RestShapeConfig, rest_shape
 from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.geometry.topology import edges
@@ -42,7 +42,7 @@ def skittle():
 def test_the_body_grows_from_where_it_no_longer_crosses():
     collar = tube(0.1, 0.3, 48, 24, base=0.35)  # cuts the skittle below its waist, where it is up to 0.15 m
     body = skittle()
-    motion = growing(body, collar, Job()).body
+    motion = plan_body_growth(body, collar, Job()).body
     assert len(intersecting_faces(collar, body)) > 0
     assert len(intersecting_faces(collar, TriangleMesh(motion.keyframes[0], body.faces))) == 0
     assert_allclose(motion.keyframes[-1], body.vertices, rtol=0, atol=0)
@@ -53,7 +53,7 @@ def test_the_body_grows_from_where_it_no_longer_crosses():
 def test_a_garment_through_the_heart_of_the_body_is_warned_of():
     job = Job()
     through = moved(sheet(40, 40, 0.6, 0.6, upright=False), -0.3, 0.5, -0.3)
-    growing(skittle(), through, job)
+    plan_body_growth(skittle(), through, job)
     assert "does not surround the body" in job.warnings[0]
 
 
@@ -181,7 +181,7 @@ def test_energy_and_forces_of_judge_and_solver_agree():
     rest, x = crumpled()
     weave = fabric(stretch=1500, weft=900, shear=60, poisson=0.2, bending=1e-4)
     model = build(rest, RestShape(rest.vertices), weave)
-    mine = Weave(rest, RestShape(rest.vertices), weave)
+    mine = ElasticEnergies(rest, RestShape(rest.vertices), weave)
     wanted = np.zeros_like(x)
     add_forces(x, model.constraints, wanted)
     assert_allclose(mine.energy(x), elastic_energy(model, x), rtol=1e-9)
@@ -191,9 +191,9 @@ def test_energy_and_forces_of_judge_and_solver_agree():
 
 
 def test_the_judge_knows_what_it_does_not_know():
-    assert knows(Materials())
+    assert covers_all_energies(Materials())
     for other in ({"membrane": "green"}, {"bending": "isometric"}, {"strain_limit": 0.1}, {"hysteresis": True}):
-        assert not knows(Materials(**other))
+        assert not covers_all_energies(Materials(**other))
 
 
 def test_the_judge_sees_balance_and_the_want_of_it():
@@ -270,7 +270,7 @@ def test_a_spike_between_the_vertices_is_cleared():
     stepper = Stepper(model, [BodyCollider(body, 0.0, 0.3)], np.full(16, 1e-3), StepConfig(), damping=5.0)
     state = stepper.run(at_rest(mesh.vertices), 0.2)
     assert len(intersecting_faces(TriangleMesh(state.positions, mesh.faces), spiked)) > 0
-    state, pairs = clear_of_body(stepper, state, mesh.faces, spiked, 40)
+    state, pairs = clear_body_crossings(stepper, state, mesh.faces, spiked, 40)
     assert len(pairs) == 0
     assert len(intersecting_faces(TriangleMesh(state.positions, mesh.faces), spiked)) == 0
     assert 1e-3 < stepper.skin.max() < 0.03
@@ -288,7 +288,7 @@ def test_a_steep_bump_is_cleared_without_stretching_the_cloth_over_it():
     stepper = Stepper(model, [body], np.full(49, 1e-3), StepConfig(), damping=5.0)
     state = stepper.run(at_rest(mesh.vertices), 0.5)
     assert len(intersecting_faces(TriangleMesh(state.positions, mesh.faces), ground)) > 0
-    state, pairs = clear_of_body(stepper, state, mesh.faces, ground, 40)
+    state, pairs = clear_body_crossings(stepper, state, mesh.faces, ground, 40)
     assert len(pairs) == 0
     ends = edges(mesh)
     was, now = (np.linalg.norm(at[ends[:, 1]] - at[ends[:, 0]], axis=1) for at in (mesh.vertices, state.positions))

@@ -6,12 +6,12 @@ import pytest
 from cloth_scenes import sheet, tube
 from moving_sheets import crumple, judge, ramp
 
-from vto_pipeline.cloth.collision.self_collision.pieces import pieces
-from vto_pipeline.cloth.collision.self_collision.proximity_bound import reach
+from vto_pipeline.cloth.collision.self_collision.pieces import surface_components
+from vto_pipeline.cloth.collision.self_collision.proximity_bound import prove_separation
 
 
 def proven(faces, start, end, thickness):
-    return reach(pieces(faces, len(start)), start, end, np.full(len(start), 0.5 * thickness))
+    return prove_separation(surface_components(faces, len(start)), start, end, np.full(len(start), 0.5 * thickness))
 
 
 def comes_near(faces, points, thickness):
@@ -198,6 +198,6 @@ def test_pieces_apart_and_a_hole():
     ring = mesh.faces[np.linalg.norm(mesh.vertices[mesh.faces].mean(axis=1)[:, [0, 2]] - 0.5, axis=1) > 0.2]
     points = np.vstack([mesh.vertices, mesh.vertices + np.array([0.0, 0.01, 0.0])])
     faces = np.ascontiguousarray(np.vstack([ring, mesh.faces + len(mesh.vertices)]))
-    assert len(pieces(faces, len(points)).piece_of_loop) == 3
+    assert len(surface_components(faces, len(points)).piece_of_loop) == 3
     assert proven(faces, points, points, 0.009).out
     assert not proven(faces, points, points, 0.011).out

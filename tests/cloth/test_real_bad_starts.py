@@ -11,7 +11,7 @@ import pytest
 from bad_starts import finned, shifted, sleeves_up, two, upside_down
 from ipc_judge import crosses
 
-from vto_pipeline.cloth.placement.place import PlaceConfig, place
+from vto_pipeline.cloth.placement.place import PlaceConfig, find_placement
 from vto_pipeline.io.meshes import read_mesh, write_ply
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -58,7 +58,9 @@ def drape(garment, body, run, *words):
 def test_a_real_shirt_badly_put(name, body, tmp_path):
     person = read_mesh(DATA / "bodies" / f"{body}.ply")
     shirt = read_mesh(DATA / "garments" / "tshirt.ply")
-    worn = TriangleMesh(place(shirt, person, PlaceConfig(), Job()).put(shirt.vertices), shirt.faces)
+    worn = TriangleMesh(
+        find_placement(shirt, person, PlaceConfig(), Job()).start_positions(shirt.vertices), shirt.faces
+    )
     start, words, code = STARTS[name]
     garment = tmp_path / "shirt.ply"
     write_ply(garment, start(worn))

@@ -7,8 +7,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
 from vto_pipeline.cloth.drape import drape
-from vto_pipeline.cloth.placement.body_growth import growing
-from vto_pipeline.cloth.placement.rigid_escape import led_about
+from vto_pipeline.cloth.placement.body_growth import plan_body_growth
+from vto_pipeline.cloth.placement.rigid_escape import escape_rigidly
 from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import edges
@@ -55,7 +55,7 @@ def test_a_garment_shifted_and_turned_is_led_back_without_a_change_of_lengths(in
     if inward:
         garment = TriangleMesh(garment.vertices, garment.faces[:, ::-1].copy())
     strayed = garment.vertices @ Rotation.from_rotvec([0.0, 0.0, 0.2]).as_matrix().T + np.array([0.08, 0.0, 0.03])
-    led = led_about(body, TriangleMesh(strayed, garment.faces))
+    led = escape_rigidly(body, TriangleMesh(strayed, garment.faces))
     assert abs(turns_about_the_limb(strayed)) < 1e-9
     assert_allclose(abs(turns_about_the_limb(led)), 1.0, rtol=0, atol=1e-9)
     assert SurfaceDistance(body).signed(strayed).distance.min() < -0.02
@@ -67,13 +67,13 @@ def test_a_garment_shifted_and_turned_is_led_back_without_a_change_of_lengths(in
 
 def test_a_garment_with_no_cloth_in_the_body_stays():
     garment = bodice_and_sleeve()
-    assert_array_equal(led_about(trunk_and_limb(), garment), garment.vertices)
+    assert_array_equal(escape_rigidly(trunk_and_limb(), garment), garment.vertices)
 
 
 def test_cloth_that_cuts_only_into_a_limb_that_can_be_thinned_is_not_led():
     job, body, garment = Job(), trunk_and_limb(), moved(bodice_and_sleeve(), 0.03, 0.0, 0.0)
     assert len(intersecting_faces(garment, body)) > 0
-    found = growing(body, garment, job)
+    found = plan_body_growth(body, garment, job)
     assert_array_equal(found.garment.vertices, garment.vertices)
     assert job.warnings == []
 

@@ -59,7 +59,7 @@ def triangle_distance(one, other):
 def test_pairs_say_how_near_any_two_triangles_are(seed):
     x, faces = triangles(25, seed)
     reach = 0.01
-    pairs = SelfContact(faces, np.full(len(x), 0.5 * reach), 0.3).near(x, x.copy(), 0.0)
+    pairs = SelfContact(faces, np.full(len(x), 0.5 * reach), 0.3).find_pairs(x, x.copy(), 0.0)
     way = np.einsum("ps,psk->pk", pairs.weights, x[pairs.vertices])
     length = np.linalg.norm(way, axis=1)
     assert_allclose(way, length[:, None] * pairs.normal, rtol=0, atol=1e-15)  # rounding
@@ -88,7 +88,7 @@ def test_a_fold_is_held_once():
     for under in (np.array([0.05, 0.0]), np.array([0.0375, 0.05])):  # over a vertex and over an edge of the sheet
         x = mesh.vertices.copy()
         x[at:, [0, 2]] += under - x[at, [0, 2]]
-        pairs = SelfContact(mesh.faces, np.full(len(x), 5.1e-4), 0.3).near(x, x.copy(), 0.0)
+        pairs = SelfContact(mesh.faces, np.full(len(x), 5.1e-4), 0.3).find_pairs(x, x.copy(), 0.0)
         assert len(pairs.key) == 1
 
 
@@ -98,7 +98,7 @@ def test_a_safe_move_crosses_nothing(seed):
     random = np.random.default_rng(seed)
     wanted = x + np.repeat(random.normal(scale=0.1, size=(40, 3)), 3, axis=0) + random.normal(scale=0.02, size=x.shape)
     assert crosses(wanted, faces)
-    there, met = SelfContact(faces, np.zeros(len(x)), 0.3).safe(x, wanted)
+    there, met = SelfContact(faces, np.zeros(len(x)), 0.3).collision_free(x, wanted)
     for share in (0.3, 0.7, 1.0):  # on the way, too
         assert not crosses(x + share * (there - x), faces)
     gone = np.linalg.norm(there - x, axis=1) / np.linalg.norm(wanted - x, axis=1)
@@ -115,7 +115,7 @@ def test_what_is_held_up_is_not_passed_through_by_what_falls_on():
     x = np.vstack([narrow - [0.0, 0.01, 0.0], wide, beside, *far])
     faces = np.arange(len(x), dtype=np.int32).reshape(-1, 3)
     wanted = x - np.where(np.arange(len(x)) < 3, 0.0, 1.0)[:, None] * np.array([0.0, 1.0, 0.0])
-    there, _ = SelfContact(faces, np.full(len(x), 1e-3), 0.3).safe(x, wanted)
+    there, _ = SelfContact(faces, np.full(len(x), 1e-3), 0.3).collision_free(x, wanted)
     assert there[3:6, 1].min() > -0.01  # held up
     assert there[6:9, 1].min() > there[3:6, 1].max()  # and what is over it stays so
     assert_array_equal(there[9:], wanted[9:])  # too far up to come near
@@ -125,7 +125,7 @@ def test_what_meets_nothing_goes_all_the_way():
     x, faces = triangles(10, 3)
     wanted = x + np.array([50.0, 20.0, -9.0])
     contact = SelfContact(faces, np.zeros(len(x)), 0.3)
-    there, met = contact.safe(x, wanted)
+    there, met = contact.collision_free(x, wanted)
     assert_array_equal(there, wanted)
     assert len(met.key) == 0
 
@@ -136,7 +136,7 @@ def test_safe_moves_have_the_same_bits_with_one_thread_and_two():
     found = []
     for threads in (1, 2):
         with limited_threads(threads):
-            found.append(SelfContact(faces, np.full(len(x), 0.002), 0.3).safe(x, wanted)[0])
+            found.append(SelfContact(faces, np.full(len(x), 0.002), 0.3).collision_free(x, wanted)[0])
     assert_array_equal(found[0], found[1])
 
 

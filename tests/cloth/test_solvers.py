@@ -6,7 +6,7 @@ from cloth_scenes import fabric, sheet
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import root
 
-from vto_pipeline.cloth.collision.contacts import Round, gather, nothing
+from vto_pipeline.cloth.collision.contacts import ContactSpan, empty_contacts, gather_contacts
 from vto_pipeline.cloth.collision.shapes.colliders import Plane, Sphere
 from vto_pipeline.cloth.constraints.points.combination import combinations
 from vto_pipeline.cloth.constraints.points.spring import springs
@@ -203,7 +203,7 @@ def test_linear_momentum_is_kept_to_rounding(name):
     model, rest = cloth(6, gravity=(0.0, 0.0, 0.0))
     rng = np.random.default_rng(1)
     state = ClothState(rest + rng.normal(0.0, 0.01, rest.shape), rng.normal(0.0, 1.0, rest.shape))
-    after = SOLVERS[name](model, sweeps=40).advance(state, nothing(len(rest)), 1.0 / 480.0, 5)
+    after = SOLVERS[name](model, sweeps=40).advance(state, empty_contacts(len(rest)), 1.0 / 480.0, 5)
     before = model.mass @ state.velocities
     scale = model.mass @ np.linalg.norm(state.velocities, axis=1)
     assert np.abs(after.velocities - state.velocities).max() > 0.1  # forces have acted
@@ -215,7 +215,7 @@ def test_rigid_rods_are_held(name):
     x = np.column_stack([np.linspace(0.0, 0.4, 5), np.zeros((5, 2))])
     rods = springs([[0, 1], [1, 2], [2, 3], [3, 4]], x, 0.0)
     model = model_of((rods,), np.full(5, 0.1), pinned=(0,))
-    after = SOLVERS[name](model, sweeps=300).advance(at_rest(x), nothing(5), 1.0 / 240.0, 3).positions
+    after = SOLVERS[name](model, sweeps=300).advance(at_rest(x), empty_contacts(5), 1.0 / 240.0, 3).positions
     assert after[-1, 1] < -1e-4  # it swings
     lengths = np.linalg.norm(np.diff(after, axis=0), axis=1)
     assert_allclose(lengths, 0.1, rtol=0, atol=1e-6)  # what 300 iterations leave of the slowest
@@ -226,7 +226,7 @@ def test_methods_that_need_a_stiffness_say_so(name):
     x = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])
     model = model_of((springs([[0, 1]], x, 0.0),), np.ones(2))
     with pytest.raises(ConfigError, match="rigid"):
-        SOLVERS[name](model, sweeps=1).advance(at_rest(x), nothing(2), 0.01, 1)
+        SOLVERS[name](model, sweeps=1).advance(at_rest(x), empty_contacts(2), 0.01, 1)
 
 
 @pytest.mark.parametrize("name", [name for name in SOLVERS if name != "newton"])
@@ -240,8 +240,8 @@ def test_friction_on_a_slope(name, friction):
     solver = SOLVERS[name](model, sweeps=8 if name == "fast_projection" else 100)
     plane = Plane((0.0, 0.0, 0.0), tuple(normal), friction)
     for _ in range(steps):
-        span = Round(state.time, state.time + h, 0.05, np.zeros(len(rest)), 1.0)
-        state = solver.advance(state, gather([plane], state.positions, span), h, 1)
+        span = ContactSpan(state.time, state.time + h, 0.05, np.zeros(len(rest)), 1.0)
+        state = solver.advance(state, gather_contacts([plane], state.positions, span), h, 1)
     speed = model.mass @ state.velocities @ down / model.mass.sum()
     expected = max(0.0, GRAVITY * (np.sin(slope) - friction * np.cos(slope))) * steps * h
     assert_allclose(speed, expected, rtol=1e-2, atol=1e-6)  # Coulomb: what the sheet's own motion leaves to chance
@@ -256,6 +256,8 @@ def test_the_same_bits_with_one_thread_and_two(name):
     ends = []
     for threads in (1, 2):
         with limited_threads(threads):
-            ends.append(SOLVERS[name](model, sweeps=2).advance(state, nothing(len(mesh.vertices)), 1.0 / 240.0, 1))
+            ends.append(
+                SOLVERS[name](model, sweeps=2).advance(state, empty_contacts(len(mesh.vertices)), 1.0 / 240.0, 1)
+            )
     assert_array_equal(ends[0].positions, ends[1].positions)
     assert np.isfinite(ends[0].positions).all()

@@ -6,19 +6,19 @@ from numpy.testing import assert_allclose
 
 from vto_pipeline.cloth.dynamics.methods import FRAME
 from vto_pipeline.cloth.model.build import ClothState, at_rest
-from vto_pipeline.cloth.rest.convergence import SettleLimits, settle
-from vto_pipeline.cloth.rest.stable_newton import LONGEST, Polish
+from vto_pipeline.cloth.rest.convergence import SettleLimits, relax_to_rest
+from vto_pipeline.cloth.rest.stable_newton import LONGEST, StableNewtonSteps
 
 
 class Steps:
     """What polishing sees of a stepper."""
 
-    rests_exactly = polishes = True
-    bearing = steps = 0
-    known = None
+    has_exact_rest = can_use_exact_stiffness = True
+    pushing_contacts = steps = 0
+    contact_memory = None
 
     def __init__(self):
-        self.substeps, self.definite, self.exact = 0.5, False, False
+        self.substeps, self.was_positive_definite, self.exact = 0.5, False, False
 
     @property
     def step(self):
@@ -27,7 +27,7 @@ class Steps:
     def prepare(self, positions):
         pass
 
-    def polish(self, on):
+    def use_exact_stiffness(self, on):
         self.exact = on
 
 
@@ -39,16 +39,16 @@ class Straying(Steps):
 
     def __init__(self):
         super().__init__()
-        self.known = "nothing"
+        self.contact_memory = "nothing"
         self.tried = 0
         self.knew = set()
 
     def run(self, state, seconds):
-        self.definite = self.exact
-        self.knew.add(self.known)
+        self.was_positive_definite = self.exact
+        self.knew.add(self.contact_memory)
         strays = self.substeps < 0.5
         self.tried += strays
-        self.known = "too far" if strays else "half way"
+        self.contact_memory = "too far" if strays else "half way"
         after = state.positions + 1.0 if strays else 0.5 * state.positions
         return ClothState(after, np.zeros((1, 3)), state.time + seconds)
 
@@ -58,7 +58,7 @@ class Straying(Steps):
 
 def test_a_long_step_that_leads_away_is_not_taken():
     stepper = Straying()
-    found = settle(stepper, at_rest(np.array([[1e-3, 0, 0]])), SettleLimits(1e-5, 0.01, 4.0, 160))
+    found = relax_to_rest(stepper, at_rest(np.array([[1e-3, 0, 0]])), SettleLimits(1e-5, 0.01, 4.0, 160))
     assert stepper.tried > 5
     assert stepper.knew == {"nothing", "half way"}
     residuals = np.array([row.residual for row in found.trace])
@@ -71,13 +71,13 @@ def test_a_long_step_that_leads_away_is_not_taken():
 
 def test_steps_grow_while_the_force_falls():
     stepper = Steps()
-    polish = Polish(stepper, enough=0.01)
+    polish = StableNewtonSteps(stepper, enough=0.01)
     polish.choose(True, 5e-3)
     assert stepper.exact
-    stepper.definite = True
+    stepper.was_positive_definite = True
     lengths, residual = [], 5e-3
-    while not polish.whole:
-        assert not polish.goes_astray(residual)
+    while not polish.took_full_step:
+        assert not polish.diverged(residual)
         polish.choose(True, residual)
         lengths.append(stepper.step)
         residual *= 0.5
@@ -86,22 +86,22 @@ def test_steps_grow_while_the_force_falls():
 
 def test_what_leaves_more_force_is_tried_in_shorter_steps_until_they_are_as_usual():
     stepper = Steps()
-    polish = Polish(stepper, enough=0.01)
+    polish = StableNewtonSteps(stepper, enough=0.01)
     polish.choose(True, 5e-3)
-    stepper.definite = True
-    assert not polish.goes_astray(0.04)  # what is soft comes first
+    stepper.was_positive_definite = True
+    assert not polish.diverged(0.04)  # what is soft comes first
     polish.choose(True, 0.04)
     assert stepper.step == pytest.approx(1 / 30)  # no longer steps before forces are all but in balance
     polish.choose(True, 5e-3)
     assert stepper.step == pytest.approx(4 / 30)
-    assert polish.goes_astray(0.04)  # but it has to fall
+    assert polish.diverged(0.04)  # but it has to fall
     assert stepper.exact
     assert stepper.step == pytest.approx(1 / 30)
-    assert not polish.goes_astray(0.4)
+    assert not polish.diverged(0.4)
     polish.choose(True, 0.4)
     assert stepper.exact
     assert stepper.step == pytest.approx(1 / 30)  # it is on its way: no longer steps yet
-    assert not polish.goes_astray(5e-3)
+    assert not polish.diverged(5e-3)
     polish.choose(True, 5e-3)
     assert stepper.step == pytest.approx(4 / 30)
 
@@ -118,8 +118,8 @@ class Buckling(Steps):
     def run(self, state, seconds):
         x, h = 1e3 * state.positions[0, 0], self.step
         held = 1.0 + h * h * self.c * (3.0 * x * x - 1.0)
-        self.definite = self.exact and held > 0.0
-        if not self.definite:
+        self.was_positive_definite = self.exact and held > 0.0
+        if not self.was_positive_definite:
             held = 1.0 + 10.0 * h * h * self.c
         x += h * h * self.c * x * (1.0 - x * x) / held
         return ClothState(np.array([[1e-3 * x, 0, 0]]), np.zeros((1, 3)), state.time + seconds)
@@ -130,7 +130,7 @@ class Buckling(Steps):
 
 
 def test_what_falls_out_of_an_unstable_place_is_let_go():
-    found = settle(Buckling(), at_rest(np.array([[5e-6, 0, 0]])), SettleLimits(1e-5, 0.01, 4.0, 160))
+    found = relax_to_rest(Buckling(), at_rest(np.array([[5e-6, 0, 0]])), SettleLimits(1e-5, 0.01, 4.0, 160))
     assert found.settled
     assert found.state.positions[0, 0] == pytest.approx(1e-3, abs=1e-5)
     assert len(found.trace) < 12
@@ -146,13 +146,13 @@ class Creeping(Buckling):
 
     def run(self, state, seconds):
         x, v, h = 1e3 * state.positions[0, 0], 1e3 * state.velocities[0, 0], self.step
-        self.definite = self.exact
+        self.was_positive_definite = self.exact
         for _ in range(round(seconds / h)):
             self.steps += 1
             held = 1.0 + h * h * self.c * (3.0 * x * x - 1.0)
             if held <= 0.0:
-                self.definite = False
-            if not self.definite:
+                self.was_positive_definite = False
+            if not self.was_positive_definite:
                 held = 1.0 + 10.0 * h * h * self.c
             v = (np.exp(-5.0 * h) * v + h * self.c * x * (1.0 - x * x)) / held
             x += h * v
@@ -161,7 +161,7 @@ class Creeping(Buckling):
 
 def test_where_cloth_is_about_to_buckle_steps_are_short_enough_for_it_to():
     strip = Creeping()
-    found = settle(strip, at_rest(np.array([[1e-9, 0, 0]])), SettleLimits(1e-5, 0.01, 4.5, 160))
+    found = relax_to_rest(strip, at_rest(np.array([[1e-9, 0, 0]])), SettleLimits(1e-5, 0.01, 4.5, 160))
     assert found.settled  # in 37 looks; the usual stiffness alone takes 54
     assert found.state.positions[0, 0] == pytest.approx(1e-3, abs=1e-5)
     assert strip.substeps == 0.5

@@ -8,10 +8,10 @@ from cloth_scenes import fabric, sheet
 from numpy.testing import assert_allclose
 
 from vto_pipeline import cloth
-from vto_pipeline.cloth.dynamics.step_refinement import refine
+from vto_pipeline.cloth.dynamics.step_refinement import refine_time_step
 from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
 from vto_pipeline.cloth.model.build import at_rest, build
-from vto_pipeline.cloth.rest.convergence import SettleLimits, settle
+from vto_pipeline.cloth.rest.convergence import SettleLimits, relax_to_rest
 from vto_pipeline.model.garment import RestShape
 
 MESH = sheet(8, 8, 0.2, 0.2, upright=False)
@@ -37,7 +37,7 @@ def fine():
 
 @pytest.mark.parametrize("error", [5e-3, 1e-3, 3e-4])
 def test_error_is_about_the_true_one(error, fine):
-    found = refine(swinging, START, SECONDS, error=error, finest=100000)
+    found = refine_time_step(swinging, START, SECONDS, error=error, finest=100000)
     assert found.error <= error
     true = rms(found.state.positions, fine)
     assert found.error / 4.0 < true < 4.0 * found.error
@@ -50,7 +50,7 @@ def test_error_is_about_the_true_one(error, fine):
 
 
 def test_it_is_no_finer_than_asked():
-    asked = refine(swinging, START, SECONDS, error=1e-3, finest=100000)
+    asked = refine_time_step(swinging, START, SECONDS, error=1e-3, finest=100000)
     coarser = swinging(asked.stepper.substeps // 2).run(START, SECONDS)
     coarsest = swinging(asked.stepper.substeps // 4).run(START, SECONDS)
     assert rms(coarser.positions, coarsest.positions) > 1e-3
@@ -58,7 +58,7 @@ def test_it_is_no_finer_than_asked():
 
 @pytest.mark.parametrize("finest", [1, 7, 8])
 def test_finest_steps_are_respected(finest):
-    found = refine(swinging, START, SECONDS, error=0.0, finest=finest)
+    found = refine_time_step(swinging, START, SECONDS, error=0.0, finest=finest)
     assert found.stepper.substeps == {1: 1, 7: 4, 8: 8}[finest]
     assert np.isinf(found.error) == (finest == 1)
 
@@ -66,7 +66,7 @@ def test_finest_steps_are_respected(finest):
 def test_the_deadline_is_kept():
     swinging(1).run(START, SECONDS)  # compiled
     began = time.perf_counter()
-    found = refine(swinging, START, SECONDS, error=0.0, finest=100000, deadline=began + 0.5)
+    found = refine_time_step(swinging, START, SECONDS, error=0.0, finest=100000, deadline=began + 0.5)
     took = time.perf_counter() - began
     assert 0.1 < took < 1.5  # it is used, and not overrun by much: how long a run takes is foreseen from the last
     assert len(found.trace) >= 3
@@ -75,7 +75,7 @@ def test_the_deadline_is_kept():
 
 
 def test_a_deadline_that_is_over_leaves_the_start():
-    found = refine(swinging, START, SECONDS, error=0.0, finest=100, deadline=time.perf_counter() - 1.0)
+    found = refine_time_step(swinging, START, SECONDS, error=0.0, finest=100, deadline=time.perf_counter() - 1.0)
     assert found.state.time == 0.0
     assert np.isinf(found.error)
 
@@ -106,9 +106,9 @@ def test_newton_rests_without_smaller_steps():
     for substeps, solver in ((None, None), (40, "xpbd")):
         config = StepConfig(substeps=substeps, solver=solver)
         stepper = Stepper(model, [], np.full(64, 2e-3), config, damping=6.0)
-        found = settle(stepper, START, SettleLimits(1e-4, 0.01, 30.0, 320))
+        found = relax_to_rest(stepper, START, SettleLimits(1e-4, 0.01, 30.0, 320))
         assert found.settled
-        assert stepper.rests_exactly == (solver is None)
+        assert stepper.has_exact_rest == (solver is None)
         assert stepper.substeps == 1 or solver
         ends.append(found.state.positions)
     assert np.abs(ends[0] - MESH.vertices).max() > 0.1
@@ -118,7 +118,7 @@ def test_newton_rests_without_smaller_steps():
 def test_xpbd_must_be_refined_to_rest():
     stepper = swinging(None, damping=6.0, solver="xpbd")
     first = stepper.prepare(START.positions) or stepper.substeps
-    found = settle(stepper, START, SettleLimits(1e-3, 0.0, 30.0, 10 * first))
-    assert not stepper.rests_exactly
+    found = relax_to_rest(stepper, START, SettleLimits(1e-3, 0.0, 30.0, 10 * first))
+    assert not stepper.has_exact_rest
     assert stepper.substeps > first
     assert found.settled

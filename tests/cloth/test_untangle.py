@@ -9,13 +9,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from vto_pipeline.bench.collision.bad_starts import BAD_STARTS, bad_start
 from vto_pipeline.cloth.untangle import untangle
-from vto_pipeline.cloth.untangle.body import Walls
+from vto_pipeline.cloth.untangle.body import OutermostFaces
 from vto_pipeline.cloth.untangle.contours import FREE, contours, crossings
-from vto_pipeline.cloth.untangle.flood import flood
-from vto_pipeline.cloth.untangle.flood import sheet as graph
-from vto_pipeline.cloth.untangle.minimise import shortening
-from vto_pipeline.cloth.untangle.relax import bars, relax
-from vto_pipeline.cloth.untangle.rows import rows
+from vto_pipeline.cloth.untangle.flood import flood_sides
+from vto_pipeline.cloth.untangle.flood import mesh_graph as graph
+from vto_pipeline.cloth.untangle.minimise import contour_shortening_shifts
+from vto_pipeline.cloth.untangle.relax import length_bounds, project_rows_and_lengths
+from vto_pipeline.cloth.untangle.rows import separation_rows
 from vto_pipeline.cloth.untangle.smooth import smoothed
 from vto_pipeline.geometry.intersections import intersecting_faces, self_intersections
 from vto_pipeline.geometry.laplace import laplacian
@@ -65,7 +65,7 @@ def check(name, seed):
     start = bad_start(name, seed)
     assert tangled(start.positions, start.faces, start.body)
     found = untangle(start.positions, start.faces, body=start.body, thickness=GAP)
-    assert found.left == 0
+    assert found.crossings_left == 0
     assert found.places == ()
     assert not tangled(found.positions, start.faces, start.body)
     growth = areas(found.positions, start.faces) / areas(start.positions, start.faces) - 1.0
@@ -93,7 +93,7 @@ def test_what_is_not_tangled_stays_as_it_is_to_the_bit():
     job = Job()
     found = untangle(x, faces, body=ball(0.1, (0, -0.2, 0)), thickness=GAP, job=job)
     assert_array_equal(found.positions, x)
-    assert (found.left, found.rounds, found.area_growth) == (0, 0, 0.0)
+    assert (found.crossings_left, found.rounds, found.area_growth) == (0, 0, 0.0)
     assert job.left_out == [("untangling the start", "no triangles intersect")]
 
 
@@ -104,12 +104,14 @@ def test_what_is_left_is_named_and_not_more_than_there_was():
     mesh = TriangleMesh(found.positions, start.faces)
     assert_array_equal(found.pairs, self_intersections(mesh))
     before = len(self_intersections(TriangleMesh(start.positions, start.faces)))
-    assert 0 < found.left <= before
+    assert 0 < found.crossings_left <= before
     met = found.positions[start.faces[found.pairs]].reshape(-1, 3)
     places = np.vstack(found.places)
     assert (places >= met.min(axis=0)).all()
     assert (places <= met.max(axis=0)).all()
-    assert job.warnings == [w for w in job.warnings if f"{found.left} of {before} pairs" in w and "near (" in w]
+    assert job.warnings == [
+        w for w in job.warnings if f"{found.crossings_left} of {before} pairs" in w and "near (" in w
+    ]
     assert len(job.warnings) == 1
 
 
@@ -120,7 +122,7 @@ def test_vertices_exactly_in_other_faces_do_no_harm(one):
     )
     assert len(self_intersections(TriangleMesh(x, faces))) > 20
     found = untangle(x, faces, thickness=GAP)
-    assert found.left == 0
+    assert found.crossings_left == 0
     assert not tangled(found.positions, faces)
 
 
@@ -129,9 +131,9 @@ def test_a_garment_too_tight_for_its_body_is_refused_and_not_stretched():
     body = TriangleMesh(ball(1.0).vertices * [0.1, 0.2, 0.1] + [0.0, 0.1, 0.0], ball(1.0).faces)
     found = untangle(tight.vertices, tight.faces, body=body, thickness=GAP, rounds=20)
     assert_array_equal(found.body_pairs, intersecting_faces(TriangleMesh(found.positions, tight.faces), body))
-    assert found.left > 0
+    assert found.crossings_left > 0
     assert len(found.places) > 0
-    assert found.left <= len(intersecting_faces(tight, body))
+    assert found.crossings_left <= len(intersecting_faces(tight, body))
     assert found.area_growth <= 0.01
 
 
@@ -188,7 +190,7 @@ def test_shortening_is_the_slope_of_the_contours_length():
         x = np.vstack([tip + shift, base])
         return crossing_of(x, faces), x
 
-    slope = -shortening(*crossing(np.zeros(3))).sum(axis=0)
+    slope = -contour_shortening_shifts(*crossing(np.zeros(3))).sum(axis=0)
     h = 1e-6
     found = [(length_of(crossing(h * d)[0]) - length_of(crossing(-h * d)[0])) / (2 * h) for d in np.eye(3)]
     assert_allclose(slope, found, rtol=0, atol=1e-8)  # central differences of a smooth length near 1
@@ -203,7 +205,7 @@ def test_the_shorter_end_of_a_tube_goes_back_through_the_sheet(up, pipe_first):
     x, faces = joined(pipe, pierced) if pipe_first else joined(pierced, pipe)
     crossing = crossing_of(x, faces)
     links = edges(TriangleMesh(x, faces))
-    found = flood(graph(links, np.ones(len(x))), crossing, contours(crossing), x)
+    found = flood_sides(graph(links, np.ones(len(x))), crossing, contours(crossing), x)
     assert found.decided.tolist() == [True]
     of_pipe = (crossing.edge[:, 0] < len((pipe if pipe_first else pierced).vertices)) == pipe_first
     want = np.array([0.0, 1.0 if up else -1.0, 0.0])
@@ -215,7 +217,7 @@ def test_where_surfaces_are_nearly_parallel_both_give_way():
     cap = ball(0.2, (0.1, -0.195, 0.1), levels=4)
     x, faces = joined(cap, sheet(31, 31, 0.2, 0.2, False))
     crossing = crossing_of(x, faces)
-    found = flood(graph(edges(TriangleMesh(x, faces)), np.ones(len(x))), crossing, contours(crossing), x)
+    found = flood_sides(graph(edges(TriangleMesh(x, faces)), np.ones(len(x))), crossing, contours(crossing), x)
     of_cap = crossing.edge[:, 0] < len(cap.vertices)
     assert (found.push[of_cap, 1] < -0.9).all()
     assert (found.push[~of_cap, 1] > 0.9).all()
@@ -225,7 +227,7 @@ def test_the_way_out_of_overlapping_parts_is_not_through_one_of_them():
     body = TriangleMesh(*joined(ball(0.1, levels=3), ball(0.1, (0.0, 0.12, 0.0), levels=3)))
     inside = np.array([[0.05, 0.01, 0.0]])  # 49 mm below the skin of the one, 21 mm from the other's hidden surface
     nothing = crossings(body.vertices, body.faces, np.empty((0, 2), np.int32))
-    found = Walls(body).rows(inside, nothing, GAP, 0.1)[0]
+    found = OutermostFaces(body).rows(inside, nothing, GAP, 0.1)[0]
     assert_allclose(found.normal, inside / np.linalg.norm(inside), rtol=0, atol=0.1)  # facets turn by 0.15 each
     assert_allclose(found.level, 0.1 + GAP, rtol=0, atol=1e-3)  # chords sag by half of that
 
@@ -237,13 +239,13 @@ def test_cloth_gives_way_to_a_tip_that_meets_none_of_its_vertices():
     assert tangled(cloth.vertices, cloth.faces, body)
     count, pairs = len(cloth.vertices), intersecting_faces(cloth, body)
     met = crossings(*joined(cloth, body), pairs + np.array([0, len(cloth.faces)], np.int32))
-    lifted = Walls(body).rows(cloth.vertices, met, GAP, 0.1)[1]
+    lifted = OutermostFaces(body).rows(cloth.vertices, met, GAP, 0.1)[1]
     through = met.edge[met.edge[:, 0] >= count] - count
     assert len(lifted.level) == len(through) > 0  # each edge of the tip lifts the face it goes through
     assert_allclose(lifted.normal, np.tile([0.0, 1.0, 0.0], (len(lifted.level), 1)), rtol=0, atol=1e-12)
     assert_allclose(lifted.level, body.vertices[through, 1].max(axis=1) + GAP, rtol=0, atol=1e-12)
     found = untangle(cloth.vertices, cloth.faces, body=body, thickness=GAP)
-    assert found.left == 0
+    assert found.crossings_left == 0
     assert not tangled(found.positions, cloth.faces, body)
 
 
@@ -252,16 +254,18 @@ def test_rounds_that_make_it_worse_do_not_count():
     before = len(self_intersections(TriangleMesh(start.positions, start.faces)))
     for rounds in (1, 2):
         found = untangle(start.positions, start.faces, thickness=GAP, rounds=rounds)
-        assert found.left <= before
+        assert found.crossings_left <= before
         assert len(self_intersections(TriangleMesh(found.positions, start.faces))) <= before
-    assert untangle(start.positions, start.faces, thickness=GAP).left == 0
+    assert untangle(start.positions, start.faces, thickness=GAP).crossings_left == 0
 
 
 def test_relaxing_keeps_rows_and_lengths():
     mesh = sheet(9, 9, 0.1, 0.1, False)
     x = mesh.vertices.copy()
-    lifted = rows(np.array([[40]]), np.ones((1, 1)), np.array([[0.0, 1.0, 0.0]]), np.array([0.005]), x, len(x))
-    found = relax(x, lifted, bars(mesh, x), 100, 1.0)
+    lifted = separation_rows(
+        np.array([[40]]), np.ones((1, 1)), np.array([[0.0, 1.0, 0.0]]), np.array([0.005]), x, len(x)
+    )
+    found = project_rows_and_lengths(x, lifted, length_bounds(mesh, x), 100, 1.0)
     assert_allclose(found[40, 1], 0.005, rtol=0, atol=1e-12)
     links = edges(mesh)
     was, now = (np.linalg.norm(y[links[:, 1]] - y[links[:, 0]], axis=1) for y in (x, found))

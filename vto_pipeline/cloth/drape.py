@@ -8,15 +8,15 @@ from collections.abc import Mapping
 import numpy as np
 
 from vto_pipeline.cloth.drape_config import DrapeConfig
-from vto_pipeline.cloth.dynamics.body_motion import covered_way
+from vto_pipeline.cloth.dynamics.body_motion import body_travel
 from vto_pipeline.cloth.dynamics.residual import elastic_energy
 from vto_pipeline.cloth.dynamics.warm_up import warm_up
 from vto_pipeline.cloth.judge.audit import audit
-from vto_pipeline.cloth.judge.residual import knows
+from vto_pipeline.cloth.judge.residual import covers_all_energies
 from vto_pipeline.cloth.judge.too_small import warn_if_too_small
 from vto_pipeline.cloth.model.settings import checked
-from vto_pipeline.cloth.placement.place import put
-from vto_pipeline.cloth.placement.transfer import reshape
+from vto_pipeline.cloth.placement.place import place_garment
+from vto_pipeline.cloth.placement.transfer import transfer_deformation
 from vto_pipeline.cloth.rest.multiresolution import come_to_rest
 from vto_pipeline.errors import DivergedError, FallenError, IntersectingError
 from vto_pipeline.model.body import MovingBody
@@ -68,7 +68,9 @@ def drape(
     if isinstance(body, TriangleMesh):
         body = MovingBody(body.vertices[None], body.faces)
     began = time.perf_counter()
-    garment, body = _begin(garment, body, config, job)  # a garment that is refused need not wait for the compiler
+    garment, body = _starting_positions(
+        garment, body, config, job
+    )  # a garment that is refused need not wait for the compiler
     job.progress(0.0, "compiling the kernels")
     compile_s = warm_up()
     job.measure(compile_s=compile_s, mode=garment.rest.worn_as)
@@ -92,31 +94,37 @@ def drape(
             settled=settling.settled,
             energy=elastic_energy(model, state.positions),
             residual=stepper.residual(state),
-            fabric=fabric if knows(config) else None,
+            fabric=fabric if covers_all_energies(config) else None,
             friction=config.friction,
             skin=stepper.skin,
         ),
         **warn_if_too_small(draped, garment.rest, config.stretch_limit, job),
     }
-    reached.phases.account(reached.before)
+    reached.phases.report_collision_work(reached.before)
     job.measure(seconds=time.perf_counter() - began, steps=stepper.steps, error_mm=settling.error_mm, **findings)
     if not settling.settled:
-        job.warn(settling.unrest)
+        job.warn(settling.not_settled_warning)
     refuse_crossings(findings, {"draped": draped, "audit": findings, "trace": tuple(settling.trace)})
     return Draped(draped, state.velocities, None, tuple(settling.trace), findings)
 
 
-def _begin(garment: Garment, body: MovingBody, config: DrapeConfig, job: Job) -> tuple[Garment, MovingBody]:
+def _starting_positions(
+    garment: Garment, body: MovingBody, config: DrapeConfig, job: Job
+) -> tuple[Garment, MovingBody]:
     """Return garment and body as the simulation starts."""
     start = TriangleMesh(body.keyframes[0], body.faces)
     if len(body.keyframes) == 1:
-        return put(garment, start, config, job), body
-    way = 1e3 * covered_way(body, garment.mesh)
-    if way <= config.ride_up_to_mm:
-        job.note(f"the body under the garment changes by up to {way:.0f} mm; the garment moves along with it")
+        return place_garment(garment, start, config, job), body
+    travel = 1e3 * body_travel(body, garment.mesh)
+    if travel <= config.ride_up_to_mm:
+        job.note(f"the body under the garment changes by up to {travel:.0f} mm; the garment moves along with it")
         return garment, body
-    job.note(f"the body under the garment changes by up to {way:.0f} mm; the garment starts reshaped on the final body")
-    reshaped = TriangleMesh(reshape(garment.mesh, start, body.final), garment.mesh.faces, garment.mesh.colors)
+    job.note(
+        f"the body under the garment changes by up to {travel:.0f} mm; the garment starts reshaped on the final body"
+    )
+    reshaped = TriangleMesh(
+        transfer_deformation(garment.mesh, start, body.final), garment.mesh.faces, garment.mesh.colors
+    )
     return Garment(reshaped, garment.rest), MovingBody(body.keyframes[-1:], body.faces)
 
 
@@ -133,7 +141,7 @@ def refuse_crossings(findings: Mapping[str, object], partial: Mapping[str, objec
     kinds = {"body": "garment and body", "self": "the garment with itself", "layer": "one garment and another"}
     crossing = [
         f"{findings[f'{kind}_intersections']} pairs of triangles of {what} still cross, near "
-        f"{named(findings[f'{kind}_intersection_places'])}"
+        f"{format_places(findings[f'{kind}_intersection_places'])}"
         for kind, what in kinds.items()
         if findings.get(f"{kind}_intersections")
     ]
@@ -145,7 +153,7 @@ def refuse_crossings(findings: Mapping[str, object], partial: Mapping[str, objec
         )
 
 
-def named(places: object) -> str:
+def format_places(places: object) -> str:
     """Return some of the places [m] of an audit as text."""
     assert isinstance(places, list)
     chosen = [places[k] for k in np.unique(np.linspace(0, len(places) - 1, _SHOWN).astype(int))] if places else []

@@ -15,14 +15,14 @@ from vto_pipeline.cloth.collision.contacts import Collider
 from vto_pipeline.cloth.collision.shapes.colliders import Box, Capsule, Ellipsoid, MeshCollider, Plane, Sphere
 from vto_pipeline.cloth.collision.shapes.moving import Moving
 from vto_pipeline.cloth.dynamics.residual import elastic_energy
-from vto_pipeline.cloth.dynamics.step_refinement import refine
+from vto_pipeline.cloth.dynamics.step_refinement import refine_time_step
 from vto_pipeline.cloth.dynamics.stepper import Pins, StepConfig, Stepper
 from vto_pipeline.cloth.model.build import at_rest, build
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.model.settings import checked
-from vto_pipeline.cloth.placement.collapsed_start import untie
-from vto_pipeline.cloth.placement.collision_free_start import free_start
-from vto_pipeline.cloth.rest.convergence import SettleLimits, settle
+from vto_pipeline.cloth.placement.collapsed_start import expand_collapsed_triangles
+from vto_pipeline.cloth.placement.collision_free_start import find_collision_free_start
+from vto_pipeline.cloth.rest.convergence import SettleLimits, relax_to_rest
 from vto_pipeline.errors import ConfigError, InputError
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import MovingBody
@@ -79,7 +79,8 @@ class Trajectory:
         report: seconds (wall), prepare_s (what the method made before), method, reason, substeps, steps,
             contact_rounds, simulated_s, energy_j, residual; with "rest" settled; error_mm where it is known; where the
             cloth is kept from itself start_pairs (of triangles that met), start_left (that still did after untangling)
-            and self_contact (see `collision.tally.Tally`); warnings, where anything is left.
+            and self_contact (see `collision.self_collision.counters.CollisionCounters`); warnings, where anything is
+            left.
         trace: Error against run time, where it is known.
     """
 
@@ -137,12 +138,12 @@ def simulate(
     job = Job(force_all=config.force_all)
     shapes = [_collider(one, job) for one in colliders]
     skins = np.full(len(mesh.vertices), skin)
-    positions, crossed = untie(mesh.vertices, shape.positions, mesh.faces, pinned), None
+    positions, crossed = expand_collapsed_triangles(mesh.vertices, shape.positions, mesh.faces, pinned), None
     report: dict[str, object] = {}
     if config.self_collision:
-        start = free_start(positions, mesh.faces, shape.positions, fabric.thickness, job)
+        start = find_collision_free_start(positions, mesh.faces, shape.positions, fabric.thickness, job)
         positions, crossed = start.positions, start.crossed
-        report.update(start_pairs=start.pairs, start_left=start.left)
+        report.update(start_pairs=start.crossings, start_left=start.crossings_left)
     state = at_rest(positions)
     pins = None if pin_path is None else Pins(np.asarray(pinned, dtype=np.int64), pin_path)
 
@@ -168,14 +169,14 @@ def simulate(
         deadline = np.inf if config.time_budget_s is None else began + config.time_budget_s
         if config.until == "rest":
             error = 1e-3 * (_REST_MM if config.target_error_mm is None else config.target_error_mm)
-            settling = settle(stepper, state, SettleLimits(error, _BALANCED, seconds, config.finest, deadline))
+            settling = relax_to_rest(stepper, state, SettleLimits(error, _BALANCED, seconds, config.finest, deadline))
             state, trace = settling.state, settling.trace
             report.update(settled=settling.settled, error_mm=1e3 * settling.error)
         elif config.target_error_mm is None and config.time_budget_s is None:
             state = stepper.run(state, seconds)
         else:
             error = 0.0 if config.target_error_mm is None else 1e-3 * config.target_error_mm
-            refined = refine(make, state, seconds, error=error, finest=config.finest, deadline=deadline)
+            refined = refine_time_step(make, state, seconds, error=error, finest=config.finest, deadline=deadline)
             state, stepper, trace = refined.state, refined.stepper, refined.trace
             report.update(error_mm=1e3 * refined.error)
     report.update(
@@ -185,16 +186,16 @@ def simulate(
         reason=stepper.choice.reason,
         substeps=stepper.substeps,
         steps=stepper.steps,
-        contact_rounds=stepper.rounds,
+        contact_rounds=stepper.contact_spans,
         simulated_s=state.time,
         energy_j=elastic_energy(model, state.positions),
         residual=stepper.residual(state),
     )
     if stepper.self_contact is not None:
-        tally = stepper.self_contact.tally
-        if tally.uncut:
-            job.warn(f"{tally.uncut} contact pairs remain where nothing could give way")
-        report.update(self_contact=tally.as_report())
+        counters = stepper.self_contact.counters
+        if counters.uncut:
+            job.warn(f"{counters.uncut} contact pairs remain where nothing could give way")
+        report.update(self_contact=counters.as_report())
     report.update(warnings=tuple(job.warnings))
     return Trajectory(state.positions, state.velocities, report, trace)
 

@@ -1,7 +1,7 @@
 """Rows of other programs on the same scenes, and run times at equal error.
 
 Such a row is one JSON line with at least scene ("hang" or "sphere"), N, peer, params, seconds, rms_stretch and com_z
-[m], from two seconds of the scenes of `bench.scenes`.
+[m], from two seconds of the scenes of `bench.cloth.scenes`.
 """
 
 from __future__ import annotations

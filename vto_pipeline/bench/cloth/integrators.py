@@ -23,7 +23,7 @@ from vto_pipeline.bench.bench import Measured, Row, Value, Watch
 from vto_pipeline.bench.cloth.closed_forms import ROOTS, implicit_dumbbell
 from vto_pipeline.bench.cloth.scenes import SIDE, grid, isotropic
 from vto_pipeline.bench.timing import timed
-from vto_pipeline.cloth.collision.contacts import nothing
+from vto_pipeline.cloth.collision.contacts import empty_contacts
 from vto_pipeline.cloth.constraints.points.spring import springs
 from vto_pipeline.cloth.integrators import INTEGRATORS
 from vto_pipeline.cloth.integrators.system import ForceSystem
@@ -98,11 +98,11 @@ def measured_root(name: str, h_omega: float) -> complex:
     """Return an integrator's characteristic root on an undamped oscillator, measured on its motion."""
     method = INTEGRATORS[name](oscillator(1.0), tolerance=_EXACT)
     state = ClothState(np.array([[0.0, 0, 0], [0.6, 0, 0.8]]), np.zeros((2, 3)))
-    state = method.advance(state, nothing(2), h_omega, SETTLED)
+    state = method.advance(state, empty_contacts(2), h_omega, SETTLED)
     found = []
     for _ in range(4):
         found.append(state.positions[1, 0])
-        state = method.advance(state, nothing(2), h_omega, 1)
+        state = method.advance(state, empty_contacts(2), h_omega, 1)
     return dominant_root(np.array(found))
 
 
@@ -111,7 +111,7 @@ def _oscillator(name: str, h_omega: float) -> Measured:
     period = 2.0 * np.pi / h_omega  # in steps
     method, start = INTEGRATORS[name](oscillator(1.0)), ClothState(np.array([[0.0, 0, 0], [1, 0, 0]]), np.zeros((2, 3)))
     steps = round(10.0 * period)  # what a run of ten periods takes
-    _, timing = timed(lambda: method.advance(start, nothing(2), h_omega, steps))
+    _, timing = timed(lambda: method.advance(start, empty_contacts(2), h_omega, steps))
     exact = ROOTS[name](1j * h_omega)
     errors: dict[str, Value] = {
         "energy_ratio": abs(root) ** (2.0 * period),
@@ -124,9 +124,9 @@ def _oscillator(name: str, h_omega: float) -> Measured:
 def _dumbbell(name: str, h: float, seconds: float) -> Measured:
     model, start = dumbbell()
     method = INTEGRATORS[name](model, tolerance=_EXACT)
-    method.advance(start, nothing(2), h, 2)
+    method.advance(start, empty_contacts(2), h, 2)
     steps = round(seconds / h)
-    end, timing = timed(lambda: method.advance(start, nothing(2), h, steps))
+    end, timing = timed(lambda: method.advance(start, empty_contacts(2), h, steps))
     left = spin(model, end)[2] / spin(model, start)[2]
     if not (np.isfinite(end.positions).all() and np.abs(end.positions).max() < 1e3):
         return timing, {"spin_error": "diverged"}
@@ -171,7 +171,9 @@ class Swing:
     def reference(self) -> FloatArray:
         """Where it is in the end [m], by fourth-order steps of 20 µs, shape (N², 3)."""
         method, steps = INTEGRATORS["rk4"](self.model), round(self.seconds / 2e-5)
-        return method.advance(at_rest(self.start), nothing(len(self.start)), self.seconds / steps, steps).positions
+        return method.advance(
+            at_rest(self.start), empty_contacts(len(self.start)), self.seconds / steps, steps
+        ).positions
 
     def energy(self, state: ClothState) -> float:
         """Return the mechanical energy as a share of m g L."""
@@ -181,7 +183,7 @@ class Swing:
 
 
 def _sheet(name: str, swing: Swing, h: float) -> Measured:
-    method, free = INTEGRATORS[name](swing.model), nothing(len(swing.start))
+    method, free = INTEGRATORS[name](swing.model), empty_contacts(len(swing.start))
     start, steps = at_rest(swing.start), round(swing.seconds / h)
     end, timing = timed(lambda: method.advance(start, free, h, steps), warm=lambda: method.advance(start, free, h, 2))
     if not (np.isfinite(end.positions).all() and np.abs(end.positions).max() < 1e3):

@@ -8,7 +8,7 @@ What the error is taken against:
   little. What is left is the reference's own row. A hanging sheet has one such shape, and so has a shirt that comes to
   rest; the sheet on the ball, undamped and without bending stiffness, buckles into other folds with any change of
   step, so there only the mean height is compared.
-* Residual: the residual force as a share of a vertex's weight; see `cloth.balance`.
+* Residual: the residual force as a share of a vertex's weight; see `cloth.dynamics.residual`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from vto_pipeline.bench.cloth.iterations import iteration_rows
 from vto_pipeline.bench.cloth.scenes import Scene, hang, measures, shirt, sphere
 from vto_pipeline.bench.measures import distance_mm
 from vto_pipeline.bench.timing import Timing, clocked, timed
-from vto_pipeline.cloth.dynamics.methods import FRAME, METHODS, choose
+from vto_pipeline.cloth.dynamics.methods import FRAME, METHODS, choose_method
 from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
 from vto_pipeline.cloth.model.build import ClothState, at_rest
 from vto_pipeline.errors import ComputationError, VtoError
@@ -151,7 +151,7 @@ def _budgets(scene: Scene, method: str, factors: Sequence[float]) -> list[tuple[
 
     Methods that iterate on a step are given more steps, and more iterations.
     """
-    usual = choose(scene.model, scene.start, method, None, None)
+    usual = choose_method(scene.model, scene.start, method, None, None)
     steps = [(_whole(usual.substeps * factor), usual.sweeps) for factor in factors]
     more = [(usual.substeps, max(1, round(usual.sweeps * factor))) for factor in factors if usual.sweeps > 1]
     return sorted(dict.fromkeys(steps + more), key=lambda budget: (budget[0] * budget[1], budget))

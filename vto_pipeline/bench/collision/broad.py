@@ -14,8 +14,8 @@ from vto_pipeline.bench.collision.sheets import square
 from vto_pipeline.bench.scaling.sizes import power_law
 from vto_pipeline.bench.timing import timed
 from vto_pipeline.cloth.collision.self_collision.candidates import self_candidates
-from vto_pipeline.cloth.collision.self_collision.pieces import pieces
-from vto_pipeline.cloth.collision.self_collision.proximity_bound import reach
+from vto_pipeline.cloth.collision.self_collision.pieces import surface_components
+from vto_pipeline.cloth.collision.self_collision.proximity_bound import prove_separation
 from vto_pipeline.cloth.collision.self_collision.self_contact import SelfContact
 from vto_pipeline.cloth.collision.self_collision.surface_features import Features, features
 from vto_pipeline.model.arrays import FloatArray, IntArray
@@ -141,20 +141,20 @@ def _with_narrow_phase(step: _Step) -> Search:
     contact = SelfContact(step.features.faces, step.radius, FRICTION, force_all=True)
 
     def search() -> dict[str, int]:
-        before = contact.tally.impacts
-        contact.near(step.start, step.end, 0.0)
-        contact.safe(step.start, step.end)
-        return {"pairs": contact.tally.impacts - before}
+        before = contact.counters.impacts
+        contact.find_pairs(step.start, step.end, 0.0)
+        contact.collision_free(step.start, step.end)
+        return {"pairs": contact.counters.impacts - before}
 
     return search
 
 
 def _by_proof(step: _Step) -> Search:
     """Return the proof that no search is needed: no pairs, and whether it succeeds."""
-    cloth = pieces(step.features.faces, len(step.start))
+    cloth = surface_components(step.features.faces, len(step.start))
 
     def prove() -> dict[str, int]:
-        return {"pairs": 0, "proven": int(reach(cloth, step.start, step.end, step.radius).out)}
+        return {"pairs": 0, "proven": int(prove_separation(cloth, step.start, step.end, step.radius).out)}
 
     return prove
 

@@ -26,7 +26,7 @@ def left_out_rows(quick: bool, watch: Watch) -> Iterator[Row]:
 
 
 def hung(count: int, name: str | None = None, **settings: Value) -> ContactScene:
-    """The square of `bench.scenes.hang`, which cannot reach itself, by these settings of `simulate`."""
+    """The square of `bench.cloth.scenes.hang`, which cannot reach itself, by these settings of `simulate`."""
     plain = hang(count)
     held = tuple(int(i) for i in np.flatnonzero(plain.model.inverse_mass == 0.0))
     mesh = TriangleMesh(plain.start, plain.model.faces)
@@ -56,12 +56,12 @@ def _measure(scene: ContactScene) -> Measured:
     moment = replace(scene, seconds=1.0 / 60.0)
     compile_s = sum(clocked(partial(moment.run, force_all=every))[1] for every in (False, True))
     less, timing, found = saved(lambda every: scene.run(force_all=every), lambda ended: ended.positions)
-    tally = cast(Mapping[str, float], less.report["self_contact"])
+    counters = cast(Mapping[str, float], less.report["self_contact"])
     found |= {
-        "searches_left_out_share": 1.0 - tally["searched"] / tally["asked"],
-        "impacts_left_out_share": tally["impacts_known"] / max(tally["impacts"] + tally["impacts_known"], 1.0),
+        "searches_left_out_share": 1.0 - counters["searched"] / counters["asked"],
+        "impacts_left_out_share": counters["impacts_known"] / max(counters["impacts"] + counters["impacts_known"], 1.0),
     }
-    if tally["impacts"] + tally["impacts_known"] == 0:
+    if counters["impacts"] + counters["impacts_known"] == 0:
         _, bare = timed(partial(scene.run, self_collision=False), budget=PATIENCE)
         found["proof_share"] = 1.0 - bare.seconds / timing.seconds
     return replace(timing, compile_s=compile_s), found

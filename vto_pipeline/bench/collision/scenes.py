@@ -46,7 +46,7 @@ def scene_rows(quick: bool, watch: Watch) -> Iterator[Row]:
 
 
 def on_ball(count: int, **settings: Value) -> ContactScene:
-    """The square metre of `bench.scenes.sphere`, N x N vertices, that other programs are measured on."""
+    """The square metre of `bench.cloth.scenes.sphere`, N x N vertices, that other programs are measured on."""
     plain = sphere(count)
     mesh = TriangleMesh(plain.start, plain.model.faces)
     ball = Sphere((0.0, 0.0, 0.0), RADIUS, FRICTION)

@@ -17,7 +17,7 @@ from vto_pipeline.bench.bench import Measured, Row, Value, Watch
 from vto_pipeline.bench.physics.cantilever import MESHES
 from vto_pipeline.bench.physics.meshes import MeshKind, disc
 from vto_pipeline.bench.timing import Timing, clocked
-from vto_pipeline.cloth.collision.contacts import nothing
+from vto_pipeline.cloth.collision.contacts import empty_contacts
 from vto_pipeline.cloth.model.build import ClothModel, at_rest, build
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.model.settings import checked
@@ -234,7 +234,7 @@ def let_fall(one: Specimen) -> FloatArray:
     method = made(one.model, damping=_DAMPING)
     state = at_rest(one.start)
     while state.time < _LONGEST:
-        state = method.advance(state, nothing(len(one.start)), _STEP, 20)
+        state = method.advance(state, empty_contacts(len(one.start)), _STEP, 20)
         if np.abs(state.velocities).max() < _STILL:
             rest: FloatArray = state.positions
             return rest

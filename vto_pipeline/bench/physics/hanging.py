@@ -13,7 +13,7 @@ from vto_pipeline.bench.physics.cantilever import MESHES
 from vto_pipeline.bench.physics.closed_forms import catenary, hanging_strip, pendulum_period
 from vto_pipeline.bench.physics.meshes import MeshKind, strip
 from vto_pipeline.bench.physics.refinement import Case, refined
-from vto_pipeline.cloth.collision.contacts import nothing
+from vto_pipeline.cloth.collision.contacts import empty_contacts
 from vto_pipeline.cloth.constraints.points.spring import springs
 from vto_pipeline.cloth.integrators import INTEGRATORS
 from vto_pipeline.cloth.model.build import ClothModel, ClothState, build, model_of
@@ -122,7 +122,7 @@ def pendulum_error(name: str, steps: int) -> float:
     method = made(model)
     state, zeros, before = ClothState(points.copy(), np.zeros_like(points)), [], 0.5 * np.pi
     for step in range(1, 2 * steps):
-        state = method.advance(state, nothing(2), h, 1)
+        state = method.advance(state, empty_contacts(2), h, 1)
         angle = float(np.arctan2(state.positions[1, 0], -state.positions[1, 1]))
         if angle * before < 0.0:
             zeros.append(h * (step - angle / (angle - before)))

@@ -24,7 +24,7 @@ from vto_pipeline.bench.physics.cantilever import (
 from vto_pipeline.bench.physics.closed_forms import cantilever_modes, hanging_sheet_modes
 from vto_pipeline.bench.physics.meshes import strip
 from vto_pipeline.bench.physics.refinement import Case, refined
-from vto_pipeline.cloth.collision.contacts import nothing
+from vto_pipeline.cloth.collision.contacts import empty_contacts
 from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
 from vto_pipeline.cloth.integrators import INTEGRATORS
 from vto_pipeline.cloth.model.build import ClothModel, ClothState, build
@@ -143,7 +143,7 @@ def swing_frequency(one: ClampedStrip, steps: int) -> float:
     state = ClothState(one.flat.copy(), velocities)
     heights = [0.0]
     for _ in range(2 * steps):
-        state = method.advance(state, nothing(len(one.flat)), h, 1)
+        state = method.advance(state, empty_contacts(len(one.flat)), h, 1)
         heights.append(float(state.positions[one.tip, 1].mean()))
     t, y = h * np.arange(len(heights)), np.array(heights)
     best = min(np.linspace(0.9, 1.1, 401), key=lambda share: _left_over(share * expected, t, y))

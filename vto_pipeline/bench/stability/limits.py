@@ -16,7 +16,7 @@ from vto_pipeline.bench.cloth.closed_forms import growth_and_frequency
 from vto_pipeline.bench.stability.case import Case
 from vto_pipeline.bench.stability.frequency import highest_frequency
 from vto_pipeline.bench.stability.trial import Maker
-from vto_pipeline.cloth.collision.contacts import nothing
+from vto_pipeline.cloth.collision.contacts import empty_contacts
 from vto_pipeline.cloth.dynamics.residual import elastic_energy
 from vto_pipeline.cloth.model.build import ClothState
 from vto_pipeline.errors import ComputationError
@@ -71,7 +71,7 @@ def measured_growth(case: Case, make: Maker, z: float) -> float:
     factor = 1.0
     for step in range(1, STEPS + 1):
         try:
-            state = method.advance(state, nothing(len(mode)), z / frequency, 1)
+            state = method.advance(state, empty_contacts(len(mode)), z / frequency, 1)
         except ComputationError:
             return np.inf
         factor = sqrt(_energy(case, state) / first) if np.isfinite(state.positions).all() else np.inf

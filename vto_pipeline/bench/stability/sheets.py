@@ -11,7 +11,7 @@ from vto_pipeline.bench.cloth.scenes import grid, isotropic
 from vto_pipeline.bench.stability.case import Case
 from vto_pipeline.cloth.model.build import build
 from vto_pipeline.cloth.model.materials import Materials
-from vto_pipeline.cloth.placement.collapsed_start import untie
+from vto_pipeline.cloth.placement.collapsed_start import expand_collapsed_triangles
 from vto_pipeline.geometry.topology import edges, face_area_vectors
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.garment import RestShape
@@ -104,7 +104,7 @@ def _recovery(name: str, rest: FloatArray, faces: IntArray, start: FloatArray, *
     return Case(
         name,
         build(mesh, RestShape(rest, curved), fabric, gravity=(0.0, 0.0, 0.0), materials=materials),
-        untie(start, rest, mesh.faces),
+        expand_collapsed_triangles(start, rest, mesh.faces),
         rest,
         edges(mesh),
         h=_FRAME / 10,

@@ -19,7 +19,7 @@ from vto_pipeline.bench.stability.strands import strand_cases
 from vto_pipeline.bench.stability.trial import Maker, attempt, undisturbed
 from vto_pipeline.bench.stability.worn import worn_rows
 from vto_pipeline.bench.timing import timed
-from vto_pipeline.cloth.dynamics.methods import FRAME, METHODS, choose
+from vto_pipeline.cloth.dynamics.methods import FRAME, METHODS, choose_method
 
 DEFAULT = "default"
 """The method that a simulation chooses by the scene, with the steps and iterations it chooses."""
@@ -59,7 +59,7 @@ def rows(quick: bool, watch: Watch) -> Iterator[Row]:
 
 def _default_cell(case: Case, patience: float, watch: Watch) -> Row:
     """What is chosen by the scene; of its own step only where the step is not what is tried."""
-    choice = choose(case.model, case.start, None, None, None)
+    choice = choose_method(case.model, case.start, None, None, None)
     if not case.step_tried:
         substeps = ceil(choice.substeps * case.h * case.substeps / FRAME - 1e-9)
         case = replace(case, h=case.h * case.substeps / substeps, substeps=substeps)

@@ -12,7 +12,7 @@ import numpy as np
 from vto_pipeline.bench.bench import Measured, Value
 from vto_pipeline.bench.stability.case import Case
 from vto_pipeline.bench.timing import Timing
-from vto_pipeline.cloth.collision.contacts import nothing
+from vto_pipeline.cloth.collision.contacts import empty_contacts
 from vto_pipeline.cloth.dynamics.methods import Method
 from vto_pipeline.cloth.dynamics.residual import elastic_energy
 from vto_pipeline.cloth.model.build import ClothState, at_rest
@@ -98,7 +98,7 @@ class _Run:
 
     def through(self, method: Method, deadline: float) -> str:
         """Go through all frames, and return the verdict."""
-        case, contacts = self._case, nothing(len(self._case.start))
+        case, contacts = self._case, empty_contacts(len(self._case.start))
         while self._frames < case.frames and not self._stays_recovered():
             state = method.advance(self._state, contacts, case.h, case.substeps)
             self._frames += 1
@@ -175,7 +175,7 @@ def _warmed(case: Case, make: Maker) -> float:
     """Return how long the first step of an instance takes, which compiles what the run needs [s]."""
     began = time.perf_counter()
     with suppress(ComputationError, ArithmeticError, RuntimeError, ValueError):  # the run itself will show it
-        _made(case, make).advance(at_rest(case.rest), nothing(len(case.rest)), case.h, 1)
+        _made(case, make).advance(at_rest(case.rest), empty_contacts(len(case.rest)), case.h, 1)
     return time.perf_counter() - began
 
 

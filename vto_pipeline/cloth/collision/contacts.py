@@ -14,7 +14,7 @@ from vto_pipeline.model.arrays import FloatArray
 class Contacts(NamedTuple):
     """For each surface S and cloth vertex V, a plane the vertex must stay in front of.
 
-    All vary linearly from the start (index 0) to the end (index 1) of the round they were made for.
+    All vary linearly from the start (index 0) to the end (index 1) of the span they were made for.
 
     Args:
         active: Whether there is a plane, shape (S, V).
@@ -32,7 +32,7 @@ class Contacts(NamedTuple):
     friction: FloatArray
 
 
-class Round(NamedTuple):
+class ContactSpan(NamedTuple):
     """A short span of time for which contacts are found once.
 
     Args:
@@ -40,7 +40,7 @@ class Round(NamedTuple):
         travel: No vertex moves farther in it [m].
         skin: Distance to keep from surfaces, of each vertex [m], shape (V,).
         recovery: Speed at which cloth inside a surface is led out [m/s]; infinite where contacts give way.
-        move: Where each vertex is heading in the round, if known [m], shape (V, 3); a plane is then chosen that is not
+        move: Where each vertex is heading in the span, if known [m], shape (V, 3); a plane is then chosen that is not
             in its way unless the surface is.
     """
 
@@ -55,28 +55,28 @@ class Round(NamedTuple):
 class Collider(Protocol):
     """A collider for cloth."""
 
-    def contacts(self, positions: FloatArray, span: Round) -> Contacts:
+    def contacts(self, positions: FloatArray, span: ContactSpan) -> Contacts:
         """Return the contacts of this surface alone with vertices at these positions [m], shape (V, 3)."""
 
 
-def gather(colliders: Sequence[Collider], positions: FloatArray, span: Round) -> Contacts:
+def gather_contacts(colliders: Sequence[Collider], positions: FloatArray, span: ContactSpan) -> Contacts:
     """Return the contacts with all colliders."""
     if not colliders:
-        return nothing(len(positions))
+        return empty_contacts(len(positions))
     found = [collider.contacts(positions, span) for collider in colliders]
     if len(found) == 1:
         return found[0]
     return Contacts(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
 
-def let_slide(found: Contacts, loose: NDArray[np.bool_]) -> Contacts:
+def without_friction(found: Contacts, loose: NDArray[np.bool_]) -> Contacts:
     """Return the contacts with those of some vertices, shape (V,), without friction, each surface twice for that."""
     point, normal, offset = (np.concatenate([part, part]) for part in (found.point, found.normal, found.offset))
     active = np.concatenate([found.active & ~loose, found.active & loose])
     return Contacts(active, point, normal, offset, np.concatenate([found.friction, np.zeros_like(found.friction)]))
 
 
-def nothing(count: int) -> Contacts:
+def empty_contacts(count: int) -> Contacts:
     """Return no contact for this many vertices."""
     return Contacts(
         np.empty((0, count), np.bool_),
@@ -87,8 +87,13 @@ def nothing(count: int) -> Contacts:
     )
 
 
-def ride(
-    distance: FloatArray, point: FloatArray, normal: FloatArray, near: NDArray[np.bool_], friction: float, span: Round
+def surface_contacts(
+    distance: FloatArray,
+    point: FloatArray,
+    normal: FloatArray,
+    near: NDArray[np.bool_],
+    friction: float,
+    span: ContactSpan,
 ) -> Contacts:
     """Return contacts of one surface.
 
@@ -97,7 +102,7 @@ def ride(
         point, normal: At begin and end, shape (V, 2, 3).
         near: Which vertices have a plane, shape (V,).
         friction: Coefficient.
-        span: The round.
+        span: For which they hold.
     """
     offset = np.empty((len(distance), 2))
     offset[:] = span.skin[:, None]

@@ -17,7 +17,7 @@ And where the general way to the stiffness, ∇Cᵀ α⁻¹ ∇C + geometric, is
 
 And for kinds that remember, whose data have a `slider`, shape (N, ...):
 
-* `slip(i, x, data)`: at the end of a step, let the slider of stencil i give way; see `cloth.losses`.
+* `slip(i, x, data)`: at the end of a step, let the slider of stencil i give way; see `cloth.model.internal_friction`.
 
 All are compiled with `forceinline`, as the formulas in `numerics` are: a call hands over the descriptors of all arrays,
 some eighty words, which costs more than the arithmetic (bending: 50 ns a hinge in place of 130).

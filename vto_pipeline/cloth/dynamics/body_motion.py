@@ -15,19 +15,19 @@ from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
-_WINDOW = 0.05  # s of cloth time between changes of pace
-_SLOWEST = 0.125  # of the full pace
-_BRAKE, _PICK_UP = 0.5, 1.25  # of the pace, where contact is deep and where it is not
-_SHALLOW = 0.25  # of what counts as deep: between the two, the pace is kept
-_BESIDE = 0.15  # m: the body this near the cloth, where it begins or ends, sets the pace
+_WINDOW = 0.05  # s of cloth time between changes of speed
+_SLOWEST = 0.125  # of full speed
+_BRAKE, _PICK_UP = 0.5, 1.25  # of the speed, where contact is deep and where it is not
+_SHALLOW = 0.25  # of what counts as deep: between the two, the speed is kept
+_BESIDE = 0.15  # m: the body this near the cloth, where it begins or ends, sets the speed
 
 
-class PacedBody(BodyCollider):
+class VariableSpeedBody(BodyCollider):
     """A moving body whose motion can be slowed and hurried while it goes on.
 
     Args:
         body: The keyframes.
-        seconds: How long the motion takes at full pace [s].
+        seconds: How long the motion takes at full speed [s].
         friction: Coulomb coefficient.
         job: For what was repaired and left out.
     """
@@ -39,35 +39,35 @@ class PacedBody(BodyCollider):
 
     @property
     def ends(self) -> float:
-        """When the motion ends at the present pace [s]."""
+        """When the motion ends at the present speed [s]."""
         return self._seconds
 
     def at(self, time: float) -> FloatArray:
-        """Return the body's vertices at a time [s] not before the last change of pace, shape (V, 3) [m]."""
-        return super().at(self._share(time) * self._seconds)
+        """Return the body's vertices at a time [s] not before the last change of speed, shape (V, 3) [m]."""
+        return super().at(self._progress(time) * self._seconds)
 
-    def set_pace(self, time: float, pace: float) -> None:
-        """Go on from this time [s], before the end, at a share of the full pace."""
-        self._since, self._gone = time, self._share(time)
-        self._seconds = time + (1.0 - self._gone) * self._full / pace
+    def set_speed(self, time: float, speed: float) -> None:
+        """Go on from this time [s], before the end, at a share of full speed."""
+        self._since, self._gone = time, self._progress(time)
+        self._seconds = time + (1.0 - self._gone) * self._full / speed
 
     def depth(self, time: float, positions: FloatArray) -> float:
         """Return how deep in the body at a time [s] the deepest vertex is that was inside when contacts were found."""
-        inside = self.holds(len(positions))
+        inside = self.contained_vertices(len(positions))
         if not inside.any():
             return 0.0
         surface = SurfaceDistance(TriangleMesh(self.at(time), self.faces))
         return max(0.0, -float(surface.signed(positions[inside]).distance.min()))
 
-    def _share(self, time: float) -> float:
+    def _progress(self, time: float) -> float:
         """Return what share of the motion is done at a time [s]."""
         if time >= self._seconds:
             return 1.0
         return self._gone + (1.0 - self._gone) * (time - self._since) / (self._seconds - self._since)
 
 
-def ride(
-    stepper: Stepper, state: ClothState, body: PacedBody, deep: float, watch: Callable[[float], None]
+def run_body_motion(
+    stepper: Stepper, state: ClothState, body: VariableSpeedBody, deep: float, watch: Callable[[float], None]
 ) -> ClothState:
     """Return the cloth when the body's motion is over; where cloth is deep in the body, that waits for it.
 
@@ -78,19 +78,19 @@ def ride(
         deep: Cloth deeper in the body than this is behind [m].
         watch: Receives the share of the motion that is done.
     """
-    pace = 1.0
+    speed = 1.0
     while state.time < body.ends - 1e-9:
         state = stepper.run(state, min(_WINDOW, body.ends - state.time))
         watch(state.time / body.ends)
         depth = body.depth(state.time, state.positions)
         change = _BRAKE if depth > deep else _PICK_UP if depth < _SHALLOW * deep else 1.0
-        pace = float(np.clip(pace * change, _SLOWEST, 1.0))
+        speed = float(np.clip(speed * change, _SLOWEST, 1.0))
         if state.time < body.ends - 1e-9:
-            body.set_pace(state.time, pace)
+            body.set_speed(state.time, speed)
     return state
 
 
-def covered_way(body: MovingBody, cloth: TriangleMesh) -> float:
+def body_travel(body: MovingBody, cloth: TriangleMesh) -> float:
     """Return how far the fastest point of the body near the cloth moves [m].
 
     Args:

@@ -50,7 +50,7 @@ _IMPLICIT = (2, 1)
 
 
 @dataclass(frozen=True)
-class Choice:
+class MethodChoice:
     """A method and its budget.
 
     Args:
@@ -66,14 +66,14 @@ class Choice:
     reason: str
 
 
-def choose(
+def choose_method(
     model: ClothModel,
     positions: FloatArray,
     method: str | None,
     substeps: float | None,
     sweeps: int | None,
     frequency: float = 0.0,
-) -> Choice:
+) -> MethodChoice:
     """Return the method as chosen by the user, and the rest by the scene.
 
     Args:
@@ -92,7 +92,7 @@ def choose(
     else:
         raise ConfigError(f"solver is {method!r}; allowed: {', '.join(METHODS)}")
     usual = _usual(method, model, positions, frequency)
-    return Choice(method, substeps or usual[0], sweeps or usual[1], reason)
+    return MethodChoice(method, substeps or usual[0], sweeps or usual[1], reason)
 
 
 def _by_scene(model: ClothModel, positions: FloatArray) -> tuple[str, str]:

@@ -17,7 +17,7 @@ _SWEEPS = 200  # at most, to find what contacts bear
 _SETTLED = 1e-4  # of the forces: a sweep that changes less is the last
 
 
-def out_of_balance(model: ClothModel, positions: FloatArray, contacts: ActiveSet) -> float:
+def relative_residual(model: ClothModel, positions: FloatArray, contacts: ActiveSet) -> float:
     """Return the residual force, rms over the free vertices, as a share of a vertex's weight.
 
     Internal forces and gravity, less the most that contacts can bear: forces inside their friction cones, with bodies
@@ -33,7 +33,7 @@ def out_of_balance(model: ClothModel, positions: FloatArray, contacts: ActiveSet
     free = model.inverse_mass > 0.0
     if not free.any():
         return 0.0
-    _bear(forces, positions, contacts, np.where(free, model.inverse_mass, 0.0))
+    _remove_contact_reactions(forces, positions, contacts, np.where(free, model.inverse_mass, 0.0))
     share = np.linalg.norm(forces[free], axis=1) / (model.mass[free] * GRAVITY)
     return float(np.sqrt(np.mean(share**2)))
 
@@ -44,7 +44,7 @@ def elastic_energy(model: ClothModel, positions: FloatArray) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _bear(forces, positions, contacts, inverse_mass):  # type: ignore[no-untyped-def]
+def _remove_contact_reactions(forces, positions, contacts, inverse_mass):  # type: ignore[no-untyped-def]
     """Take from the forces what contacts can bear, in place: projected Gauss-Seidel on Σ |force / mass|²."""
     borne = np.zeros((len(contacts.key), 3))
     total = 0.0
@@ -53,7 +53,9 @@ def _bear(forces, positions, contacts, inverse_mass):  # type: ignore[no-untyped
     for c in range(len(contacts.key)):
         n = load(contacts.normal, c)
         if contacts.force[c] > 0.0 and _touches(contacts, c, positions):
-            known = _in_cone(axpy(contacts.force[c], n, load(contacts.rub, c)), n, contacts.friction[c])
+            known = _project_to_friction_cone(
+                axpy(contacts.force[c], n, load(contacts.friction_force, c)), n, contacts.friction[c]
+            )
             store(borne, c, known)
             _push(forces, contacts, c, known, inverse_mass)
     for _ in range(_SWEEPS):
@@ -71,7 +73,7 @@ def _bear(forces, positions, contacts, inverse_mass):  # type: ignore[no-untyped
             if give == 0.0:
                 continue
             before = load(borne, c)
-            after = _in_cone(axpy(-1.0 / give, pull, before), n, contacts.friction[c])
+            after = _project_to_friction_cone(axpy(-1.0 / give, pull, before), n, contacts.friction[c])
             store(borne, c, after)
             move = sub(after, before)
             changed += weight * norm(move)
@@ -96,7 +98,7 @@ def _push(forces, contacts, c, force, inverse_mass):  # type: ignore[no-untyped-
 
 
 @njit(cache=True, error_model="numpy")
-def _in_cone(force, normal, friction):  # type: ignore[no-untyped-def]
+def _project_to_friction_cone(force, normal, friction):  # type: ignore[no-untyped-def]
     """Return the push along the normal and the friction that go with it, of a force that is asked for."""
     push = dot(force, normal)
     if push <= 0.0:

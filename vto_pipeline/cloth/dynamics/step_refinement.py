@@ -16,7 +16,7 @@ _LOOK = 0.1  # s of cloth time between looks at the clock
 
 
 @dataclass
-class Refined:
+class RefinedTrajectory:
     """A motion and how well it is known.
 
     Args:
@@ -33,7 +33,7 @@ class Refined:
     trace: list[TraceRow] = field(default_factory=list)
 
 
-def refine(
+def refine_time_step(
     make: Callable[[float | None], Stepper],
     start: ClothState,
     seconds: float,
@@ -41,7 +41,7 @@ def refine(
     error: float,
     finest: int,
     deadline: float = np.inf,
-) -> Refined:
+) -> RefinedTrajectory:
     """Run a motion with steps halved until its error is known to be small enough, or time is up.
 
     Args:
@@ -54,7 +54,7 @@ def refine(
     """
     began = time.perf_counter()
     stepper = make(None)
-    result = Refined(_run(stepper, start, seconds, deadline), stepper)
+    result = RefinedTrajectory(_run(stepper, start, seconds, deadline), stepper)
     while True:
         spent = time.perf_counter() - began
         rms = float(1e3 * result.error)

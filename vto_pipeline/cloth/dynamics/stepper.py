@@ -1,4 +1,4 @@
-"""Time stepping among colliders, in rounds short enough for the contacts found at their start."""
+"""Time stepping among colliders, in spans short enough for the contacts found at their start."""
 
 from __future__ import annotations
 
@@ -12,14 +12,20 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from vto_pipeline.cloth.collision.body.contacts import BodyCollider
-from vto_pipeline.cloth.collision.contacts import Collider, Round, gather, let_slide, nothing
+from vto_pipeline.cloth.collision.contacts import (
+    Collider,
+    ContactSpan,
+    empty_contacts,
+    gather_contacts,
+    without_friction,
+)
 from vto_pipeline.cloth.collision.response.active_set import ActiveSet, active_set, no_contacts
 from vto_pipeline.cloth.collision.response.penalty import FREQUENCY, Penalty
-from vto_pipeline.cloth.collision.response.projected_gauss_seidel import hold_apart
+from vto_pipeline.cloth.collision.response.projected_gauss_seidel import separate_pairs
 from vto_pipeline.cloth.collision.self_collision.pairs import no_pairs
 from vto_pipeline.cloth.collision.self_collision.self_contact import SelfContact
-from vto_pipeline.cloth.dynamics.methods import FRAME, METHODS, Choice, Method, choose
-from vto_pipeline.cloth.dynamics.residual import out_of_balance
+from vto_pipeline.cloth.dynamics.methods import FRAME, METHODS, Method, MethodChoice, choose_method
+from vto_pipeline.cloth.dynamics.residual import relative_residual
 from vto_pipeline.cloth.integrators import INTEGRATORS
 from vto_pipeline.cloth.integrators.integrator import Integrator
 from vto_pipeline.cloth.model.build import ClothModel, ClothState
@@ -87,11 +93,11 @@ class Stepper:
         loose: Vertices that slide on surfaces without friction, shape (V,); none, but may be changed between runs.
         substeps: Steps per 1/60 s; after `prepare`, and may be changed between runs.
         steps: Steps taken so far.
-        rounds: Times contacts were found.
+        contact_spans: Times contacts were found.
         self_contact: What keeps the cloth from itself, None if nothing does.
     """
 
-    choice: Choice
+    choice: MethodChoice
     substeps: float
 
     def __init__(
@@ -110,7 +116,7 @@ class Stepper:
         self.skin = skin
         self.loose = np.zeros(len(skin), np.bool_)
         self.steps = 0
-        self.rounds = 0
+        self.contact_spans = 0
         self._model = model
         self._colliders = colliders
         self._config = config
@@ -118,7 +124,7 @@ class Stepper:
         self._max_speed = max_speed
         self._method: Method | None = None
         self._pins = pins
-        self._contacts = nothing(len(skin))
+        self._contacts = empty_contacts(len(skin))
         self.self_contact: SelfContact | None = None
         if config.self_collision and len(model.faces) > 0:
             self.self_contact = SelfContact(
@@ -141,7 +147,7 @@ class Stepper:
             return
         config = self._config
         besides = FREQUENCY if config.contact_forces else 0.0
-        self.choice = choose(self._model, positions, config.solver, config.substeps, config.sweeps, besides)
+        self.choice = choose_method(self._model, positions, config.solver, config.substeps, config.sweeps, besides)
         self.substeps = self.choice.substeps
         self._method = METHODS[self.choice.method](
             self._model, sweeps=self.choice.sweeps, damping=self._damping, max_speed=self._max_speed
@@ -169,38 +175,38 @@ class Stepper:
         if abs(left * h - seconds) > _WHOLE * h:  # not a whole number of steps: they are a little shorter
             h = seconds / left
         while left > 0:
-            count = min(left, self._round_length(state, h))
-            state = self._round(state, h, count)
+            count = min(left, self._steps_per_span(state, h))
+            state = self._advance_span(state, h, count)
             left -= count
         return state
 
     def residual(self, state: ClothState) -> float:
-        """Return the residual force; see `balance.out_of_balance`."""
+        """Return the residual force; see `residual.relative_residual`."""
         x, still = state.positions, np.zeros_like(state.positions)
-        pairs = no_pairs() if self.self_contact is None else self.self_contact.near(x, x, FRAME)
+        pairs = no_pairs() if self.self_contact is None else self.self_contact.find_pairs(x, x, FRAME)
         mass = self._model.inverse_mass
-        touched = active_set(self._contacts, pairs, 0.0, 1.0, mass, x, still, still, self.known)
-        return out_of_balance(self._model, x, touched)
+        touched = active_set(self._contacts, pairs, 0.0, 1.0, mass, x, still, still, self.contact_memory)
+        return relative_residual(self._model, x, touched)
 
     @property
-    def known(self) -> ActiveSet:
+    def contact_memory(self) -> ActiveSet:
         """What is known of the contacts from the last step, as far as the method keeps it; may be set back to it."""
         return self._method.active if isinstance(self._method, Newton) else no_contacts(0)
 
-    @known.setter
-    def known(self, before: ActiveSet) -> None:
+    @contact_memory.setter
+    def contact_memory(self, before: ActiveSet) -> None:
         if isinstance(self._method, Newton):
             self._method.active = before
 
     @property
-    def rests_exactly(self) -> bool:
+    def has_exact_rest(self) -> bool:
         """Whether the state of rest does not depend on the length of steps; after `prepare`."""
-        return getattr(self._method, "rests_exactly", True)
+        return getattr(self._method, "has_exact_rest", True)
 
     @property
-    def bearing(self) -> int:
+    def pushing_contacts(self) -> int:
         """How many contacts pushed in the last step, as far as the method counts them."""
-        return getattr(self._method, "bearing", 0)
+        return getattr(self._method, "pushing_contacts", 0)
 
     @property
     def step(self) -> float:
@@ -208,24 +214,24 @@ class Stepper:
         return FRAME / self.substeps
 
     @property
-    def polishes(self) -> bool:
+    def can_use_exact_stiffness(self) -> bool:
         """Whether the method can use the exact stiffness; after `prepare`."""
-        return isinstance(self._method, Newton) and self._method.knows_exactly
+        return isinstance(self._method, Newton) and self._method.can_use_exact_stiffness
 
-    def polish(self, on: bool) -> None:
+    def use_exact_stiffness(self, on: bool) -> None:
         """Let steps use the exact stiffness from now on, or no longer; after `prepare`."""
         if isinstance(self._method, Newton):
             self._method.exact = on
 
     @property
-    def definite(self) -> bool:
+    def was_positive_definite(self) -> bool:
         """Whether the last step did throughout: at no point was the cloth about to buckle."""
         return isinstance(self._method, Newton) and self._method.definite
 
     def _speed(self, state: ClothState) -> float:
         return float(np.abs(state.velocities).max() * np.sqrt(3.0))  # a bound, which does not overflow
 
-    def _round_length(self, state: ClothState, h: float) -> int:
+    def _steps_per_span(self, state: ClothState, h: float) -> int:
         """Return how many steps no vertex travels farther than the contacts are good for."""
         most = 1 if self._pins is not None else max(1, round(self.substeps))
         if not isinstance(self._method, Newton) and self._is_near_itself(state, h * most):
@@ -235,24 +241,24 @@ class Stepper:
         speed = self._speed(state) + float(np.linalg.norm(self._model.gravity)) * h * most
         return int(np.clip(self._config.travel_mm * 1e-3 / max(speed * h, 1e-12), 1, most))
 
-    def _round(self, state: ClothState, h: float, count: int) -> ClothState:
+    def _advance_span(self, state: ClothState, h: float, count: int) -> ClothState:
         travel = max(self._config.travel_mm * 1e-3, 2.0 * self._speed(state) * h)
         move = count * h * state.velocities
         recovery = np.inf if self._config.contact_forces else self._config.recovery_speed
-        span = Round(state.time, state.time + count * h, travel, self.skin, recovery, move)
-        self._contacts = gather(self._colliders, state.positions, span)
+        span = ContactSpan(state.time, state.time + count * h, travel, self.skin, recovery, move)
+        self._contacts = gather_contacts(self._colliders, state.positions, span)
         if self.loose.any():
-            self._contacts = let_slide(self._contacts, self.loose)
+            self._contacts = without_friction(self._contacts, self.loose)
         assert self._method is not None  # `run` prepared it
         before = state
         if self._pins is not None:
-            state = self._led(state, self._pins, count * h)
+            state = self._with_pins_moved(state, self._pins, count * h)
         after = self._method.advance(state, self._contacts, h, count)
         self.steps += count
-        self.rounds += 1
+        self.contact_spans += 1
         self._refuse_divergence(after)
         if self.self_contact is not None and not isinstance(self._method, Newton):
-            after = self._apart(before, after, h * count)
+            after = self._resolve_self_contacts(before, after, h * count)
         return after
 
     def _refuse_divergence(self, state: ClothState) -> None:
@@ -266,7 +272,7 @@ class Stepper:
                 hint="more substeps, or a softer fabric",
             )
 
-    def _led(self, state: ClothState, pins: Pins, seconds: float) -> ClothState:
+    def _with_pins_moved(self, state: ClothState, pins: Pins, seconds: float) -> ClothState:
         """Return the state with the pins under way to where their path has them after this many seconds."""
         positions, velocities = state.positions.copy(), state.velocities.copy()
         there = pins.path(state.time + seconds)
@@ -279,20 +285,20 @@ class Stepper:
         """Return whether, by its velocities, the cloth comes near itself in this many seconds."""
         if self.self_contact is None:
             return False
-        self.self_contact.at(state.time, state.time + seconds)
+        self.self_contact.set_time_span(state.time, state.time + seconds)
         drift = seconds * state.velocities
         end = state.positions + drift + 0.5 * seconds**2 * self._model.gravity
-        return len(self.self_contact.near(state.positions, end, seconds, drift).key) > 0
+        return len(self.self_contact.find_pairs(state.positions, end, seconds, drift).key) > 0
 
-    def _apart(self, state: ClothState, after: ClothState, seconds: float) -> ClothState:
+    def _resolve_self_contacts(self, state: ClothState, after: ClothState, seconds: float) -> ClothState:
         """Resolve self-contacts after a step of a method that ignores them."""
         assert self.self_contact is not None
         positions = after.positions.copy()
-        self.self_contact.at(state.time, state.time + seconds)
-        pairs = self.self_contact.near(state.positions, positions, seconds)
+        self.self_contact.set_time_span(state.time, state.time + seconds)
+        pairs = self.self_contact.find_pairs(state.positions, positions, seconds)
         if self._config.contact_forces:  # a spring bears only so much
             pairs = pairs._replace(gap=_HARD * pairs.gap)
-        hold_apart(pairs, self._model.inverse_mass, state.positions, positions)
-        positions, _ = self.self_contact.safe(state.positions, positions)
+        separate_pairs(pairs, self._model.inverse_mass, state.positions, positions)
+        positions, _ = self.self_contact.collision_free(state.positions, positions)
         velocities = after.velocities + (positions - after.positions) / seconds
         return replace(after, positions=positions, velocities=velocities)

@@ -33,7 +33,7 @@ def warm_up() -> float:
     config = StepConfig.model_validate({"substeps": 1, "sweeps": 2})
     stepper = Stepper(model, [collider], np.full(len(cloth.vertices), 1e-3), config)
     state = stepper.run(at_rest(cloth.vertices), FRAME)
-    stepper.polish(True)
+    stepper.use_exact_stiffness(True)
     stepper.residual(stepper.run(state, FRAME))
     intersecting_faces(cloth, below)
     return time.perf_counter() - began

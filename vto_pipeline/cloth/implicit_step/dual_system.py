@@ -4,7 +4,7 @@ From (x, λ), a change Δλ moves the vertices by Δx = W ∇Cᵀ Δλ, and solv
 A = (1 + γ) ∇C W ∇Cᵀ + α̃ and r = -(C + α̃ λ + γ ∇C (x - xⁿ)); Macklin et al. 2016, eq. 15 to 18.
 
 What is left out there is left out here: ∇C turns while λ grows, so that M (x - x̃) and ∇C(x)ᵀ λ part by the order of
-h² |a| times how far the threads turn in the step. Small steps make that small; `turning` puts it back.
+h² |a| times how far the threads turn in the step. Small steps make that small; `geometric_stiffness` puts it back.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _CHUNK = 128  # stencils a thread takes at a time
 _NOTHING = 1e-13  # a pivot smaller than this share of what it was is rounding
 
 
-class Rows(NamedTuple):
+class LinearisedConstraints(NamedTuple):
     """The constraints of one kind, linearised. Arrays are overwritten by each linearisation.
 
     Args:
@@ -59,7 +59,7 @@ class Linearised:
     """
 
     def __init__(self, model: ClothModel) -> None:
-        self.kinds = tuple(_rows(data) for data in model.constraints)
+        self.kinds = tuple(_empty_constraints(data) for data in model.constraints)
         self._model = model
         self._pull = np.zeros((len(model.mass), 3))
 
@@ -115,10 +115,10 @@ def inner(one: Sequence[FloatArray], other: Sequence[FloatArray]) -> float:
     return sum(float(np.vdot(a, b)) for a, b in zip(one, other, strict=True))
 
 
-def _rows(data: Any) -> Rows:
+def _empty_constraints(data: Any) -> LinearisedConstraints:
     count, corners = data.vertices.shape
     rows = kind_of(data).rows
-    return Rows(
+    return LinearisedConstraints(
         data.vertices,
         data.starts,
         data.colours,

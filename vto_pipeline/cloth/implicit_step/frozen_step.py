@@ -3,8 +3,8 @@
 Backward Euler: M (x - x̃) = ∇Cᵀ λ, C + α̃ λ = 0, with x in front of planes that do not rub. The same point is the
 minimum of |x - x̃|²_M / 2 + h² E(x), so it needs no multipliers to be recognised.
 
-XPBD drops how gradients turn in the step (see `turning`), so it ends beside the solution: 0.2 µm at h = 1/1200 s on a
-sheet that falls freely, 20 µm on one that hits a ball. The others end on it at any h.
+XPBD drops how gradients turn in the step (see `geometric_stiffness`), so it ends beside the solution: 0.2 µm at h =
+1/1200 s on a sheet that falls freely, 20 µm on one that hits a ball. The others end on it at any h.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from vto_pipeline.cloth.collision.contacts import Collider, Contacts, Round, gather
-from vto_pipeline.cloth.collision.response.step_response import respond
+from vto_pipeline.cloth.collision.contacts import Collider, Contacts, ContactSpan, gather_contacts
+from vto_pipeline.cloth.collision.response.step_response import resolve_plane_contacts
 from vto_pipeline.cloth.constraints.sweep import add_damping_forces, add_forces
 from vto_pipeline.cloth.implicit_step.dual_system import Linearised, inner
 from vto_pipeline.cloth.model.build import ClothModel, ClothState
@@ -60,11 +60,13 @@ class FrozenStep:
         moved = x + self.model.inverse_mass[:, None] * (pull + self.h**2 * forces)
         unused = np.empty_like(x)
         w = self.model.inverse_mass
-        respond(moved, unused, self.state.positions, w, self.contacts, 0.0, 1.0, self.h, np.inf, False, False)
+        resolve_plane_contacts(
+            moved, unused, self.state.positions, w, self.contacts, 0.0, 1.0, self.h, np.inf, False, False
+        )
         return rms(moved - x, self.model)
 
     def residuals(self, x: FloatArray, multipliers: Sequence[FloatArray]) -> tuple[float, float]:
-        """Return `Reached.constraint` and `Reached.energy` [m] of positions [m], shape (V, 3), and λ."""
+        """Return the `constraint` and `energy` of `IterationResiduals` [m] at positions [m], shape (V, 3), and λ."""
         linear = Linearised(self.model)
         for one, given in zip(linear.multipliers, multipliers, strict=True):
             one[:] = given
@@ -76,7 +78,7 @@ class FrozenStep:
         return float(np.sqrt(inner(residual, along) / mass)), float(np.sqrt(inner(along, product) / mass))
 
 
-class Method(Protocol):
+class IterativeMethod(Protocol):
     """What moves a cloth on; see `methods.METHODS`."""
 
     def __init__(self, model: ClothModel, *, sweeps: int) -> None: ...
@@ -86,7 +88,7 @@ class Method(Protocol):
 
 
 @runtime_checkable
-class HasMultipliers(Protocol):
+class DualMethod(Protocol):
     """A method that works on λ."""
 
     @property
@@ -95,7 +97,7 @@ class HasMultipliers(Protocol):
 
 
 @dataclass(frozen=True)
-class Reached:
+class IterationResiduals:
     """What this many iterations of a method reached.
 
     Args:
@@ -130,14 +132,14 @@ def frozen_step(
     """
     speed = float(np.linalg.norm(state.velocities, axis=1).max())
     travel = 2.0 * (speed + h * float(np.linalg.norm(model.gravity))) * h
-    span = Round(state.time, state.time + h, travel, np.full(len(state.positions), skin), _RECOVERY)
-    contacts = gather(list(colliders), state.positions, span)
+    span = ContactSpan(state.time, state.time + h, travel, np.full(len(state.positions), skin), _RECOVERY)
+    contacts = gather_contacts(list(colliders), state.positions, span)
     return FrozenStep(model, state, contacts._replace(friction=np.zeros_like(contacts.friction)), h)
 
 
 def residual_history(
-    method: type[Method], step: FrozenStep, iterations: Sequence[int], solution: FloatArray
-) -> Iterator[Reached]:
+    method: type[IterativeMethod], step: FrozenStep, iterations: Sequence[int], solution: FloatArray
+) -> Iterator[IterationResiduals]:
     """Yield what a method reaches with this many iterations, each run from the start of the step.
 
     Args:
@@ -152,8 +154,8 @@ def residual_history(
         began = time.perf_counter()
         x = solver.advance(step.state, step.contacts, step.h, 1).positions
         seconds = time.perf_counter() - began
-        residuals = step.residuals(x, solver.multipliers) if isinstance(solver, HasMultipliers) else (None, None)
-        yield Reached(count, seconds, rms(x - solution, step.model), step.imbalance(x), *residuals)
+        residuals = step.residuals(x, solver.multipliers) if isinstance(solver, DualMethod) else (None, None)
+        yield IterationResiduals(count, seconds, rms(x - solution, step.model), step.imbalance(x), *residuals)
 
 
 def rms(change: FloatArray, model: ClothModel) -> float:

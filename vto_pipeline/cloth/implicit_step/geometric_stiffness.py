@@ -19,12 +19,14 @@ from vto_pipeline.model.arrays import FloatArray
 _EVERY = 32  # sweeps; looking costs about two
 
 
-def is_due(sweep: int, sweeps: int) -> bool:
+def is_drift_removal_due(sweep: int, sweeps: int) -> bool:
     """Return whether to put back after this sweep, counted from 1, of this many in a step."""
     return sweep % _EVERY == 0 and sweep < sweeps
 
 
-def put_back(linear: Linearised, model: ClothModel, step: ImplicitStep, x: FloatArray, pressed: FloatArray) -> None:
+def remove_primal_drift(
+    linear: Linearised, model: ClothModel, step: ImplicitStep, x: FloatArray, pressed: FloatArray
+) -> None:
     """Move x [m], shape (V, 3), towards x̃ + W (∇C(x)ᵀ λ + p), in place.
 
     As long as the multipliers are farther off, |missing|_M < (rᵀ D⁻¹ r)^½, nothing is done: λ is still on its path, and

@@ -9,13 +9,13 @@ from math import exp
 import numpy as np
 
 from vto_pipeline.cloth.collision.contacts import Contacts
-from vto_pipeline.cloth.collision.response.step_response import respond
+from vto_pipeline.cloth.collision.response.step_response import resolve_plane_contacts
 from vto_pipeline.cloth.constraints.rigid import refuse_rigid
 from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM
 from vto_pipeline.cloth.implicit_step.dual_system import Linearised
 from vto_pipeline.cloth.implicit_step.prediction import predict
 from vto_pipeline.cloth.model.build import ClothModel, ClothState
-from vto_pipeline.cloth.model.internal_friction import own, recall, remember, slip
+from vto_pipeline.cloth.model.internal_friction import copy_sliders, restore_sliders, slip, with_own_sliders
 from vto_pipeline.model.arrays import FloatArray
 
 
@@ -64,10 +64,10 @@ class Iterated(ABC):
     """
 
     takes_rigid = True
-    rests_exactly = False
+    has_exact_rest = False
 
     def __init__(self, model: ClothModel, *, sweeps: int = 1, damping: float = 0.0, max_speed: float = np.inf) -> None:
-        self.model = own(model)
+        self.model = with_own_sliders(model)
         self.sweeps = sweeps
         self._damping = damping
         self._max_speed = max_speed
@@ -87,7 +87,7 @@ class Iterated(ABC):
         if not self._checked:
             refuse_rigid(model.constraints, state.positions, type(self).__name__)
             self._checked = True
-        recall(model, state.sliders)
+        restore_sliders(model, state.sliders)
         x, v, start = state.positions.copy(), state.velocities.copy(), np.empty_like(state.positions)
         fall = (h * model.gravity[0], h * model.gravity[1], h * model.gravity[2])
         for number in range(substeps):
@@ -95,9 +95,11 @@ class Iterated(ABC):
             predict(x, v, start, model.inverse_mass, fall, h, exp(-self._damping * h), threaded)
             with np.errstate(over="ignore", invalid="ignore"):  # what grows without bound is found by who called
                 self.solve(ImplicitStep(start, x.copy(), h, contacts, t0, t1), x)
-            respond(x, v, start, model.inverse_mass, contacts, t0, t1, h, self._max_speed * h, True, threaded)
+            resolve_plane_contacts(
+                x, v, start, model.inverse_mass, contacts, t0, t1, h, self._max_speed * h, True, threaded
+            )
             slip(x, model.constraints)
-        return ClothState(x, v, state.time + substeps * h, remember(model))
+        return ClothState(x, v, state.time + substeps * h, copy_sliders(model))
 
 
 class DualIterated(Iterated):

@@ -13,7 +13,7 @@ from vto_pipeline.cloth.model.build import ClothModel
 from vto_pipeline.numerics.linear.block_matrix import BlockMatrix
 
 
-class Pieces(NamedTuple):
+class ClothComponents(NamedTuple):
     """Connected pieces of the cloth.
 
     Args:
@@ -25,7 +25,7 @@ class Pieces(NamedTuple):
     held: NDArray[np.bool_]
 
 
-def pieces(model: ClothModel, matrix: BlockMatrix) -> Pieces | None:
+def free_components(model: ClothModel, matrix: BlockMatrix) -> ClothComponents | None:
     """Return the pieces of a cloth, of whose stiffness this is the pattern; None if all are held somewhere."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
@@ -38,7 +38,7 @@ def pieces(model: ClothModel, matrix: BlockMatrix) -> Pieces | None:
     ones = np.ones(len(matrix.columns), np.int8)
     of = connected_components(csr_array((ones, matrix.columns, matrix.starts), shape=(count, count)))[1]
     pinned = np.bincount(of, held) > 0
-    return None if pinned.all() else Pieces(of, pinned)
+    return None if pinned.all() else ClothComponents(of, pinned)
 
 
 @njit(cache=True, error_model="numpy")

@@ -13,12 +13,12 @@ _CHUNK = 512  # vertices a thread takes at a time
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
-def press(x, start, weights, contacts, t0, t1, pressed):
+def solve_plane_contacts(x, start, weights, contacts, t0, t1, pressed):
     """Do one sweep of projected Gauss-Seidel over the contacts, in place.
 
-    `respond` can only push. Iterated with other constraints it would keep what the first guess needed, and end in a
-    point that depends on the way there; here the sum of the pushes, not each of them, is kept above zero, and
-    friction inside the cone of that sum (Jean & Moreau 1992; Erleben 2007, section 4).
+    `resolve_plane_contacts` can only push. Iterated with other constraints it would keep what the first guess needed,
+    and end in a point that depends on the way there; here the sum of the pushes, not each of them, is kept above zero,
+    and friction inside the cone of that sum (Jean & Moreau 1992; Erleben 2007, section 4).
 
     Args:
         x: Positions [m], shape (V, 3), changed in place.
@@ -32,11 +32,11 @@ def press(x, start, weights, contacts, t0, t1, pressed):
         for i in range(_CHUNK * chunk, min(len(x), _CHUNK * chunk + _CHUNK)):
             for s in range(len(contacts.friction)):
                 if weights[i] > 0.0 and contacts.active[s, i]:
-                    _press_one(i, s, x, start, weights[i], contacts, t0, t1, pressed)
+                    _solve_plane_contact(i, s, x, start, weights[i], contacts, t0, t1, pressed)
 
 
 @njit(cache=True, error_model="numpy")
-def _press_one(i, s, x, start, weight, contacts, t0, t1, pressed):
+def _solve_plane_contact(i, s, x, start, weight, contacts, t0, t1, pressed):
     here, before = load(x, i), load(pressed[s], i)
     normal, place, offset, carried = plane_at(contacts, s, i, t0, t1)
     lack = offset - dot(normal, sub(here, place))

@@ -6,15 +6,15 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from vto_pipeline.cloth.collision.contacts import Contacts, nothing
-from vto_pipeline.cloth.collision.response.step_response import respond
+from vto_pipeline.cloth.collision.contacts import Contacts, empty_contacts
+from vto_pipeline.cloth.collision.response.step_response import resolve_plane_contacts
 from vto_pipeline.cloth.collision.self_collision.pairs import Pairs, no_pairs
 from vto_pipeline.cloth.collision.self_collision.self_contact import SelfContact
 from vto_pipeline.cloth.constraints.rigid import refuse_rigid
 from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM
 from vto_pipeline.cloth.integrators.system import ForceSystem
 from vto_pipeline.cloth.model.build import ClothModel, ClothState
-from vto_pipeline.cloth.model.internal_friction import own, recall, remember, slip
+from vto_pipeline.cloth.model.internal_friction import copy_sliders, restore_sliders, slip, with_own_sliders
 from vto_pipeline.model.arrays import FloatArray
 
 
@@ -46,7 +46,7 @@ class Integrator(ABC):
         tolerance: float = 1e-5,
     ) -> None:
         self.tolerance = tolerance * model.edge_length
-        self._model = own(model)
+        self._model = with_own_sliders(model)
         self.system = ForceSystem(self._model, damping, air)
         self._max_speed = max_speed
         self.self_contact: SelfContact | None = None
@@ -70,7 +70,7 @@ class Integrator(ABC):
             refuse_rigid(self._model.constraints, state.positions, type(self).__name__)
         if state is not self._last or h != self._h:
             self.restart()
-        recall(self._model, state.sliders)
+        restore_sliders(self._model, state.sliders)
         x, v = state.positions, self.system.free * state.velocities
         with np.errstate(over="ignore", invalid="ignore"):  # beyond its limit of stability a method grows until inf
             for step in range(substeps):
@@ -82,18 +82,18 @@ class Integrator(ABC):
                     x = x.copy()  # what was kept for a step from here was without its contacts
                     penalty.begin(contacts, self._pairs(x, v, state.time + step * h, h), t0, t1, x, h)
                     new_x, new_v = self.step(self.system, x, v, h)
-                    x, v = self._respond(x, new_x, new_v, nothing(len(x)), t0, t1, h)
+                    x, v = self._respond(x, new_x, new_v, empty_contacts(len(x)), t0, t1, h)
                     penalty.end(x)
                 slip(x, self._model.constraints)
-        self._h, self._last = h, ClothState(x, v, state.time + substeps * h, remember(self._model))
+        self._h, self._last = h, ClothState(x, v, state.time + substeps * h, copy_sliders(self._model))
         return self._last
 
     def _pairs(self, x: FloatArray, v: FloatArray, time: float, h: float) -> Pairs:
         """Return where the cloth comes near itself and what bodies have beside faces."""
         if self.self_contact is None:
             return no_pairs()
-        self.self_contact.at(time, time + h)
-        return self.self_contact.near(x, x + h * v + h * h * self._model.gravity, h, h * v)
+        self.self_contact.set_time_span(time, time + h)
+        return self.self_contact.find_pairs(x, x + h * v + h * h * self._model.gravity, h, h * v)
 
     def _respond(
         self, start: FloatArray, x: FloatArray, v: FloatArray, contacts: Contacts, t0: float, t1: float, h: float
@@ -104,5 +104,7 @@ class Integrator(ABC):
         moved, speed = x.copy(), np.zeros_like(v)
         threaded = len(x) >= PARALLEL_FROM
         longest = self._max_speed * h
-        respond(moved, speed, start, self._model.inverse_mass, contacts, t0, t1, h, longest, True, threaded)
+        resolve_plane_contacts(
+            moved, speed, start, self._model.inverse_mass, contacts, t0, t1, h, longest, True, threaded
+        )
         return moved, v + (moved - x) / h

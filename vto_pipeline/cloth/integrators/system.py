@@ -98,7 +98,7 @@ class ForceSystem:
 
         Args:
             right: Shape (V, 3).
-            tolerance: Share of the residual that may be left; see `numerics.linear.pcg`.
+            tolerance: Share of the residual that may be left; see `numerics.linear.conjugate_gradients`.
         """
         stiffness, levels = self._assembly
         update(levels)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from vto_pipeline.cloth.judge.crossings import crossings_between, self_crossings
 from vto_pipeline.cloth.judge.gap import gaps_within
-from vto_pipeline.cloth.judge.residual import Weave, left_over_force
+from vto_pipeline.cloth.judge.residual import ElasticEnergies, judged_residual
 from vto_pipeline.cloth.judge.strain import gradients, principal_strains, rest_triangles, thread_strains
 from vto_pipeline.geometry.signed_distance import SurfaceDistance, SurfacePoints
 from vto_pipeline.geometry.topology import edges
@@ -52,8 +52,8 @@ def audit(
         settled: Whether the drape came to rest.
         energy: Stored in the cloth, says the solver [J].
         residual: Residual force, rms, as a share of a vertex's weight, says the solver.
-        fabric: What it is made of, where the judge knows its model (`judge.balance.knows`); energy and force are
-            then judged.
+        fabric: What it is made of, where the judge knows its model (`judge.residual.covers_all_energies`); energy and
+            force are then judged.
         friction: Against the body; the fabric's own when None.
         skin: Distance that vertices keep from the body, shape (V,) or one for all [m]. A little more may still be
             borne by it; by the cloth itself, within the least of them.
@@ -91,7 +91,7 @@ def audit(
         "residual": residual,
     }
     if fabric is not None:
-        weave = Weave(mesh, rest, fabric)
+        weave = ElasticEnergies(mesh, rest, fabric)
         free = np.ones(len(mesh.vertices), np.bool_)
         free[list(pinned)] = False
         free[mesh.faces[near[gaps < least]]] = False
@@ -99,7 +99,7 @@ def audit(
         mu = fabric.friction if friction is None else friction
         found["judged_energy_j"] = weave.energy(mesh.vertices)
         found["judged_residual_left_out"] = int((~free).sum())
-        found["judged_residual"] = left_over_force(
+        found["judged_residual"] = judged_residual(
             weave, mesh.vertices, body, nearest, friction=mu, touching=touching, free=free
         )
     return found

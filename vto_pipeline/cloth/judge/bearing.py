@@ -11,7 +11,7 @@ _ROUNDS = 50  # at most; a dozen are many
 _DONE = 1e-10  # of the force: less is not worth another round
 
 
-def left_by_one(force: FloatArray, outward: FloatArray, friction: float) -> FloatArray:
+def residual_after_one_surface(force: FloatArray, outward: FloatArray, friction: float) -> FloatArray:
     """Return what is left of each force when one surface bears what it can of it, shape (N, 3) [N].
 
     It bears all of the force into it, and along it up to friction times that: Coulomb's law for what slides.
@@ -28,7 +28,7 @@ def left_by_one(force: FloatArray, outward: FloatArray, friction: float) -> Floa
     return np.where(push[:, None] > 0.0, slips[:, None] * along, force)
 
 
-def left_by_all(force: FloatArray, outward: FloatArray, friction: float) -> FloatArray:
+def residual_after_all_surfaces(force: FloatArray, outward: FloatArray, friction: float) -> FloatArray:
     """Return the least that is left of a force when surfaces bear it within their cones of friction, shape (3,) [N].
 
     Non-negative least squares over rays of the cones, to which the ray of each cone that would take most of what is

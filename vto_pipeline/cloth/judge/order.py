@@ -12,7 +12,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 _WIDTH = 1e-6  # m: of the slivers that stand for straight ways
 
 
-def outside(inner: TriangleMesh, outer: TriangleMesh, body: TriangleMesh) -> NDArray[np.int64]:
+def outside_outer_garment(inner: TriangleMesh, outer: TriangleMesh, body: TriangleMesh) -> NDArray[np.int64]:
     """Return which vertices of the inner garment lie outside the outer one.
 
     Those are they whose straight way to the nearest place of the body passes through the outer one, and through as many

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from vto_pipeline.cloth.judge.bearing import left_by_all, left_by_one
+from vto_pipeline.cloth.judge.bearing import residual_after_all_surfaces, residual_after_one_surface
 from vto_pipeline.cloth.judge.flanks import flanks
 from vto_pipeline.cloth.judge.strain import RestTriangles, gradients, rest_triangles, thread_strains
 from vto_pipeline.cloth.model.materials import Materials
@@ -27,14 +27,14 @@ _ALIKE = 1e-3  # between directions: less is one flank
 _SLIVER = 0.01  # height over longest side of a triangle that counts as that high at least, and does not bend
 
 
-def knows(materials: Materials) -> bool:
-    """Return whether the energies of `Weave` are all that this model of cloth has."""
+def covers_all_energies(materials: Materials) -> bool:
+    """Return whether the energies of `ElasticEnergies` are all that this model of cloth has."""
     extra = (materials.strain_limit, materials.yield_curvature)
     plain = extra == (None, None) and not materials.hysteresis
     return plain and (materials.membrane, materials.bending) == ("threads", "hinge")
 
 
-class Weave:
+class ElasticEnergies:
     """A cloth of the model "threads" with "hinge" bending, and its energies.
 
     Args:
@@ -86,8 +86,8 @@ class Weave:
         return 0.5 * self._rigidity * (_angles(corners) - self._angles) ** 2
 
 
-def left_over_force(
-    weave: Weave,
+def judged_residual(
+    weave: ElasticEnergies,
     positions: FloatArray,
     body: TriangleMesh | None,
     nearest: SurfacePoints | None,
@@ -119,14 +119,14 @@ def left_over_force(
         outward = (positions - nearest.point) * np.where(inside, -1.0, 1.0)[:, None]
         outward /= np.maximum(np.abs(nearest.distance), np.finfo(float).tiny)[:, None]
         forces = left.copy()
-        left[held] = left_by_one(forces[held], outward[held], friction)
+        left[held] = residual_after_one_surface(forces[held], outward[held], friction)
         much = np.linalg.norm(left, axis=1) > _MUCH * GRAVITY * weave.mass
         (between,) = np.nonzero(held & much)  # two flanks, perhaps
         owner, pushes = flanks(body, positions[between], inside[between], touching[between])
         first = np.searchsorted(owner, np.arange(len(between) + 1))
         for i, start, end in zip(between, first[:-1], first[1:], strict=True):
             if end - start > 1 and np.ptp(pushes[start:end], axis=0).max() > _ALIKE:
-                left[i] = left_by_all(forces[i], pushes[start:end], friction)
+                left[i] = residual_after_all_surfaces(forces[i], pushes[start:end], friction)
     share = np.linalg.norm(left[free], axis=1) / (GRAVITY * weave.mass[free])
     return float(np.sqrt(np.mean(share**2)))
 

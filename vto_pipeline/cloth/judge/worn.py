@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vto_pipeline.cloth.judge.residual import Weave
+from vto_pipeline.cloth.judge.residual import ElasticEnergies
 from vto_pipeline.cloth.judge.strain import gradients, rest_triangles, thread_strains
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.arrays import FloatArray
@@ -20,7 +20,7 @@ def vertex_maps(mesh: TriangleMesh, rest: RestShape, body: TriangleMesh, fabric:
     """Return figures per vertex of a draped garment.
 
     Pressure is the force with which the body holds a vertex up, along the body's normal, over the vertex's area: what
-    elastic forces and weight leave, forces being differences of energies (`judge.balance`, threads with hinges).
+    elastic forces and weight leave, forces being differences of energies (`judge.residual`, threads with hinges).
 
     Args:
         mesh: The garment at rest on the body [m].
@@ -42,7 +42,7 @@ def vertex_maps(mesh: TriangleMesh, rest: RestShape, body: TriangleMesh, fabric:
         total = np.bincount(corners.ravel(), np.repeat(laid.area * strain, 3), count)
         maps[name] = np.divide(total, area, out=np.zeros(count), where=area > 0.0)
 
-    weave = Weave(mesh, rest, fabric)
+    weave = ElasticEnergies(mesh, rest, fabric)
     force = weave.forces(mesh.vertices)
     force[:, 1] -= GRAVITY * weave.mass
     nearest = SurfaceDistance(body).signed(mesh.vertices)

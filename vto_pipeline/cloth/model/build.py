@@ -57,7 +57,7 @@ class ClothState:
         positions: [m], shape (V, 3).
         velocities: [m/s], shape (V, 3).
         time: [s].
-        sliders: Where internal friction and plasticity stand; see `losses`. None before the first step.
+        sliders: Where internal friction and plasticity stand; see `internal_friction`. None before the first step.
     """
 
     positions: FloatArray

@@ -1,7 +1,8 @@
 """State of internal friction and plasticity: the sliders.
 
 A model is constant and a state varies, so a state carries the sliders and each method works on its own copy of the
-model: `own` once, `recall` before the first step, `slip` at the end of each, `remember` after the last.
+model: `with_own_sliders` once, `restore_sliders` before the first step, `slip` at the end of each, `copy_sliders` after
+the last.
 """
 
 from __future__ import annotations
@@ -21,20 +22,20 @@ from vto_pipeline.model.arrays import FloatArray
 _BY_DATA = {kind.data: kind for kind in KINDS}
 
 
-def own(model: ClothModel) -> ClothModel:
+def with_own_sliders(model: ClothModel) -> ClothModel:
     """Return the same cloth with sliders of its own."""
     mine = tuple(data._replace(slider=data.slider.copy()) if kind_of(data).slip else data for data in model.constraints)
     return replace(model, constraints=mine)
 
 
-def recall(model: ClothModel, sliders: Sequence[FloatArray]) -> None:
+def restore_sliders(model: ClothModel, sliders: Sequence[FloatArray]) -> None:
     """Set the sliders of a model to those of a state; at the start, to rest."""
     kept = _sliders(model)
     for k, mine in enumerate(kept):
         mine[:] = sliders[k] if len(sliders) == len(kept) else 0.0
 
 
-def remember(model: ClothModel) -> tuple[FloatArray, ...]:
+def copy_sliders(model: ClothModel) -> tuple[FloatArray, ...]:
     """Return the sliders of a model, for a state."""
     return tuple(slider.copy() for slider in _sliders(model))
 

@@ -14,10 +14,10 @@ from vto_pipeline.cloth.dynamics.residual import elastic_energy
 from vto_pipeline.cloth.judge.audit import JUST, audit, places
 from vto_pipeline.cloth.judge.crossings import crossings_between
 from vto_pipeline.cloth.judge.gap import gaps_within
-from vto_pipeline.cloth.judge.order import outside
-from vto_pipeline.cloth.judge.residual import knows
+from vto_pipeline.cloth.judge.order import outside_outer_garment
+from vto_pipeline.cloth.judge.residual import covers_all_energies
 from vto_pipeline.cloth.judge.too_small import warn_if_too_small
-from vto_pipeline.cloth.outfit.combined_cloth import Joined
+from vto_pipeline.cloth.outfit.combined_cloth import CombinedCloth
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -29,7 +29,7 @@ _PLACES = 10  # named of two garments
 
 def audit_outfit(
     layers: Sequence[Layer],
-    joined: Joined,
+    joined: CombinedCloth,
     body: TriangleMesh,
     config: DrapeConfig,
     *,
@@ -51,7 +51,7 @@ def audit_outfit(
         job: Warned of garments that are too small, and of layers out of order.
 
     Returns:
-        Under "layers" what `audit.audit` and `tight.warn_if_too_small` find of each garment, a vertex that another
+        Under "layers" what `audit.audit` and `too_small.warn_if_too_small` find of each garment, a vertex that another
         garment may bear counted as held. Of all: the sum of their crossings, and the worst of what else is in
         its findings; layer_intersections (pairs of triangles of two garments), min_layer_gap_mm (None above 5 mm),
         out_of_order_vertices (of inner garments, outside an outer one), the largest out_of_order_share of a garment's,
@@ -73,7 +73,7 @@ def audit_outfit(
                 settled=settled,
                 energy=elastic_energy(model, x),
                 residual=residual,
-                fabric=layer.fabric if knows(config) else None,
+                fabric=layer.fabric if covers_all_energies(config) else None,
                 friction=config.friction,
                 skin=skin[span],
                 pinned=borne[(borne >= span.start) & (borne < span.stop)] - span.start,
@@ -99,7 +99,7 @@ def audit_outfit(
 
 
 def _between(
-    layers: Sequence[Layer], x: FloatArray, joined: Joined, within: float
+    layers: Sequence[Layer], x: FloatArray, joined: CombinedCloth, within: float
 ) -> tuple[NDArray[np.int64], FloatArray]:
     """Return the pairs of faces of two garments that are this near, and their distances [m]."""
     near, gaps = gaps_within(x, joined.rest.positions, joined.mesh.faces, within)
@@ -128,7 +128,7 @@ def _order(layers: Sequence[Layer], body: TriangleMesh, job: Job) -> dict[str, A
     count, share, where = 0, 0.0, []
     for inner, outer in combinations(layers, 2):
         mesh = inner.garment.mesh
-        beyond = outside(mesh, outer.garment.mesh, body)
+        beyond = outside_outer_garment(mesh, outer.garment.mesh, body)
         if len(beyond):
             count, share = count + len(beyond), max(share, len(beyond) / len(mesh.vertices))
             chosen = beyond[np.linspace(0, len(beyond) - 1, min(_PLACES, len(beyond))).astype(int)]

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vto_pipeline.cloth.placement.voxel_fit import closed
+from vto_pipeline.cloth.placement.voxel_fit import close_openings
 from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import concatenate, vertex_normals
@@ -22,7 +22,7 @@ _FINER = 0.7  # of the cube: where cloth shows through the solid, it is made aga
 _FINEST = 4e-3  # m
 
 
-def dressed(body: TriangleMesh, worn: Sequence[TriangleMesh]) -> TriangleMesh:
+def wrap_in_surface(body: TriangleMesh, worn: Sequence[TriangleMesh]) -> TriangleMesh:
     """Return the surface at a small distance around a body and the garments on it, closed and oriented outward.
 
     Args:
@@ -31,7 +31,7 @@ def dressed(body: TriangleMesh, worn: Sequence[TriangleMesh]) -> TriangleMesh:
     """
     import igl
 
-    solids = [body, *(closed(_outward(garment, body)) for garment in worn)]
+    solids = [body, *(close_openings(_outward(garment, body)) for garment in worn)]
     whole = concatenate(solids)
     vertices, faces = np.array(whole.vertices), whole.faces.astype(np.int64)
     longest, cube = float(np.ptp(vertices, axis=0).max()), _CUBE

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vto_pipeline.cloth.collision.contacts import Contacts, Round
-from vto_pipeline.cloth.dynamics.body_motion import PacedBody
+from vto_pipeline.cloth.collision.contacts import Contacts, ContactSpan
+from vto_pipeline.cloth.dynamics.body_motion import VariableSpeedBody
 from vto_pipeline.cloth.model.build import ClothModel, build
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.model.arrays import FloatArray
@@ -22,7 +22,7 @@ from vto_pipeline.model.outfit import Layer
 _APART = 10.0  # m between rest shapes: what is near at rest is not looked at where it is near when worn
 
 
-class Joined(NamedTuple):
+class CombinedCloth(NamedTuple):
     """Garments as one cloth.
 
     Args:
@@ -40,7 +40,7 @@ class Joined(NamedTuple):
     vertices: tuple[slice, ...]
 
 
-def join(layers: Sequence[Layer], materials: Materials) -> Joined:
+def combine_garments(layers: Sequence[Layer], materials: Materials) -> CombinedCloth:
     """Return these garments as one cloth.
 
     Raises:
@@ -71,10 +71,10 @@ def join(layers: Sequence[Layer], materials: Materials) -> Joined:
         reach=parts("reach"),
         friction=parts("friction"),
     )
-    return Joined(model, tuple(models), TriangleMesh(positions, faces), RestShape(rest), own)
+    return CombinedCloth(model, tuple(models), TriangleMesh(positions, faces), RestShape(rest), own)
 
 
-class WornOn(PacedBody):
+class MultiFrictionBody(VariableSpeedBody):
     """A body at rest on which fabrics of different friction lie.
 
     Args:
@@ -88,7 +88,7 @@ class WornOn(PacedBody):
         self._kinds = np.unique(friction)
         self._of_kind = friction == self._kinds[:, None]
 
-    def contacts(self, positions: FloatArray, span: Round) -> Contacts:
+    def contacts(self, positions: FloatArray, span: ContactSpan) -> Contacts:
         """See `Collider.contacts`; each plane once for each coefficient, touched by the vertices that have it."""
         found = super().contacts(positions, span)
         active = found.active[:, None] & self._of_kind

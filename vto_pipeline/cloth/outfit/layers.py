@@ -1,8 +1,8 @@
 """Several garments, in layers: put on one by one, inner first, then at rest jointly.
 
-Each is draped alone first. What is worn beneath is then frozen with some room about it (`dressed`), and the garment is
-draped over that, which leaves it clear of all beneath and on the right side. At the end all move together, as one
-cloth whose garments have their own fabrics, and what kept the cloth from itself keeps the layers apart.
+Each is draped alone first. What is worn beneath is then frozen with some room about it (`wrap_in_surface`), and the
+garment is draped over that, which leaves it clear of all beneath and on the right side. At the end all move together,
+as one cloth whose garments have their own fabrics, and what kept the cloth from itself keeps the layers apart.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from vto_pipeline.cloth.drape import drape, named, refuse_crossings
+from vto_pipeline.cloth.drape import drape, format_places, refuse_crossings
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.model.build import at_rest
 from vto_pipeline.cloth.model.settings import checked
 from vto_pipeline.cloth.outfit.audit import audit_outfit
-from vto_pipeline.cloth.outfit.body_with_layers import dressed
-from vto_pipeline.cloth.outfit.combined_cloth import WornOn, join
-from vto_pipeline.cloth.placement.place import put
+from vto_pipeline.cloth.outfit.body_with_layers import wrap_in_surface
+from vto_pipeline.cloth.outfit.combined_cloth import MultiFrictionBody, combine_garments
+from vto_pipeline.cloth.placement.place import place_garment
 from vto_pipeline.cloth.rest.phases import Phases
 from vto_pipeline.errors import ComputationError, DivergedError, FallenError, InputError, IntersectingError
 from vto_pipeline.model.body import MovingBody
@@ -63,11 +63,11 @@ def drape_layers(
     config, job = checked(DrapeConfig, settings), job or Job()
     if isinstance(body, TriangleMesh):
         body = MovingBody(body.vertices[None], body.faces)
-    refuse_twins(layers)
+    refuse_duplicates(layers)
     return _Outfit(config, body, job).drape(layers)
 
 
-def refuse_twins(layers: Sequence[Layer]) -> None:
+def refuse_duplicates(layers: Sequence[Layer]) -> None:
     """Refuse a garment given twice: cloth in the very place of other cloth has no order of layers.
 
     Raises:
@@ -103,7 +103,7 @@ class _Outfit:
             began = time.perf_counter()
             job = self._part(layer.name, k * _ALONE / len(layers), (k + 1) * _ALONE / len(layers))
             try:
-                worn.append(replace(layer, garment=self._put_on(layer, worn, len(layers), job)))
+                worn.append(replace(layer, garment=self._drape_layer(layer, worn, len(layers), job)))
             except ComputationError as error:
                 error.problem = f"{layer.name}: {error.problem}"
                 error.partial = {f"{layer.name}_draped": error.partial.get("draped", layer.garment.mesh)}
@@ -113,7 +113,7 @@ class _Outfit:
                 self._job.warnings += [f"{layer.name}, when put on: {text}" for text in job.warnings]
                 self._job.left_out += [(f"{layer.name}: {what}", reason) for what, reason in job.left_out]
             seconds[layer.name] = time.perf_counter() - began
-        return self._settle(worn, seconds)
+        return self._relax_together(worn, seconds)
 
     def _part(self, name: str, begin: float, end: float) -> Job:
         """Return a job whose progress is a part of the whole one's."""
@@ -123,7 +123,7 @@ class _Outfit:
 
         return Job(progress, self._job.scratch, self._job.seed, self._job.force_all)
 
-    def _put_on(self, layer: Layer, beneath: Sequence[Layer], count: int, job: Job) -> Garment:
+    def _drape_layer(self, layer: Layer, beneath: Sequence[Layer], count: int, job: Job) -> Garment:
         """Return a garment nearly at rest on the final body, outside and clear of the layers beneath."""
         garment, body = layer.garment, self._body
         settings = {
@@ -135,14 +135,14 @@ class _Outfit:
         if self._config.time_budget_s is not None:
             settings["time_budget_s"] = _ALONE * self._config.time_budget_s / count
         if len(body.keyframes) == 1:
-            garment = put(garment, self._still, self._config, job)
+            garment = place_garment(garment, self._still, self._config, job)
         else:
             garment = Garment(drape(garment, body, layer.fabric, settings, job).mesh, garment.rest)
             if not beneath:
                 return garment
         if not beneath:
             return Garment(drape(garment, self._still, layer.fabric, settings, job).mesh, garment.rest)
-        solid = dressed(self._still, [one.garment.mesh for one in beneath])
+        solid = wrap_in_surface(self._still, [one.garment.mesh for one in beneath])
         settings |= {
             "grow_above_mm": 0.0,  # pushed out as the solid grows, cloth stays where it is along the body
             "clear_rounds": 0,  # a coarse triangle may cut a corner of the room that the solid has to spare
@@ -156,7 +156,7 @@ class _Outfit:
             mesh = found
         return Garment(mesh, garment.rest)
 
-    def _settle(self, layers: Sequence[Layer], seconds: Mapping[str, float]) -> DrapedOutfit:
+    def _relax_together(self, layers: Sequence[Layer], seconds: Mapping[str, float]) -> DrapedOutfit:
         """Return all garments at rest together.
 
         Args:
@@ -166,20 +166,22 @@ class _Outfit:
         began = time.perf_counter()
         config, job = self._config, self._job
         together = self._part("together", _ALONE, 1.0)
-        joined = join(layers, config)
+        joined = combine_garments(layers, config)
         thinnest = min((layer.fabric for layer in layers), key=lambda fabric: fabric.thickness)
         phases = Phases(joined.model, joined.rest, thinnest, config, together)
         own = joined.model.friction
-        collider = WornOn(self._still, np.full_like(own, config.friction) if config.friction is not None else own, job)
+        collider = MultiFrictionBody(
+            self._still, np.full_like(own, config.friction) if config.friction is not None else own, job
+        )
         stepper = phases.stepper(joined.model, collider, config.damping)
         deadline = np.inf if config.time_budget_s is None else self._began + config.time_budget_s
         try:
-            state = phases.free(at_rest(joined.mesh.vertices), self._still)
-            settling = phases.settle(state, stepper, self._still, deadline)
+            state = phases.resolve_crossings(at_rest(joined.mesh.vertices), self._still)
+            settling = phases.settle_and_clear(state, stepper, self._still, deadline)
         except (DivergedError, FallenError) as error:
             error.partial = {f"{layer.name}_draped": layer.garment.mesh for layer in layers}
             raise
-        phases.account()
+        phases.report_collision_work()
         x = settling.state.positions
         worn = [
             replace(one, garment=replace(one.garment, mesh=replace(one.garment.mesh, vertices=x[span])))
@@ -200,7 +202,7 @@ class _Outfit:
         job.left_out += together.left_out
         error_mm = settling.error_mm
         if not settling.settled:
-            job.warn(settling.unrest)
+            job.warn(settling.not_settled_warning)
         spent = time.perf_counter()
         job.measure(
             **{**together.metrics, **findings},
@@ -220,7 +222,7 @@ class _Outfit:
         if findings["out_of_order_share"] > _STRAY:
             raise IntersectingError(
                 f"{findings['out_of_order_vertices']} vertices of inner garments lie outside outer ones, near "
-                f"{named(findings['out_of_order_places'])}",
+                f"{format_places(findings['out_of_order_places'])}",
                 hint="give the inner garment first, and allow enough time to put each on",
                 partial=partial,
             )

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vto_pipeline.cloth.placement.rigid_escape import led_about
+from vto_pipeline.cloth.placement.rigid_escape import escape_rigidly
 from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.job import Job
@@ -21,7 +21,7 @@ _STEP = 1e-3  # m²: a limb of radius r shrinks by exp(-1e-3 / r²) a step, a wr
 _MOST = 12  # steps: an arm is a line long before, and a torso still two thirds
 
 
-class Growth(NamedTuple):
+class BodyGrowth(NamedTuple):
     """The growth of a body, and its garment.
 
     Args:
@@ -33,7 +33,7 @@ class Growth(NamedTuple):
     body: MovingBody
 
 
-def growing(body: TriangleMesh, garment: TriangleMesh, job: Job) -> Growth:
+def plan_body_growth(body: TriangleMesh, garment: TriangleMesh, job: Job) -> BodyGrowth:
     """Return the body's growth, from the least thinning at which it no longer crosses the garment.
 
     Where it crosses however thin, the garment is not about the body, and is led there as a whole if that helps.
@@ -43,23 +43,23 @@ def growing(body: TriangleMesh, garment: TriangleMesh, job: Job) -> Growth:
         garment: In its place about the body [m].
         job: Warned when the garment is led, or no thinning gets the body clear of it.
     """
-    grown, crossing = _thinned(body, garment)
+    grown, crossing = _thin_until_clear(body, garment)
     if not crossing:
-        return Growth(garment, grown)
-    led = TriangleMesh(led_about(body, garment), garment.faces)
-    about, still = _thinned(body, led)
+        return BodyGrowth(garment, grown)
+    led = TriangleMesh(escape_rigidly(body, garment), garment.faces)
+    about, still = _thin_until_clear(body, led)
     if still:
         job.warn(f"the garment does not surround the body: {crossing} pairs of triangles cross it even at its thinnest")
-        return Growth(garment, grown)
+        return BodyGrowth(garment, grown)
     way = 1e3 * (led.vertices - garment.vertices).mean(axis=0)
     job.warn(
         f"the garment does not surround the body as it stands; it was moved by "
         f"({', '.join(f'{part:.0f}' for part in way)}) mm (x, y, z) before the body grows"
     )
-    return Growth(led, about)
+    return BodyGrowth(led, about)
 
 
-def _thinned(body: TriangleMesh, garment: TriangleMesh) -> tuple[MovingBody, int]:
+def _thin_until_clear(body: TriangleMesh, garment: TriangleMesh) -> tuple[MovingBody, int]:
     """Return the body's growth from the least sufficient thinning, or the most, and the pairs that cross."""
     import igl
     from scipy.sparse.linalg import splu

@@ -22,7 +22,7 @@ _RELAX = 0.1  # s of cloth time a round
 _PATIENCE = 5  # rounds without fewer crossings: what passes through a limb does so however thick the skin
 
 
-def clear_of_body(
+def clear_body_crossings(
     stepper: Stepper, state: ClothState, faces: IntArray, body: TriangleMesh, rounds: int
 ) -> tuple[ClothState, IntArray]:
     """Thicken and relax until no triangle of the cloth crosses the body, or no progress is made.
@@ -40,10 +40,10 @@ def clear_of_body(
     Returns:
         The state, and the pairs (cloth face, body face) still meeting, shape (K, 2).
     """
-    skin, known = stepper.skin.copy(), stepper.known
+    skin, known = stepper.skin.copy(), stepper.contact_memory
     cleared, pairs = _thicken(stepper, state, faces, body, rounds, slides=True)
     if len(pairs) > 0 and rounds > 0:
-        stepper.skin, stepper.known = skin, known
+        stepper.skin, stepper.contact_memory = skin, known
         cleared, pairs = _thicken(stepper, state, faces, body, rounds, slides=False)
     return cleared, pairs
 

@@ -20,7 +20,9 @@ _NOISE = 0.1  # of the length of an edge of that trace
 _COLLAPSED = 1e-9  # twice the area over the longest side squared, where a direction drowns in rounding
 
 
-def untie(positions: FloatArray, rest: FloatArray, faces: IntArray, pinned: Sequence[int] = ()) -> FloatArray:
+def expand_collapsed_triangles(
+    positions: FloatArray, rest: FloatArray, faces: IntArray, pinned: Sequence[int] = ()
+) -> FloatArray:
     """Return the positions, with a trace of the rest shape added at the corners of collapsed triangles.
 
     Args:

@@ -27,12 +27,12 @@ class Start(NamedTuple):
     """
 
     positions: FloatArray
-    pairs: int
-    left: int
+    crossings: int
+    crossings_left: int
     crossed: NDArray[np.bool_]
 
 
-def free_start(
+def find_collision_free_start(
     positions: FloatArray,
     faces: IntArray,
     rest: FloatArray,
@@ -55,7 +55,7 @@ def free_start(
     count = remaining = len(pairs) + (0 if body is None else len(intersecting_faces(mesh, body)))
     if 0 < count <= _HOPELESS * len(faces):
         untangled = untangle(positions, faces, body=body, rest=rest, thickness=thickness, job=job)
-        positions, left, remaining = untangled.positions, untangled.pairs, untangled.left
+        positions, left, remaining = untangled.positions, untangled.pairs, untangled.crossings_left
     elif count > 0:
         job.warn(f"{count} pairs of triangles intersect at the start; not all can be untangled before it moves")
     return Start(positions, count, remaining, meeting_vertices(left, faces, len(positions)))

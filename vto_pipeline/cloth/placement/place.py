@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import Field
 
-from vto_pipeline.cloth.placement.voxel_fit import Cubes, Fill, quarter_turns
+from vto_pipeline.cloth.placement.voxel_fit import VoxelFit, VoxelPlacement, quarter_turns
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.arrays import FloatArray
@@ -68,19 +68,19 @@ class Placement(NamedTuple):
     stretch: float
     shift: FloatArray
 
-    def turned(self, rest: FloatArray) -> FloatArray:
+    def rest_positions(self, rest: FloatArray) -> FloatArray:
         """Return the rest positions of the garment, shape (V, 3), in metres and in the body's axes."""
         return self.scale * rest @ self.turn.T
 
-    def put(self, positions: FloatArray) -> FloatArray:
+    def start_positions(self, positions: FloatArray) -> FloatArray:
         """Return the start positions of a garment from its original ones, shape (V, 3) [m]."""
-        return self.stretch * self.turned(positions) + self.shift
+        return self.stretch * self.rest_positions(positions) + self.shift
 
 
 _AS_IT_STANDS = Placement(1.0, np.eye(3), 1.0, np.zeros(3))
 
 
-def place(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig, job: Job) -> Placement:
+def find_placement(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig, job: Job) -> Placement:
     """Return the placement in which the body fills the garment best.
 
     Args:
@@ -97,29 +97,31 @@ def place(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig, job: J
         return _AS_IT_STANDS
     scale = _scale(garment, body, config, job)
     metres = TriangleMesh(scale * garment.vertices, garment.faces)
-    stands, best = _best_way(metres, body, config)
-    if round(best.worth, 6) <= 0.0:  # but for what the transforms round
+    stands, best = _best_orientation(metres, body, config)
+    if round(best.score, 6) <= 0.0:  # but for what the transforms round
         raise InputError(
             "the body fills this garment nowhere: it goes around nothing of the body",
             hint="give it as it is worn, sewn and open; drape.place=as_it_stands drapes it from where it lies",
         )
-    if stands.worth < config.turned_well * best.worth:
-        best = _as_if_large_enough(metres, body, best, config)
-    as_turned = 1.0 if (best.turn == stands.turn).all() else _share(stands.worth, best.worth)
+    if stands.score < config.turned_well * best.score:
+        best = _best_orientation_if_larger(metres, body, best, config)
+    as_turned = 1.0 if (best.turn == stands.turn).all() else _relative_score(stands.score, best.score)
     if as_turned >= _ALIKE:
         best = stands
     elif as_turned >= config.turned_well:
-        job.note(f"garment not turned, though ({_way(best)}) as (x, y, z) would score {1 / as_turned - 1:.1%} better")
+        job.note(
+            f"garment not turned, though ({_axis_names(best)}) as (x, y, z) would score {1 / as_turned - 1:.1%} better"
+        )
         best = stands
     else:
         job.note(
-            f"garment turned: its ({_way(best)}) is the body's (x, y, z); as it stood, it scored "
+            f"garment turned: its ({_axis_names(best)}) is the body's (x, y, z); as it stood, it scored "
             f"{as_turned:.0%} of the best"
         )
-    stretch, best = _stretched(metres, body, best, config)
+    stretch, best = _enlarge_until_body_inside(metres, body, best, config)
     if stretch > 1.0:
         job.warn(f"too small: this body needs it {stretch - 1:.0%} larger; it starts stretched by that much")
-    share = _share(best.here, best.worth)
+    share = _relative_score(best.score_in_place, best.score)
     if config.place == "auto" and best is stands and scale == 1.0 and share >= config.stands_well:
         job.note(f"garment left where it stands: its place scores {share:.0%} of the best")
         return _AS_IT_STANDS
@@ -130,42 +132,48 @@ def place(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig, job: J
     return Placement(scale, best.turn, stretch, best.shift)
 
 
-def put(garment: Garment, body: TriangleMesh, config: PlaceConfig, job: Job) -> Garment:
+def place_garment(garment: Garment, body: TriangleMesh, config: PlaceConfig, job: Job) -> Garment:
     """Return the garment in its place, with its rest shape in metres and rotated alike: the warp is its vertical.
 
-    Args, Raises: See `place`.
+    Args, Raises: See `find_placement`.
     """
-    placed = place(garment.mesh, body, config, job)
-    mesh = TriangleMesh(placed.put(garment.mesh.vertices), garment.mesh.faces, garment.mesh.colors)
-    return Garment(mesh, replace(garment.rest, positions=placed.turned(garment.rest.positions)))
+    placed = find_placement(garment.mesh, body, config, job)
+    mesh = TriangleMesh(placed.start_positions(garment.mesh.vertices), garment.mesh.faces, garment.mesh.colors)
+    return Garment(mesh, replace(garment.rest, positions=placed.rest_positions(garment.rest.positions)))
 
 
-def _best_way(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig) -> tuple[Fill, Fill]:
+def _best_orientation(
+    garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig
+) -> tuple[VoxelPlacement, VoxelPlacement]:
     """Return the best place of the garment as it is turned, and of all quarter turns."""
     cube = 1e-3 * config.cube_mm
     turns = quarter_turns()
-    cubes = Cubes(garment, body, _COARSE * cube, config.cloth_in_body)
-    coarse = np.array([cubes.fill(turn).worth for turn in turns])
+    cubes = VoxelFit(garment, body, _COARSE * cube, config.cloth_in_body)
+    coarse = np.array([cubes.best_placement(turn).score for turn in turns])
     promising = coarse >= np.maximum(_CLOSE * coarse.max(), config.turned_well * coarse[0])
     promising[0] = True
-    cubes = Cubes(garment, body, cube, config.cloth_in_body)
-    ways = [cubes.fill(turn) for turn, look in zip(turns, promising, strict=True) if look]
-    return ways[0], max(ways, key=lambda way: way.worth)
+    cubes = VoxelFit(garment, body, cube, config.cloth_in_body)
+    ways = [cubes.best_placement(turn) for turn, look in zip(turns, promising, strict=True) if look]
+    return ways[0], max(ways, key=lambda way: way.score)
 
 
-def _as_if_large_enough(garment: TriangleMesh, body: TriangleMesh, best: Fill, config: PlaceConfig) -> Fill:
+def _best_orientation_if_larger(
+    garment: TriangleMesh, body: TriangleMesh, best: VoxelPlacement, config: PlaceConfig
+) -> VoxelPlacement:
     """Return the best place, turned as the garment would be if larger: one too small for the trunk may suit a thigh."""
     ways = [best]
     for step in range(1, _STEPS + 1):
         larger = TriangleMesh(_LARGER**step * garment.vertices, garment.faces)
-        ways.append(_best_way(larger, body, config)[1])
-        if ways[-1].worth < _FALLING * max(way.worth for way in ways):
+        ways.append(_best_orientation(larger, body, config)[1])
+        if ways[-1].score < _FALLING * max(way.score for way in ways):
             break
-    turn = max(ways, key=lambda way: way.worth).turn
-    return Cubes(garment, body, 1e-3 * config.cube_mm, config.cloth_in_body).fill(turn)
+    turn = max(ways, key=lambda way: way.score).turn
+    return VoxelFit(garment, body, 1e-3 * config.cube_mm, config.cloth_in_body).best_placement(turn)
 
 
-def _stretched(garment: TriangleMesh, body: TriangleMesh, own: Fill, config: PlaceConfig) -> tuple[float, Fill]:
+def _enlarge_until_body_inside(
+    garment: TriangleMesh, body: TriangleMesh, own: VoxelPlacement, config: PlaceConfig
+) -> tuple[float, VoxelPlacement]:
     """Return by how much the garment must start larger for the body to be inside it, and its place then.
 
     Args:
@@ -180,10 +188,10 @@ def _stretched(garment: TriangleMesh, body: TriangleMesh, own: Fill, config: Pla
     ways = [own]
     for step in range(1, _STEPS + 1):
         larger = TriangleMesh(_LARGER**step * garment.vertices, garment.faces)
-        ways.append(Cubes(larger, body, 1e-3 * config.cube_mm, config.cloth_in_body).fill(own.turn))
-        if ways[-1].worth < _FALLING * max(way.worth for way in ways):
+        ways.append(VoxelFit(larger, body, 1e-3 * config.cube_mm, config.cloth_in_body).best_placement(own.turn))
+        if ways[-1].score < _FALLING * max(way.score for way in ways):
             break
-    best = max(range(len(ways)), key=lambda step: ways[step].worth)
+    best = max(range(len(ways)), key=lambda step: ways[step].score)
     return _LARGER**best, ways[best]
 
 
@@ -204,17 +212,17 @@ def _scale(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig, job: 
     for unit, metres in plausible.items() if len(plausible) > 1 else ():
         scaled = TriangleMesh(metres * garment.vertices, garment.faces)
         cube = max(1e-3 * config.cube_mm, np.ptp(scaled.vertices, axis=0).max() / _AROUND)
-        cubes = Cubes(scaled, body, cube, config.cloth_in_body)
-        worth[unit] = max(cubes.fill(turn).worth for turn in quarter_turns())
+        cubes = VoxelFit(scaled, body, cube, config.cloth_in_body)
+        worth[unit] = max(cubes.best_placement(turn).score for turn in quarter_turns())
     unit = max(worth, key=lambda name: worth[name])
     job.note(f"garment assumed to be in {unit}: in metres its longest side would be {longest:.3g} times the body's")
     return plausible[unit]
 
 
-def _way(fill: Fill) -> str:
+def _axis_names(fill: VoxelPlacement) -> str:
     """Name which of the garment's axes are the body's x, y and z."""
     return ", ".join(("-" if row.sum() < 0.0 else "") + "xyz"[np.abs(row).argmax()] for row in fill.turn)
 
 
-def _share(worth: float, best: float) -> float:
+def _relative_score(worth: float, best: float) -> float:
     return max(worth, 0.0) / best if best > 0.0 else 0.0

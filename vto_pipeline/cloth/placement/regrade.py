@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from vto_pipeline.cloth.placement.transfer import reshape
+from vto_pipeline.cloth.placement.transfer import transfer_deformation
 from vto_pipeline.errors import ConfigError
 from vto_pipeline.geometry.topology import edges
 from vto_pipeline.model.body import MovingBody
@@ -48,7 +48,7 @@ def worn_rest(garment: Garment, body: MovingBody, config: GradeConfig, job: Job)
             hint="give --source-body (in a document: given.mannequin)",
         )
     rest = TriangleMesh(garment.rest.positions, garment.mesh.faces)
-    positions = reshape(rest, TriangleMesh(body.keyframes[0], body.faces), body.final)
+    positions = transfer_deformation(rest, TriangleMesh(body.keyframes[0], body.faces), body.final)
     ends = edges(rest)
     was, now = (np.linalg.norm(p[ends[:, 1]] - p[ends[:, 0]], axis=1) for p in (rest.vertices, positions))
     change = np.quantile(now[was > 0.0] / was[was > 0.0], (0.05, 0.5, 0.95)) - 1.0

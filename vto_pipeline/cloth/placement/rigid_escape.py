@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from vto_pipeline.cloth.placement.voxel_fit import closed
+from vto_pipeline.cloth.placement.voxel_fit import close_openings
 from vto_pipeline.geometry.laplace import laplacian
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import face_normals, vertex_normals
@@ -25,7 +25,7 @@ _STILL = 5e-4  # m: no vertex moves farther in the last round
 _HELD = 1e-3  # share of the weight of all cloth in the body that resists each motion: what nothing asks for stays away
 
 
-def led_about(body: TriangleMesh, garment: TriangleMesh) -> FloatArray:
+def escape_rigidly(body: TriangleMesh, garment: TriangleMesh) -> FloatArray:
     """Return the rigidly moved garment with the least cloth inside the body.
 
     Args:
@@ -47,13 +47,15 @@ def led_about(body: TriangleMesh, garment: TriangleMesh) -> FloatArray:
         own = outward * vertex_normals(TriangleMesh(x, garment.faces))[buried]
         _, face = by_place_and_look.query(np.hstack([x[buried], _TURNED * own]))
         depth = np.einsum("vi,vi->v", middles[face] - x[buried], looks[face])
-        before, x = x, _moved(x, x[buried], looks[face], np.maximum(depth, 0.0), area[buried])
+        before, x = x, _fit_rigid_motion(x, x[buried], looks[face], np.maximum(depth, 0.0), area[buried])
         if np.abs(x - before).max() < _STILL:
             break
     return x
 
 
-def _moved(x: FloatArray, at: FloatArray, way: FloatArray, wanted: FloatArray, weight: FloatArray) -> FloatArray:
+def _fit_rigid_motion(
+    x: FloatArray, at: FloatArray, way: FloatArray, wanted: FloatArray, weight: FloatArray
+) -> FloatArray:
     """Return the positions after the small rigid motion that best fits the target moves of points.
 
     Args:
@@ -73,6 +75,6 @@ def _moved(x: FloatArray, at: FloatArray, way: FloatArray, wanted: FloatArray, w
 
 def _outward(garment: TriangleMesh) -> float:
     """Return 1 where the garment's faces look outward, its openings closed, and -1 where they look inward."""
-    solid = closed(garment)
+    solid = close_openings(garment)
     a, b, c = (solid.vertices[solid.faces[:, k]] for k in range(3))
     return float(np.sign(np.einsum("fi,fi->", a, np.cross(b, c))))

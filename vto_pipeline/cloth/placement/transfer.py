@@ -22,7 +22,7 @@ _FIRM = 0.03  # m: over this length along the cloth, tightness outweighs proport
 _SMOOTH = 0.06  # m: over this length along loose cloth, the change of the body is averaged
 
 
-def reshape(cloth: TriangleMesh, source: TriangleMesh, target: TriangleMesh) -> FloatArray:
+def transfer_deformation(cloth: TriangleMesh, source: TriangleMesh, target: TriangleMesh) -> FloatArray:
     """Return the cloth's positions on the target body [m], shape (V, 3).
 
     Args:
@@ -32,7 +32,7 @@ def reshape(cloth: TriangleMesh, source: TriangleMesh, target: TriangleMesh) -> 
     """
     surface = SurfaceDistance(source).signed(cloth.vertices)
     corners = source.faces[surface.face]
-    shares = _shares(surface.point, source.vertices[corners])
+    shares = _barycentric(surface.point, source.vertices[corners])
     near = 1.0 / (1.0 + (surface.distance / _TIGHT) ** 2)
     matrix, area = laplacian(cloth)
     gradient = np.einsum("nk,nkij->nij", shares, _vertex_gradients(source, target)[corners])
@@ -98,7 +98,7 @@ def _rotations(gradient: FloatArray) -> FloatArray:
     return np.asarray(left @ right)
 
 
-def _shares(points: FloatArray, corners: FloatArray) -> FloatArray:
+def _barycentric(points: FloatArray, corners: FloatArray) -> FloatArray:
     """Return barycentric coordinates of points of triangles, shape (N, 3)."""
     import igl
 

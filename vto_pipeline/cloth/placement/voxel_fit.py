@@ -19,7 +19,7 @@ from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 
 
-class Fill(NamedTuple):
+class VoxelPlacement(NamedTuple):
     """The best place of a garment, turned in one way.
 
     Args:
@@ -31,8 +31,8 @@ class Fill(NamedTuple):
 
     turn: FloatArray
     shift: FloatArray
-    worth: float
-    here: float
+    score: float
+    score_in_place: float
 
 
 def quarter_turns() -> list[FloatArray]:
@@ -47,7 +47,7 @@ def quarter_turns() -> list[FloatArray]:
     return turns
 
 
-class Cubes:
+class VoxelFit:
     """A body and a garment as cubes.
 
     Args:
@@ -60,18 +60,18 @@ class Cubes:
     def __init__(self, garment: TriangleMesh, body: TriangleMesh, cube: float, penalty: float) -> None:
         self._cube = cube
         self._body_low = body.vertices.min(axis=0)
-        self._body = _solid(body, self._body_low, cube)
+        self._body = _voxelise(body, self._body_low, cube)
         # garment cubes lie on the body's lattice, so that the shifts found include "none"
         low = garment.vertices.min(axis=0)
         self._low = self._body_low + np.floor((low - self._body_low) / cube) * cube
-        inside = _solid(closed(garment), self._low, cube)
+        inside = _voxelise(close_openings(garment), self._low, cube)
         cloth = np.zeros_like(inside)
         points = np.vstack([garment.vertices, garment.vertices[garment.faces].mean(axis=1)])
         cloth[tuple(((points - self._low) / cube).astype(np.int64).T)] = True
         self._worth = (inside & ~cloth).astype(np.float64) - penalty * cloth
         self._whole = max(int((inside | cloth).sum()), 1)
 
-    def fill(self, turn: FloatArray) -> Fill:
+    def best_placement(self, turn: FloatArray) -> VoxelPlacement:
         """Return the best place of the garment after a quarter turn."""
         worth, low = self._turned(turn)
         size = [next_fast_len(int(a + b)) for a, b in zip(self._body.shape, worth.shape, strict=True)]
@@ -82,7 +82,7 @@ class Cubes:
         overlaps = ((stay < np.array(self._body.shape)) & (stay > -np.array(worth.shape))).all()
         here = score[tuple(stay % np.array(size))] if overlaps else 0.0
         shift = self._body_low + steps * self._cube - low
-        return Fill(turn, shift, float(score[best] / self._whole), float(here / self._whole))
+        return VoxelPlacement(turn, shift, float(score[best] / self._whole), float(here / self._whole))
 
     def _turned(self, turn: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the garment's cubes after a quarter turn, and their lowest corner [m]."""
@@ -92,7 +92,7 @@ class Cubes:
         return np.flip(self._worth.transpose(axes), back), ends.min(axis=0)
 
 
-def _solid(mesh: TriangleMesh, low: FloatArray, cube: float) -> NDArray[np.bool_]:
+def _voxelise(mesh: TriangleMesh, low: FloatArray, cube: float) -> NDArray[np.bool_]:
     """Return which cubes, counted from `low`, have their centre inside the mesh, whichever way it is oriented."""
     import igl
 
@@ -102,7 +102,7 @@ def _solid(mesh: TriangleMesh, low: FloatArray, cube: float) -> NDArray[np.bool_
     return (np.abs(winding) > 0.5).reshape(counts)
 
 
-def closed(garment: TriangleMesh) -> TriangleMesh:
+def close_openings(garment: TriangleMesh) -> TriangleMesh:
     """Return the garment with a fan over each opening."""
     vertices, faces = [garment.vertices], [garment.faces]
     count = len(garment.vertices)

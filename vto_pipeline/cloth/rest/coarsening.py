@@ -20,7 +20,7 @@ _ROUNDS = 5  # of the remesher: more make no better triangles
 _SHORTEST, _LONGEST = 1e-3, 0.1  # m, edges that it makes
 
 
-class Coarser(NamedTuple):
+class CoarseGarment(NamedTuple):
     """A garment in fewer triangles.
 
     Args:
@@ -31,12 +31,12 @@ class Coarser(NamedTuple):
     garment: Garment
     binding: Binding
 
-    def finer(self, positions: FloatArray) -> FloatArray:
+    def prolong(self, positions: FloatArray) -> FloatArray:
         """Return where the fine garment's vertices are when the coarse one's are here; [m], shapes (V, 3)."""
         return apply(self.binding, positions)
 
 
-def coarser(fine: Garment, vertices: int) -> Coarser:
+def coarsen(fine: Garment, vertices: int) -> CoarseGarment:
     """Return a garment with about this many vertices.
 
     It is remeshed at rest, where it is smooth and clear of itself, onto the rest surface of the fine one; so both have
@@ -57,4 +57,4 @@ def coarser(fine: Garment, vertices: int) -> Coarser:
     coarse = remesh(laid, RemeshConfig(edge_mm=1e3 * edge, iterations=_ROUNDS), Job())
     now = apply(bind(coarse, laid), fine.mesh.vertices)
     garment = Garment(TriangleMesh(now, coarse.faces), replace(fine.rest, positions=coarse.vertices))
-    return Coarser(garment, bind(laid, coarse))
+    return CoarseGarment(garment, bind(laid, coarse))

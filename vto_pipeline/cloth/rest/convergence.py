@@ -10,7 +10,7 @@ import numpy as np
 
 from vto_pipeline.cloth.dynamics.stepper import Stepper
 from vto_pipeline.cloth.model.build import ClothState
-from vto_pipeline.cloth.rest.stable_newton import LOOK, Polish
+from vto_pipeline.cloth.rest.stable_newton import LOOK, StableNewtonSteps
 from vto_pipeline.errors import FallenError
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.cloth import TraceRow
@@ -45,7 +45,7 @@ class SettleLimits:
 
 
 @dataclass
-class Settling:
+class SettlingResult:
     """The result of settling.
 
     Args:
@@ -68,7 +68,7 @@ class Settling:
         return 1e3 * self.error if np.isfinite(self.error) else None
 
     @property
-    def unrest(self) -> str:
+    def not_settled_warning(self) -> str:
         """The warning where it did not settle."""
         if self.error_mm is None:
             return "not at rest, error unknown"
@@ -76,12 +76,12 @@ class Settling:
         return f"not at rest: {self.error_mm:.1f} mm of motion predicted, {left}"
 
 
-def settle(
+def relax_to_rest(
     stepper: Stepper,
     state: ClothState,
     limits: SettleLimits,
     watch: Callable[[float, float], None] = lambda done, error: None,
-) -> Settling:
+) -> SettlingResult:
     """Run until rest; where that depends on the steps, halve them until halving changes no more than the bound.
 
     The moves d of successive windows shrink by q, so d q / (1 - q) is still to come. Half the way of two windows is
@@ -90,8 +90,8 @@ def settle(
     shows three quarters of it (Richardson) and a third of that is left.
 
     Cloth that buckles slowly hardly moves for a long while, so being quiet does not prove much. A method that knows the
-    exact stiffness goes on in steps that grow as long as the system is positive definite (`cloth.polish`): one of these
-    goes all the way that was to come, and where it goes nowhere, the cloth is at rest, and stable.
+    exact stiffness goes on in steps that grow as long as the system is positive definite (`cloth.rest.stable_newton`):
+    one of these goes all the way that was to come, and where it goes nowhere, the cloth is at rest, and stable.
 
     Args:
         stepper: The cloth among its colliders; its steps are changed, and as they were at the end if the rest does not
@@ -104,24 +104,24 @@ def settle(
         FallenError: all of it is under the lowest thing that could hold it.
     """
     began = time.perf_counter()
-    result = Settling(state)
+    result = SettlingResult(state)
     moves: list[float] = []
     drifts: list[float] = []
     earlier = state.positions
     coarse: FloatArray | None = None
     quiet = still = 0
     stepper.prepare(state.positions)
-    exact, polish = stepper.rests_exactly, Polish(stepper, limits.residual)
+    exact, newton_steps = stepper.has_exact_rest, StableNewtonSteps(stepper, limits.residual)
     looks, share = 0, 0.0
     while share < 1.0 and time.perf_counter() < limits.deadline:
-        before, known = result.state.positions, stepper.known
-        span = polish.span
+        before, known = result.state.positions, stepper.contact_memory
+        span = newton_steps.span
         after = stepper.run(result.state, span)
         residual = stepper.residual(after)
         looks += 1
         share = looks * LOOK / limits.seconds
-        if polish.goes_astray(residual):
-            stepper.known = known
+        if newton_steps.diverged(residual):
+            stepper.contact_memory = known
             continue
         result.state, result.residual = after, residual
         if after.positions[:, 1].max() < limits.lowest:
@@ -134,26 +134,26 @@ def settle(
             moves.append(moved)
             drifts.append(0.5 * _rms(after.positions - earlier) if len(moves) > 1 else moved)
             earlier = before
-            whole = polish.whole and len(moves) > 1
+            whole = newton_steps.took_full_step and len(moves) > 1
             to_come = max(moves[-2:]) if whole else max(moved, _still_to_come(drifts))
-            result.error = max(to_come, _VAGUE) if stepper.polishes and not whole else to_come
+            result.error = max(to_come, _VAGUE) if stepper.can_use_exact_stiffness and not whole else to_come
             if not exact:
                 result.error += np.inf if coarse is None else _rms(after.positions - coarse) / 3.0
         seconds = time.perf_counter() - began
-        row = TraceRow(seconds, stepper.steps, 1e3 * result.error, result.residual, contacts=stepper.bearing)
+        row = TraceRow(seconds, stepper.steps, 1e3 * result.error, result.residual, contacts=stepper.pushing_contacts)
         result.trace.append(row)
         watch(share, result.error)
         if brief:
-            polish.choose(moved < _STILL, residual)
+            newton_steps.choose(moved < _STILL, residual)
             continue
         first = coarse is None and not exact
         bound = _COARSE * limits.error if first else (1.0 if exact else 0.5) * limits.error
         still = still + 1 if to_come < _STILL else 0
         balanced = result.residual < limits.residual or not exact
         over = balanced or still >= _LONG
-        quiet = quiet + 1 if to_come < bound and over and (whole or not stepper.definite) else 0
-        if stepper.polishes and limits.error < _VAGUE:
-            polish.choose(moved < (_NEAR if over else _STILL), residual)
+        quiet = quiet + 1 if to_come < bound and over and (whole or not stepper.was_positive_definite) else 0
+        if stepper.can_use_exact_stiffness and limits.error < _VAGUE:
+            newton_steps.choose(moved < (_NEAR if over else _STILL), residual)
         if quiet < (1 if exact and residual < limits.residual else _QUIET):  # at a turn of its way forces are large
             continue
         if result.error <= limits.error:
@@ -166,7 +166,7 @@ def settle(
         coarse, moves, drifts, quiet = result.state.positions, [], [], 0
         stepper.substeps *= 2
     if exact:
-        polish.end()
+        newton_steps.end()
     return result
 
 

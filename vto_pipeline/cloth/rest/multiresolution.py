@@ -16,8 +16,8 @@ from typing import NamedTuple
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.dynamics.stepper import Stepper
 from vto_pipeline.cloth.model.build import ClothModel, at_rest, build
-from vto_pipeline.cloth.rest.coarsening import Coarser, coarser
-from vto_pipeline.cloth.rest.convergence import Settling
+from vto_pipeline.cloth.rest.coarsening import CoarseGarment, coarsen
+from vto_pipeline.cloth.rest.convergence import SettlingResult
 from vto_pipeline.cloth.rest.phases import REST, ROUGH, Phases
 from vto_pipeline.cloth.simulation import default_skin
 from vto_pipeline.errors import GarmentError, InputError
@@ -32,7 +32,7 @@ _FEWER = 4  # times fewer vertices on the next coarser mesh: edges twice as long
 _FIRST = 0.5  # of the progress, and of the time there is: the coarser meshes
 
 
-class Reached(NamedTuple):
+class RestOnMesh(NamedTuple):
     """How a garment came to rest on one mesh.
 
     Args:
@@ -46,13 +46,13 @@ class Reached(NamedTuple):
     model: ClothModel
     phases: Phases
     stepper: Stepper
-    settling: Settling
+    settling: SettlingResult
     before: tuple[Phases, ...] = ()
 
 
 def come_to_rest(
     garment: Garment, body: MovingBody, fabric: Fabric, config: DrapeConfig, job: Job, deadline: float
-) -> Reached:
+) -> RestOnMesh:
     """Return the garment at rest on the body as it ends; the trace begins with those of the coarser meshes.
 
     Args:
@@ -68,10 +68,10 @@ def come_to_rest(
         DivergedError: positions are no longer finite.
     """
     model = build(garment.mesh, garment.rest, fabric, materials=config, job=job)
-    return _Descent(garment, model, fabric, config, job).reach(body, deadline)
+    return _CoarseToFine(garment, model, fabric, config, job).run(body, deadline)
 
 
-class _Descent:
+class _CoarseToFine:
     """The way of one garment down its meshes, coarsest first."""
 
     def __init__(self, garment: Garment, model: ClothModel, fabric: Fabric, config: DrapeConfig, job: Job) -> None:
@@ -85,7 +85,7 @@ class _Descent:
         self._rough = config.model_copy(update={"skin_mm": skin_mm, "clear_rounds": 0})  # a finer mesh will see to that
         self._coarser = _coarser_ones(garment, config.coarsen_above, job)
 
-    def reach(self, body: MovingBody, deadline: float) -> Reached:
+    def run(self, body: MovingBody, deadline: float) -> RestOnMesh:
         """Return the garment at rest on its own mesh."""
         trace: list[TraceRow] = []
         before: tuple[Phases, ...] = ()
@@ -104,7 +104,7 @@ class _Descent:
                 f"first came to rest on {len(start.mesh.vertices)} vertices: {time.perf_counter() - now:.1f} s, "
                 f"{found.stepper.steps} steps"
             )
-            there = self._coarser[level - 1].finer(found.settling.state.positions)
+            there = self._coarser[level - 1].prolong(found.settling.state.positions)
             start = Garment(TriangleMesh(there, finer.mesh.faces), finer.rest)
             body = MovingBody(body.keyframes[-1:], body.faces)
         reached = self._rest_on(0, start, body, deadline)
@@ -112,7 +112,7 @@ class _Descent:
         reached.settling.trace[:0] = trace
         return reached._replace(before=before)
 
-    def _rest_on(self, level: int, garment: Garment, body: MovingBody, deadline: float) -> Reached | None:
+    def _rest_on(self, level: int, garment: Garment, body: MovingBody, deadline: float) -> RestOnMesh | None:
         """Return the garment at rest on one mesh: 0 is its own, the last the coarsest.
 
         None where that is coarser and too coarse to be freed from the body: between large triangles that pass through
@@ -124,26 +124,28 @@ class _Descent:
             model = build(garment.mesh, garment.rest, self._fabric, materials=config)
         phases = Phases(model, garment.rest, self._fabric, config, job)
         first = TriangleMesh(body.keyframes[0], body.faces)
-        state = phases.free(at_rest(garment.mesh.vertices))
+        state = phases.resolve_crossings(at_rest(garment.mesh.vertices))
         if level == len(self._coarser):  # the others start outside the body, but for corners that edges have cut
-            state = phases.free(phases.grow(state, first), first)
-            if level > 0 and phases.left > 0:
+            state = phases.resolve_crossings(phases.grow_body(state, first), first)
+            if level > 0 and phases.crossings_left > 0:
                 self._job.leave_out(
                     f"coming to rest on {len(model.mass)} vertices first",
-                    f"too coarse to clear the body: {phases.left} pairs of triangles still intersect",
+                    f"too coarse to clear the body: {phases.crossings_left} pairs of triangles still intersect",
                 )
                 return None
         collider = phases.collider(body, TriangleMesh(state.positions, model.faces))
         stepper = phases.stepper(model, collider, config.damping)
         stepper.prepare(state.positions)
         job.note(f"{stepper.choice.method}, {stepper.substeps} steps per 1/60 s: {stepper.choice.reason}")
-        state = phases.ride(state, stepper, collider, body.final)
+        state = phases.follow_body(state, stepper, collider, body.final)
         before = time.perf_counter() - self._began
-        settling = phases.settle(state, stepper, body.final, deadline, (ROUGH,) if level > 0 else (ROUGH, REST))
+        settling = phases.settle_and_clear(
+            state, stepper, body.final, deadline, (ROUGH,) if level > 0 else (ROUGH, REST)
+        )
         settling.trace = [replace(row, seconds=before + row.seconds, level=level) for row in settling.trace]
         if level > 0:  # what matters in the end warns again
             self._job.notes += [f"on {len(model.mass)} vertices: {text}" for text in job.warnings]
-        return Reached(model, phases, stepper, settling)
+        return RestOnMesh(model, phases, stepper, settling)
 
     def _part(self, level: int) -> Job:
         """Return a job whose progress is a part of the first half of the whole one's."""
@@ -155,13 +157,13 @@ class _Descent:
         return Job(progress, whole.scratch, whole.seed, whole.force_all)
 
 
-def _coarser_ones(garment: Garment, most: int, job: Job) -> list[Coarser]:
+def _coarser_ones(garment: Garment, most: int, job: Job) -> list[CoarseGarment]:
     """Return coarser garments, each of a quarter of the vertices of the last, until one has no more than `most`."""
-    made: list[Coarser] = []
+    made: list[CoarseGarment] = []
     what = "coming to rest on a coarser mesh first"
     while (count := len(garment.mesh.vertices)) > most:
         try:
-            made.append(coarser(garment, count // _FEWER))
+            made.append(coarsen(garment, count // _FEWER))
         except (InputError, GarmentError) as error:
             job.leave_out(what, f"{count} vertices cannot be reduced to {count // _FEWER}: {error.problem}")
             return made

@@ -8,15 +8,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from vto_pipeline.cloth.collision.self_collision.tally import Tally, tell
+from vto_pipeline.cloth.collision.self_collision.counters import CollisionCounters, report_counters
 from vto_pipeline.cloth.drape_config import DrapeConfig
-from vto_pipeline.cloth.dynamics.body_motion import PacedBody, covered_way, ride
+from vto_pipeline.cloth.dynamics.body_motion import VariableSpeedBody, body_travel, run_body_motion
 from vto_pipeline.cloth.dynamics.stepper import Stepper
 from vto_pipeline.cloth.model.build import ClothModel, ClothState, at_rest, without_gravity
-from vto_pipeline.cloth.placement.body_growth import growing
-from vto_pipeline.cloth.placement.clear_body import clear_of_body
-from vto_pipeline.cloth.placement.collision_free_start import free_start
-from vto_pipeline.cloth.rest.convergence import SettleLimits, Settling, settle
+from vto_pipeline.cloth.placement.body_growth import plan_body_growth
+from vto_pipeline.cloth.placement.clear_body import clear_body_crossings
+from vto_pipeline.cloth.placement.collision_free_start import find_collision_free_start
+from vto_pipeline.cloth.rest.convergence import SettleLimits, SettlingResult, relax_to_rest
 from vto_pipeline.cloth.simulation import default_skin
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.body import MovingBody
@@ -58,29 +58,29 @@ class Phases:
         self._skin = default_skin(model.edge_length) if config.skin_mm is None else 1e-3 * config.skin_mm
         self._config = config
         self._job = job
-        self.left = 0
+        self.crossings_left = 0
         self._crossed = np.zeros(len(model.mass), np.bool_)
-        self._tallies: list[Tally] = []
-        self._colliders: list[PacedBody] = []
+        self._counters: list[CollisionCounters] = []
+        self._colliders: list[VariableSpeedBody] = []
 
-    def free(self, state: ClothState, body: TriangleMesh | None = None) -> ClothState:
+    def resolve_crossings(self, state: ClothState, body: TriangleMesh | None = None) -> ClothState:
         """Return the cloth where it crosses neither itself nor the body; where it could not be freed, it may go on."""
         if not self._config.self_collision:
             return state
-        start = free_start(
+        start = find_collision_free_start(
             state.positions, self._model.faces, self._rest.positions, self._fabric.thickness, self._job, body
         )
-        self.left, self._crossed = start.left, start.crossed
-        if start.pairs == 0:
+        self.crossings_left, self._crossed = start.crossings_left, start.crossed
+        if start.crossings == 0:
             return state
         return replace(state, positions=start.positions, velocities=np.zeros_like(state.velocities))
 
-    def collider(self, body: MovingBody, cloth: TriangleMesh) -> PacedBody:
+    def collider(self, body: MovingBody, cloth: TriangleMesh) -> VariableSpeedBody:
         """Return the body, which moves as fast as it may about the cloth."""
-        seconds = covered_way(body, cloth) / self._config.body_speed
-        return PacedBody(body, seconds, self._friction, self._job)
+        seconds = body_travel(body, cloth) / self._config.body_speed
+        return VariableSpeedBody(body, seconds, self._friction, self._job)
 
-    def stepper(self, model: ClothModel, collider: PacedBody, damping: float) -> Stepper:
+    def stepper(self, model: ClothModel, collider: VariableSpeedBody, damping: float) -> Stepper:
         """Return the cloth among its colliders."""
         made = Stepper(
             model,
@@ -94,10 +94,10 @@ class Phases:
         )
         self._colliders.append(collider)
         if made.self_contact is not None:
-            self._tallies.append(made.self_contact.tally)
+            self._counters.append(made.self_contact.counters)
         return made
 
-    def grow(self, state: ClothState, body: TriangleMesh) -> ClothState:
+    def grow_body(self, state: ClothState, body: TriangleMesh) -> ClothState:
         """Return the cloth outside the body."""
         mesh = TriangleMesh(state.positions, self._model.faces)
         depth = -float(SurfaceDistance(body).signed(mesh.vertices).distance.min())
@@ -106,34 +106,40 @@ class Phases:
             self._job.leave_out(what, f"no cloth is deeper inside than {1e3 * max(depth, 0):.1f} mm")
             return state
         self._job.progress(0.05, what)
-        growth = growing(body, mesh, self._job)
+        growth = plan_body_growth(body, mesh, self._job)
         state = at_rest(growth.garment.vertices)
         collider = self.collider(growth.body, growth.garment)
         stepper = self.stepper(without_gravity(self._model), collider, _CALM)
-        grown = ride(stepper, state, collider, self._skin, lambda done: self._job.progress(0.05 + 0.25 * done, what))
+        grown = run_body_motion(
+            stepper, state, collider, self._skin, lambda done: self._job.progress(0.05 + 0.25 * done, what)
+        )
         return at_rest(grown.positions)
 
-    def ride(self, state: ClothState, stepper: Stepper, collider: PacedBody, body: TriangleMesh) -> ClothState:
+    def follow_body(
+        self, state: ClothState, stepper: Stepper, collider: VariableSpeedBody, body: TriangleMesh
+    ) -> ClothState:
         """Return the cloth after the body's motion."""
         what = "moving along with the body"
         if collider.ends == 0.0:
             self._job.leave_out(what, "the body is at rest")
             return state
         at_full_pace = collider.ends
-        state = ride(stepper, state, collider, self._skin, lambda done: self._job.progress(0.3 + 0.2 * done, what))
+        state = run_body_motion(
+            stepper, state, collider, self._skin, lambda done: self._job.progress(0.3 + 0.2 * done, what)
+        )
         self._job.note(
             f"the body took {collider.ends:.2f} s to change, in simulated time; {at_full_pace:.2f} s unslowed"
         )
-        return self.free(state, body)
+        return self.resolve_crossings(state, body)
 
-    def settle(
+    def settle_and_clear(
         self,
         state: ClothState,
         stepper: Stepper,
         body: TriangleMesh,
         deadline: float,
         passes: Sequence[tuple[float, float]] = (ROUGH, REST),
-    ) -> Settling:
+    ) -> SettlingResult:
         """Return the cloth at rest and clear of the body, or as near to it as allowed.
 
         Args:
@@ -157,7 +163,7 @@ class Phases:
             lowest=float(body.vertices[:, 1].min()),
         )
         stepper.prepare(state.positions)
-        if self._config.substeps is None and stepper.rests_exactly:
+        if self._config.substeps is None and stepper.has_exact_rest:
             stepper.substeps = min(stepper.substeps, _LONG)
         trace: list[TraceRow] = []
         began = time.perf_counter()
@@ -165,10 +171,12 @@ class Phases:
             error, times = passes[min(turn, len(passes) - 1)]
             enough = replace(limits, error=max(error, limits.error), residual=times * limits.residual)
             spent = time.perf_counter() - began
-            settling = settle(stepper, state, enough, watch)
+            settling = relax_to_rest(stepper, state, enough, watch)
             trace += [replace(row, seconds=spent + row.seconds) for row in settling.trace]
             self._job.progress(0.9, "clearing the body")
-            state, crossing = clear_of_body(stepper, settling.state, self._model.faces, body, self._config.clear_rounds)
+            state, crossing = clear_body_crossings(
+                stepper, settling.state, self._model.faces, body, self._config.clear_rounds
+            )
             lies_clear = state is settling.state
             settling.state, settling.trace = state, trace
             if not lies_clear:  # nobody has looked at it since it was moved
@@ -179,8 +187,8 @@ class Phases:
                 break
         return settling
 
-    def account(self, before: Sequence[Phases] = ()) -> None:
+    def report_collision_work(self, before: Sequence[Phases] = ()) -> None:
         """Tell what keeping the cloth apart took, and what was left out of it, here and on coarser meshes before."""
         every = (*before, self)
-        tallies = [tally for one in every for tally in one._tallies]
-        tell(tallies, [collider for one in every for collider in one._colliders], self._job)
+        counters = [count for one in every for count in one._counters]
+        report_counters(counters, [collider for one in every for collider in one._colliders], self._job)

@@ -17,7 +17,7 @@ _SHORTER = 64.0  # times shorter than usual, at most, where cloth is about to bu
 _FEW = 3  # of these steps to a look: it is the way that matters there, not the time it takes
 
 
-class Polish:
+class StableNewtonSteps:
     """Chooses the steps of a cloth that comes to rest.
 
     With inertia gone a step with the exact stiffness is one of Newton's method (pseudo-transient continuation; Kelley &
@@ -45,18 +45,18 @@ class Polish:
     def span(self) -> float:
         """Cloth time until the next look [s]."""
         stepper = self._stepper
-        if stepper.polishes and stepper.substeps > self._usual:
+        if stepper.can_use_exact_stiffness and stepper.substeps > self._usual:
             return _FEW * stepper.step
         return max(LOOK, stepper.step)
 
     @property
-    def whole(self) -> bool:
+    def took_full_step(self) -> bool:
         """Whether the last step went all the way there was to go, of a cloth that is stable there."""
-        return self._stepper.definite and self._stepper.step >= LONGEST
+        return self._stepper.was_positive_definite and self._stepper.step >= LONGEST
 
-    def goes_astray(self, residual: float) -> bool:
+    def diverged(self, residual: float) -> bool:
         """Return whether the last step was a long one, and led away from rest; if so the next ones are shorter."""
-        if not self._stepper.definite or residual <= self._most or self._stepper.substeps >= self._usual:
+        if not self._stepper.was_positive_definite or residual <= self._most or self._stepper.substeps >= self._usual:
             return False
         self._shorten()
         return True
@@ -69,9 +69,9 @@ class Polish:
             residual: Left-over force now.
         """
         stepper = self._stepper
-        if stepper.definite and residual > self._most:
+        if stepper.was_positive_definite and residual > self._most:
             self._most = _ASIDE * residual
-        elif stepper.definite:
+        elif stepper.was_positive_definite:
             self._most = max(_FALLS * self._most, _SLIGHT * self._enough)
             if residual < self._enough or stepper.substeps > self._usual:
                 stepper.substeps = max(stepper.substeps / _LONGER, FRAME / LONGEST)
@@ -84,13 +84,13 @@ class Polish:
             elif self._tried:
                 stepper.substeps = min(_LONGER * stepper.substeps, _SHORTER * self._usual)
             self._tried = near
-            stepper.polish(near)
+            stepper.use_exact_stiffness(near)
 
     def _shorten(self) -> None:
         self._stepper.substeps = min(_LONGER * self._stepper.substeps, self._usual)
-        self._stepper.polish(True)
+        self._stepper.use_exact_stiffness(True)
 
     def end(self) -> None:
         """Go back to the usual steps."""
         self._stepper.substeps = self._usual
-        self._stepper.polish(False)
+        self._stepper.use_exact_stiffness(False)

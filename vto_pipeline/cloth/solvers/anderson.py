@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vto_pipeline.cloth.implicit_step.geometric_stiffness import is_due, put_back
+from vto_pipeline.cloth.implicit_step.geometric_stiffness import is_drift_removal_due, remove_primal_drift
 from vto_pipeline.cloth.implicit_step.iterated import ImplicitStep
 from vto_pipeline.cloth.solvers.gauss_seidel import GaussSeidel
 from vto_pipeline.model.arrays import FloatArray
@@ -45,8 +45,8 @@ class Anderson(GaussSeidel):
             smallest = min(smallest, size)
             changes = [*changes[-_WINDOW:], change]
             results = [*results[-_WINDOW:], np.concatenate([one.ravel() for one in parts])]
-            if is_due(sweep, self.sweeps):
-                put_back(self.linear, self.model, step, x, pressed)
+            if is_drift_removal_due(sweep, self.sweeps):
+                remove_primal_drift(self.linear, self.model, step, x, pressed)
                 changes, results, smallest = [], [], np.inf
             elif len(changes) > 1 and sweep < self.sweeps:
                 _spread(_extrapolated(changes, results), parts)

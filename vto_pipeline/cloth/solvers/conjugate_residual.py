@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from vto_pipeline.cloth.implicit_step.dual_system import inner
-from vto_pipeline.cloth.implicit_step.geometric_stiffness import is_due, put_back
+from vto_pipeline.cloth.implicit_step.geometric_stiffness import is_drift_removal_due, remove_primal_drift
 from vto_pipeline.cloth.implicit_step.iterated import DualIterated, ImplicitStep
-from vto_pipeline.cloth.implicit_step.plane_multiplier import press
+from vto_pipeline.cloth.implicit_step.plane_multiplier import solve_plane_contacts
 from vto_pipeline.cloth.model.build import ClothModel
 from vto_pipeline.model.arrays import FloatArray
 
@@ -56,6 +56,6 @@ class ConjugateResidual(DualIterated):
             for scaled, direction in zip(self._scaled, self._direction, strict=True):
                 np.multiply(direction, share, out=scaled)
             linear.move(x, self._scaled)
-            press(x, step.start, self.model.inverse_mass, step.contacts, step.t0, step.t1, pressed)
-            if is_due(iteration + 1, self.sweeps):
-                put_back(linear, self.model, step, x, pressed)
+            solve_plane_contacts(x, step.start, self.model.inverse_mass, step.contacts, step.t0, step.t1, pressed)
+            if is_drift_removal_due(iteration + 1, self.sweeps):
+                remove_primal_drift(linear, self.model, step, x, pressed)

@@ -12,10 +12,10 @@ from scipy.sparse.linalg import splu
 
 from vto_pipeline.cloth.constraints.rigid import rigid_kind
 from vto_pipeline.cloth.constraints.sweep import stiffness_one, stiffness_scratch
-from vto_pipeline.cloth.implicit_step.dual_system import Rows
+from vto_pipeline.cloth.implicit_step.dual_system import LinearisedConstraints
 from vto_pipeline.cloth.implicit_step.iterated import DualIterated, ImplicitStep
 from vto_pipeline.cloth.implicit_step.line_search import Merit
-from vto_pipeline.cloth.implicit_step.plane_multiplier import press
+from vto_pipeline.cloth.implicit_step.plane_multiplier import solve_plane_contacts
 from vto_pipeline.cloth.model.build import ClothModel
 from vto_pipeline.model.arrays import FloatArray
 
@@ -58,7 +58,7 @@ class FastProjection(DualIterated):
             share = 1.0 if merit is None else merit.share(x, moved, pushes)
             x += share * moved
         weights = self.model.inverse_mass
-        press(x, step.start, weights, step.contacts, step.t0, step.t1, pushes[:, :, None] * normals)
+        solve_plane_contacts(x, step.start, weights, step.contacts, step.t0, step.t1, pushes[:, :, None] * normals)
 
     def _direction(
         self,
@@ -108,7 +108,7 @@ def _plane_rows(working: NDArray[np.bool_], normals: FloatArray) -> csr_array:
     return csr_array((normals[working].ravel(), columns.ravel(), starts), shape=(len(vertex), 3 * working.shape[1]))
 
 
-def _jacobian(rows: Rows, free: NDArray[np.bool_]) -> csr_array:
+def _jacobian(rows: LinearisedConstraints, free: NDArray[np.bool_]) -> csr_array:
     count, size, corners, _ = rows.gradients.shape
     columns = np.broadcast_to((3 * rows.vertices[:, :, None] + np.arange(3))[:, None], rows.gradients.shape)
     starts = 3 * corners * np.arange(count * size + 1)
@@ -116,13 +116,13 @@ def _jacobian(rows: Rows, free: NDArray[np.bool_]) -> csr_array:
     return csr_array((values, columns.ravel(), starts), shape=(count * size, len(free)))
 
 
-def _soft(rows: Rows) -> bsr_array:
+def _soft(rows: LinearisedConstraints) -> bsr_array:
     count, size, _ = rows.soft.shape
     places = np.arange(count + 1)
     return bsr_array((rows.soft, places[:-1], places), shape=(count * size, count * size))
 
 
-def _stiffness(blocks: FloatArray, rows: Rows, h: float, free: NDArray[np.bool_]) -> csr_array:
+def _stiffness(blocks: FloatArray, rows: LinearisedConstraints, h: float, free: NDArray[np.bool_]) -> csr_array:
     """Return h² K of one kind from its stencils' blocks, without rows and columns of held vertices."""
     places = 3 * rows.vertices[:, :, None] + np.arange(3)
     corners = rows.vertices.shape[1]

@@ -16,26 +16,26 @@ import numpy as np
 from numba import njit
 
 from vto_pipeline.cloth.collision.contacts import Contacts
-from vto_pipeline.cloth.collision.response.active_set import ActiveSet, active_set, no_contacts, taken_on
+from vto_pipeline.cloth.collision.response.active_set import ActiveSet, active_set, add_pairs, no_contacts
 from vto_pipeline.cloth.collision.response.contact_springs import (
     add_contacts,
     add_last_forces,
     contact_energy,
-    keep_apart,
+    displacement_by_planes,
     linked_contacts,
-    revise,
-    taken_along,
+    project_to_contacts,
+    update_active_set,
 )
-from vto_pipeline.cloth.collision.response.step_response import respond
+from vto_pipeline.cloth.collision.response.step_response import resolve_plane_contacts
 from vto_pipeline.cloth.collision.self_collision.pairs import no_pairs
 from vto_pipeline.cloth.collision.self_collision.self_contact import SelfContact
 from vto_pipeline.cloth.constraints.rigid import refuse_rigid
 from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM, add_damping_forces, add_forces
 from vto_pipeline.cloth.implicit_step.linear_system import LinearSystem
-from vto_pipeline.cloth.implicit_step.momentum import keep_momentum, pieces
+from vto_pipeline.cloth.implicit_step.momentum import free_components, keep_momentum
 from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
 from vto_pipeline.cloth.model.build import ClothModel, ClothState
-from vto_pipeline.cloth.model.internal_friction import own, recall, remember, slip
+from vto_pipeline.cloth.model.internal_friction import copy_sliders, restore_sliders, slip, with_own_sliders
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.numerics.line_search import halvings
 from vto_pipeline.numerics.linear.block_matrix import BlockMatrix, row_times
@@ -92,7 +92,7 @@ class Newton:
     """
 
     def __init__(self, model: ClothModel, *, sweeps: int = 1, damping: float = 0.0, max_speed: float = np.inf) -> None:
-        self._model = model = own(model)
+        self._model = model = with_own_sliders(model)
         self._sweeps = sweeps
         self._damping = damping
         self._max_speed = max_speed
@@ -104,12 +104,12 @@ class Newton:
         self._system = LinearSystem(self._stiffness.matrix, self._held)
         self._stiffness.write_to(self._system.blocks)
         self.active: ActiveSet = no_contacts(0)
-        self._pieces = pieces(model, self._stiffness.matrix)
+        self._pieces = free_components(model, self._stiffness.matrix)
         self._allowed = 0.0  # what a step may cost in energy by being solved in part [J]
         self._whole = np.zeros((len(model.mass), 3))  # what the residuals of a step are measured against [N]
 
     @property
-    def knows_exactly(self) -> bool:
+    def can_use_exact_stiffness(self) -> bool:
         """Whether systems with the exact stiffness can be solved: of very large cloth they are not factored."""
         return self._system.eliminates
 
@@ -124,16 +124,16 @@ class Newton:
         if not self._checked:
             refuse_rigid(self._model.constraints, state.positions, "newton")
             self._checked = True
-        recall(self._model, state.sliders)
+        restore_sliders(self._model, state.sliders)
         x, v = state.positions.copy(), state.velocities.copy()
         for step in range(substeps):
             if self.self_contact is not None:
-                self.self_contact.at(state.time + step * h, state.time + (step + 1) * h)
+                self.self_contact.set_time_span(state.time + step * h, state.time + (step + 1) * h)
             self._step(x, v, contacts, step / substeps, (step + 1) / substeps, h)
-        return ClothState(x, v, state.time + substeps * h, remember(self._model))
+        return ClothState(x, v, state.time + substeps * h, copy_sliders(self._model))
 
     @property
-    def bearing(self) -> int:
+    def pushing_contacts(self) -> int:
         """How many contacts pushed in the last step."""
         return int(self.active.pushing.sum())
 
@@ -147,7 +147,7 @@ class Newton:
         x[led] += h * v[led]
         target = x + move + (~held)[:, None] * (h * h * model.gravity)
         itself = self.self_contact
-        pairs = no_pairs() if itself is None else itself.near(start, target, h, move)
+        pairs = no_pairs() if itself is None else itself.find_pairs(start, target, h, move)
         guess, mass = target - start, model.inverse_mass
         self.active = active_set(contacts, pairs, t0, t1, mass, start, guess, move, self.active)
         if led.any():  # what they pull at their neighbours by being led is no measure
@@ -166,9 +166,11 @@ class Newton:
                 done = min(done, self._descend(x, target, h, first), key=lambda one: one.left)
         x[:] = done.y
         longest = self._max_speed * h
-        respond(x, v, start, model.inverse_mass, contacts, t0, t1, h, longest, True, len(x) >= PARALLEL_FROM)
+        resolve_plane_contacts(
+            x, v, start, model.inverse_mass, contacts, t0, t1, h, longest, True, len(x) >= PARALLEL_FROM
+        )
         if itself is not None:
-            x[:], _ = itself.safe(start, x, taken_along(self.active, start))
+            x[:], _ = itself.collision_free(start, x, displacement_by_planes(self.active, start))
             v[:] = (x - start) / h
             self._keep_momentum(v, (target - start) / h)  # what was cut short has pushed something else
         slip(x, model.constraints)
@@ -234,7 +236,9 @@ class Newton:
         if y is x:
             if not measured:  # in the cloth's own frame: speed is no force
                 self._whole = self._unbalanced(forces - (model.mass / (h * h))[:, None] * guess)
-            guess = _better(system.levels, forces, guess, guess + (~self._held)[:, None] * (h * h * model.gravity))
+            guess = _lower_of_two(
+                system.levels, forces, guess, guess + (~self._held)[:, None] * (h * h * model.gravity)
+            )
         elif self._sweeps > 1:  # who asks for more wants to get to the end
             self._whole = forces
         bare = matrix.blocks[matrix.diagonal]
@@ -248,7 +252,7 @@ class Newton:
                 matrix.blocks[matrix.diagonal] = bare
                 between = system.couple(*linked_contacts(self.active, self._held))
                 add_contacts(self.active, model.mass, self._held, h, x, y, matrix, right, between)
-                keep_apart(self.active, model.inverse_mass, x, y, move)
+                project_to_contacts(self.active, model.inverse_mass, x, y, move)
             if self.definite:
                 self.definite = system.eliminated(right, move)
                 if not self.definite:  # once more, with a stiffness that is, and for now not tried again
@@ -260,11 +264,11 @@ class Newton:
             self._keep_momentum(move, target - y)
             if touches:
                 pushes = tuple(contact_energy(self.active, x, y + share * move) for share in (0.0, 0.5, 1.0))
-                changed = revise(self.active, x, y + move, _CROSSED * model.edge_length)
-                good = min(_CHANGED, _FEW / max(self.bearing, 1))
+                changed = update_active_set(self.active, x, y + move, _CROSSED * model.edge_length)
+                good = min(_CHANGED, _FEW / max(self.pushing_contacts, 1))
             if changed >= good and rounds > 0:
                 continue
-            if changed >= good or extensions == 0 or not self._take_on(x, y + move):
+            if changed >= good or extensions == 0 or not self._add_contacts_on_path(x, y + move):
                 break
             extensions -= 1
             rounds = max(rounds, 1)
@@ -277,13 +281,13 @@ class Newton:
             return self._stiffness.assemble_exact(y, 1.0 / (h * h), 1.0 / h)
         return self._stiffness.assemble(y, 1.0 / (h * h), 1.0, 1.0 / h)
 
-    def _take_on(self, x: FloatArray, end: FloatArray) -> bool:
+    def _add_contacts_on_path(self, x: FloatArray, end: FloatArray) -> bool:
         """Add what a move from x to end would pass through to the contacts; return whether there was any."""
         if self.self_contact is None:
             return False
-        _, met = self.self_contact.safe(x, end)
+        _, met = self.self_contact.collision_free(x, end)
         before = len(self.active.key)
-        self.active = taken_on(self.active, met, x, end - x)
+        self.active = add_pairs(self.active, met, x, end - x)
         return len(self.active.key) > before
 
     def _keep_momentum(self, move: FloatArray, wanted: FloatArray) -> None:
@@ -330,7 +334,7 @@ class Newton:
         return float(0.5 / (h * h) * np.einsum("i,ij,ij->", self._model.mass, off, off))
 
 
-def _better(levels: Hierarchy, right: FloatArray, one: FloatArray, other: FloatArray) -> FloatArray:
+def _lower_of_two(levels: Hierarchy, right: FloatArray, one: FloatArray, other: FloatArray) -> FloatArray:
     """Return that of two guesses at A d = right, shape (V, 3), with the smaller ½ dᵀ A d - dᵀ right."""
     return one if _quadratic(levels, right, one) <= _quadratic(levels, right, other) else other
 

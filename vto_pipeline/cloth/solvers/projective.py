@@ -12,7 +12,7 @@ from scipy.sparse.linalg import SuperLU, splu
 from vto_pipeline.cloth.constraints.sweep import linearised
 from vto_pipeline.cloth.implicit_step.iterated import ImplicitStep, Iterated
 from vto_pipeline.cloth.implicit_step.line_search import Merit
-from vto_pipeline.cloth.implicit_step.plane_multiplier import press
+from vto_pipeline.cloth.implicit_step.plane_multiplier import solve_plane_contacts
 from vto_pipeline.cloth.model.build import ClothModel
 from vto_pipeline.model.arrays import FloatArray
 
@@ -76,7 +76,7 @@ class Projective(Iterated):
         gaps = np.einsum("svk,vk->sv", normals, x) - heights
         pushes = np.where(able & (gaps <= touching), np.einsum("svk,vk->sv", normals, gradient), 0.0)
         pressed = np.maximum(pushes, 0.0)[:, :, None] * normals
-        press(x, step.start, self.model.inverse_mass, step.contacts, step.t0, step.t1, pressed)
+        solve_plane_contacts(x, step.start, self.model.inverse_mass, step.contacts, step.t0, step.t1, pressed)
 
     def _prefactored(self, step: ImplicitStep) -> SuperLU:
         if self._first is None:

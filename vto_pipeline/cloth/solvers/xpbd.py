@@ -1,7 +1,7 @@
 """Extended position based dynamics with small steps.
 
 Macklin, Müller & Chentanez 2016 (compliance); Macklin et al. 2019, "Small steps in physics simulation": many substeps
-with one Gauss-Seidel sweep each beat few steps with many sweeps. All substeps of a round run in one compiled call.
+with one Gauss-Seidel sweep each beat few steps with many sweeps. All substeps of a span run in one compiled call.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from numba import njit
 from numba.extending import overload
 
 from vto_pipeline.cloth.collision.contacts import Contacts
-from vto_pipeline.cloth.collision.response.step_response import respond
+from vto_pipeline.cloth.collision.response.step_response import resolve_plane_contacts
 from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM, multipliers, project
-from vto_pipeline.cloth.implicit_step.plane_multiplier import press
+from vto_pipeline.cloth.implicit_step.plane_multiplier import solve_plane_contacts
 from vto_pipeline.cloth.implicit_step.prediction import predict
 from vto_pipeline.cloth.model.build import ClothModel, ClothState
-from vto_pipeline.cloth.model.internal_friction import own, recall, remember, slip
+from vto_pipeline.cloth.model.internal_friction import copy_sliders, restore_sliders, slip, with_own_sliders
 from vto_pipeline.model.arrays import FloatArray
 
 
@@ -37,10 +37,10 @@ class Xpbd:
 
     forgets = False
 
-    rests_exactly = False  # one sweep a step leaves a share of h² of each constraint's error
+    has_exact_rest = False  # one sweep a step leaves a share of h² of each constraint's error
 
     def __init__(self, model: ClothModel, *, sweeps: int = 1, damping: float = 0.0, max_speed: float = np.inf) -> None:
-        self._model = own(model)
+        self._model = with_own_sliders(model)
         self._sweeps = sweeps
         self._damping = damping
         self._max_speed = max_speed
@@ -53,7 +53,7 @@ class Xpbd:
 
     def advance(self, state: ClothState, contacts: Contacts, h: float, substeps: int) -> ClothState:
         """Return the state after `substeps` steps of h [s]. The contacts hold for their whole span."""
-        recall(self._model, state.sliders)
+        restore_sliders(self._model, state.sliders)
         x, v = state.positions.copy(), state.velocities.copy()
         _advance(
             x,
@@ -71,7 +71,7 @@ class Xpbd:
             self.forgets,
             len(x) >= PARALLEL_FROM,
         )
-        return ClothState(x, v, state.time + substeps * h, remember(self._model))
+        return ClothState(x, v, state.time + substeps * h, copy_sliders(self._model))
 
 
 @njit(cache=True, error_model="numpy")
@@ -89,7 +89,7 @@ def _advance(
             if forgets:
                 _reset(lambdas)
             sweep_once(x, start, inverse_mass, constraints, lambdas, contacts, pressed, t0, t1, h, threaded)
-        respond(x, v, start, inverse_mass, contacts, t0, t1, h, longest, True, threaded)
+        resolve_plane_contacts(x, v, start, inverse_mass, contacts, t0, t1, h, longest, True, threaded)
         slip(x, constraints)
 
 
@@ -97,11 +97,11 @@ def _advance(
 def sweep_once(x, start, inverse_mass, constraints, lambdas, contacts, pressed, t0, t1, h, threaded):
     """Do one sweep of Gauss-Seidel over constraints and contacts on x, λ and pushes, in place.
 
-    See `constraints.sweep.project` and `press.press`.
+    See `constraints.sweep.project` and `plane_multiplier.solve_plane_contacts`.
     """
     project(x, start, inverse_mass, constraints, lambdas, h, threaded)
     if len(contacts.friction) > 0:
-        press(x, start, inverse_mass, contacts, t0, t1, pressed)
+        solve_plane_contacts(x, start, inverse_mass, contacts, t0, t1, pressed)
 
 
 def _reset(lambdas):

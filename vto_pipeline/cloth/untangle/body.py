@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vto_pipeline.cloth.untangle.contours import Crossings
-from vto_pipeline.cloth.untangle.rows import Rows, rows
+from vto_pipeline.cloth.untangle.rows import SeparationRows, separation_rows
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import face_normals, submesh
 from vto_pipeline.model.arrays import FloatArray
@@ -14,7 +14,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 _BEFORE = 1e-4  # m before a face, where it is asked whether that is still inside
 
 
-class Walls:
+class OutermostFaces:
     """A body's outermost faces. Those that lie inside it, where its parts overlap, show no way out and are left out.
 
     Args:
@@ -29,7 +29,7 @@ class Walls:
         self._normals = face_normals(skin)
         self._body = body
 
-    def rows(self, positions: FloatArray, crossing: Crossings, thickness: float, step: float) -> list[Rows]:
+    def rows(self, positions: FloatArray, crossing: Crossings, thickness: float, step: float) -> list[SeparationRows]:
         """Return rows that lead the cloth out.
 
         Args:
@@ -45,7 +45,7 @@ class Walls:
         away = (positions[near] - found.point[near]) / np.where(np.abs(depth) > 1e-9, depth, np.inf)[:, None]
         outward = np.where((np.abs(depth) > 1e-9)[:, None], away, self._normals[found.face[near]])
         level = np.minimum(thickness, depth + step) + np.einsum("nd,nd->n", found.point[near], outward)
-        parts = [rows(near[:, None], np.ones((len(near), 1)), outward, level, positions, free)]
+        parts = [separation_rows(near[:, None], np.ones((len(near), 1)), outward, level, positions, free)]
 
         everything = np.vstack([positions, self._body.vertices])
         of_body = crossing.edge[:, 0] >= free
@@ -56,7 +56,7 @@ class Walls:
         height = np.einsum("nkd,nd->nk", everything[crossing.edge[n]] - crossing.point[n, None], out)
         top = height.argmax(axis=1)
         parts.append(
-            rows(
+            separation_rows(
                 np.column_stack([crossing.edge[n, top], crossing.face[n]]),
                 np.column_stack([-np.ones(len(n)), crossing.weights[n]]),
                 out,
@@ -68,7 +68,7 @@ class Walls:
         n = np.flatnonzero(~of_body)
         n = n[(found.distance[crossing.edge[n]] >= 0.0).all(axis=1)]  # edges of the cloth across a ridge of the body
         parts.append(
-            rows(
+            separation_rows(
                 crossing.edge[n],
                 np.column_stack([1.0 - crossing.share[n], crossing.share[n]]),
                 crossing.normal[n],

@@ -26,7 +26,7 @@ _CLEAR = 0.3
 _ACROSS = 0.3  # cosine to the other sheet's direction, below which a crossing does not take part
 
 
-class Sheet(NamedTuple):
+class MeshGraph(NamedTuple):
     """A mesh as a graph of its vertices.
 
     Args:
@@ -41,7 +41,7 @@ class Sheet(NamedTuple):
     area: FloatArray
 
 
-class Sides(NamedTuple):
+class FloodSides(NamedTuple):
     """What the flood has found.
 
     Args:
@@ -54,15 +54,15 @@ class Sides(NamedTuple):
     decided: NDArray[np.bool_]
 
 
-def sheet(edges: IntArray, area: FloatArray) -> Sheet:
+def mesh_graph(edges: IntArray, area: FloatArray) -> MeshGraph:
     """Return the graph of these edges, shape (E, 2), among vertices with these areas [m²], shape (V,)."""
     ends = edges.T.reshape(-1)
     order = np.argsort(ends, kind="stable")
     begins = np.searchsorted(ends[order], np.arange(len(area) + 1)).astype(np.int32)
-    return Sheet(edges, begins, (order % len(edges)).astype(np.int32), area)
+    return MeshGraph(edges, begins, (order % len(edges)).astype(np.int32), area)
 
 
-def flood(sheet: Sheet, crossing: Crossings, contour: Contours, vertices: FloatArray) -> Sides:
+def flood_sides(sheet: MeshGraph, crossing: Crossings, contour: Contours, vertices: FloatArray) -> FloodSides:
     """Return where edges must go.
 
     Args:
@@ -75,7 +75,7 @@ def flood(sheet: Sheet, crossing: Crossings, contour: Contours, vertices: FloatA
         sheet.edges[:, 0].astype(np.int64) * count + sheet.edges[:, 1],
         crossing.edge[:, 0].astype(np.int64) * count + crossing.edge[:, 1],
     )
-    return Sides(*_flood(sheet, edge, crossing, contour, vertices))
+    return FloodSides(*_flood(sheet, edge, crossing, contour, vertices))
 
 
 @njit(cache=True, error_model="numpy")

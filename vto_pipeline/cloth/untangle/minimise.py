@@ -16,7 +16,7 @@ from vto_pipeline.model.arrays import FloatArray
 _GRAZING = 0.2  # |e · n| below which the crossing would run away along the edge
 
 
-def shortening(crossing: Crossings, vertices: FloatArray) -> FloatArray:
+def contour_shortening_shifts(crossing: Crossings, vertices: FloatArray) -> FloatArray:
     """Return the shift of each crossing's edge, against its face, that shortens the contour fastest, shape (N, 3).
 
     Its length is how many metres the contour loses per metre of shift.

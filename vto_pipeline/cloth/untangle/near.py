@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from vto_pipeline.cloth.collision.self_collision.candidates import self_candidates
 from vto_pipeline.cloth.collision.self_collision.surface_features import Features
-from vto_pipeline.cloth.untangle.rows import Rows, rows
+from vto_pipeline.cloth.untangle.rows import SeparationRows, separation_rows
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.numerics.distance import blend, closest_on_segments, closest_on_triangle
 from vto_pipeline.numerics.spatial.bvh import Bvh, refit_swept
@@ -17,7 +17,7 @@ from vto_pipeline.numerics.vector import add, load, norm, scale, store, sub, uni
 
 def near_rows(
     tree: Bvh, features: Features, positions: FloatArray, reach: float, thickness: float, skip: NDArray[np.bool_]
-) -> list[Rows]:
+) -> list[SeparationRows]:
     """Return rows that keep features of the cloth `thickness` apart, on the side where they are.
 
     Args:
@@ -39,7 +39,7 @@ def near_rows(
         coefficients, normal, distance = found(positions, ids)
         kept = (distance > 0.0) & (distance < reach)
         level = np.full(int(kept.sum()), thickness)
-        parts.append(rows(ids[kept], coefficients[kept], normal[kept], level, positions, len(positions)))
+        parts.append(separation_rows(ids[kept], coefficients[kept], normal[kept], level, positions, len(positions)))
     return parts
 
 

@@ -20,7 +20,7 @@ _DRAG = 0.2  # share of the difference of their moves that the ends of a bar los
 _OPEN = 0.5  # distance across a hinge, as a share of the flat one, to which a kink is opened
 
 
-class Bars(NamedTuple):
+class LengthBounds(NamedTuple):
     """How far apart vertices may be: those of an edge, and those across it, which keep a hinge from folding flat.
 
     Args:
@@ -35,7 +35,7 @@ class Bars(NamedTuple):
     opened: FloatArray
 
 
-def bars(mesh: TriangleMesh, rest: FloatArray) -> Bars:
+def length_bounds(mesh: TriangleMesh, rest: FloatArray) -> LengthBounds:
     """Return bars that let the cloth be as it is, or as it is at rest, and what lies between.
 
     Args:
@@ -46,7 +46,7 @@ def bars(mesh: TriangleMesh, rest: FloatArray) -> Bars:
     length, natural = _lengths(mesh.vertices, links), _lengths(rest, links)
     opened = _OPEN * _flat(rest, across)
     least = np.minimum(_lengths(mesh.vertices, across[:, 2:]), opened)
-    return Bars(
+    return LengthBounds(
         np.vstack([links, across[:, 2:]]),
         np.concatenate([np.minimum(length, natural), least]),
         np.concatenate([np.maximum(length, natural), np.full(len(across), np.inf)]),
@@ -54,14 +54,14 @@ def bars(mesh: TriangleMesh, rest: FloatArray) -> Bars:
     )
 
 
-def opened_at(bars: Bars, vertices: IntArray, count: int) -> Bars:
+def with_kinks_opened(bars: LengthBounds, vertices: IntArray, count: int) -> LengthBounds:
     """Return the bars with kinks at these of this many vertices to be opened."""
     kinked = np.zeros(count, np.bool_)
     kinked[vertices] = True
     return bars._replace(least=np.where(kinked[bars.ends].any(axis=1), bars.opened, bars.least))
 
 
-def shortfall(positions: FloatArray, bars: Bars) -> float:
+def length_violation(positions: FloatArray, bars: LengthBounds) -> float:
     """Return how far bars are from where they may be, rms [m]."""
     length = _lengths(positions, bars.ends)
     off = np.maximum(bars.least - length, 0.0) + np.maximum(length - bars.most, 0.0)
@@ -85,13 +85,13 @@ def _flat(rest: FloatArray, hinge: IntArray) -> FloatArray:
 
 
 @njit(cache=True, error_model="numpy")
-def relax(positions, rows, bars, sweeps, pressed):  # type: ignore[no-untyped-def]
+def project_rows_and_lengths(positions, rows, bars, sweeps, pressed):  # type: ignore[no-untyped-def]
     """Return the positions [m], shape (V, 3), after this many sweeps; the rows have the last word.
 
     Args:
         positions: [m], shape (V, 3).
-        rows: `Rows`.
-        bars: `Bars`.
+        rows: `SeparationRows`.
+        bars: `LengthBounds`.
         sweeps: How many.
         pressed: Share of its shortage that a bar regains in a sweep.
     """

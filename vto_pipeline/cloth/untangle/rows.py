@@ -11,7 +11,7 @@ from vto_pipeline.model.arrays import FloatArray, IntArray
 _WIDTH = 5  # points of a row at most: an edge and a face
 
 
-class Rows(NamedTuple):
+class SeparationRows(NamedTuple):
     """Conditions Σ cᵢ n · xᵢ >= level.
 
     Args:
@@ -27,14 +27,14 @@ class Rows(NamedTuple):
     level: FloatArray
 
 
-def rows(
+def separation_rows(
     vertices: IntArray,
     coefficients: FloatArray,
     normal: FloatArray,
     distance: FloatArray,
     positions: FloatArray,
     free: int,
-) -> Rows:
+) -> SeparationRows:
     """Return rows Σ cᵢ n · xᵢ >= distance, in which only the first `free` vertices can move.
 
     Args:
@@ -47,7 +47,7 @@ def rows(
     held = vertices >= free
     away = np.einsum("ki,kid,kd->k", np.where(held, coefficients, 0.0), positions[vertices], normal)
     room = [(0, 0), (0, _WIDTH - vertices.shape[1])]
-    return Rows(
+    return SeparationRows(
         np.pad(np.where(held, 0, vertices), room).astype(np.int32),
         np.pad(np.where(held, 0.0, coefficients), room),
         np.ascontiguousarray(normal),
@@ -55,6 +55,6 @@ def rows(
     )
 
 
-def joined(parts: list[Rows]) -> Rows:
+def concatenate_rows(parts: list[SeparationRows]) -> SeparationRows:
     """Return all rows of the parts."""
-    return Rows(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
+    return SeparationRows(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))

@@ -13,13 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from vto_pipeline.cloth.collision.self_collision.surface_features import features
-from vto_pipeline.cloth.untangle.body import Walls
+from vto_pipeline.cloth.untangle.body import OutermostFaces
 from vto_pipeline.cloth.untangle.contours import Crossings, contours, crossings
-from vto_pipeline.cloth.untangle.flood import sheet
+from vto_pipeline.cloth.untangle.flood import mesh_graph
 from vto_pipeline.cloth.untangle.near import near_rows
 from vto_pipeline.cloth.untangle.push import push_rows
-from vto_pipeline.cloth.untangle.relax import bars, opened_at, relax, shortfall
-from vto_pipeline.cloth.untangle.rows import Rows, joined
+from vto_pipeline.cloth.untangle.relax import (
+    length_bounds,
+    length_violation,
+    project_rows_and_lengths,
+    with_kinks_opened,
+)
+from vto_pipeline.cloth.untangle.rows import SeparationRows, concatenate_rows
 from vto_pipeline.cloth.untangle.smooth import smoothed
 from vto_pipeline.geometry.intersections import intersecting_faces, self_intersections
 from vto_pipeline.geometry.laplace import laplacian
@@ -60,7 +65,7 @@ class Untangled:
     area_growth: float
 
     @property
-    def left(self) -> int:
+    def crossings_left(self) -> int:
         """Pairs of faces that still meet."""
         return len(self.pairs) + len(self.body_pairs)
 
@@ -92,9 +97,9 @@ def untangle(
         The best that was found. Whatever is left is named.
     """
     job = job or Job()
-    work = _Work(TriangleMesh(positions, faces), body, positions if rest is None else rest, thickness)
+    work = _UntangleProblem(TriangleMesh(positions, faces), body, positions if rest is None else rest, thickness)
     x = np.array(positions, dtype=np.float64)
-    best = tangle = work.tangle(x)
+    best = tangle = work.find_crossings(x)
     best_round, began = 0, best.count
     if not began:
         job.leave_out("untangling the start", "no triangles intersect")
@@ -103,9 +108,9 @@ def untangle(
         if best.count == 0 or stalled > _PATIENCE:
             break
         if stalled and stalled % _KINKED == 0:
-            tangle = work.tangle(work.smoothed(tangle, stalled // _KINKED))
-        tangle = work.tangle(work.pushed(tangle))
-        if tangle.count < best.count and work.growth(tangle.positions) <= _GROWTH:
+            tangle = work.find_crossings(work.smoothed(tangle, stalled // _KINKED))
+        tangle = work.find_crossings(work.pushed(tangle))
+        if tangle.count < best.count and work.area_growth(tangle.positions) <= _GROWTH:
             best, best_round = tangle, k
         job.progress(1.0 - best.count / began, f"untangling: {best.count} of {began} pairs of triangles left")
     if best_round:
@@ -114,11 +119,11 @@ def untangle(
     if best.count:
         shown = ", ".join("({:.3f}, {:.3f}, {:.3f})".format(*points.mean(axis=0)) for points in places[:5])
         job.warn(f"{best.count} of {began} pairs of triangles still intersect at the start, near {shown}")
-    return Untangled(best.positions, best.pairs, best.body_pairs, places, best_round, work.growth(best.positions))
+    return Untangled(best.positions, best.pairs, best.body_pairs, places, best_round, work.area_growth(best.positions))
 
 
 @dataclass(frozen=True)
-class _Tangle:
+class _Crossing:
     """A cloth and what of it meets: see `Untangled`."""
 
     positions: FloatArray
@@ -130,51 +135,55 @@ class _Tangle:
         return len(self.pairs) + len(self.body_pairs)
 
 
-class _Work:
+class _UntangleProblem:
     """What does not change from round to round."""
 
     def __init__(self, start: TriangleMesh, body: TriangleMesh | None, rest: FloatArray, thickness: float) -> None:
         self._faces = start.faces.copy()
         self._features = features(start.faces, len(start.vertices))
         self._tree = bvh.build(start.vertices.copy(), self._features.faces)
-        self._bars = bars(start, rest)
+        self._bars = length_bounds(start, rest)
         self._laplacian, area = laplacian(start)
-        self._sheet = sheet(self._features.edges, area)
+        self._sheet = mesh_graph(self._features.edges, area)
         self._area = _area(start)
         self._body = body
-        self._walls = None if body is None else Walls(body)
+        self._walls = None if body is None else OutermostFaces(body)
         self._thickness = thickness
         ends = start.vertices[self._features.edges]
         self._step = _STEP * float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean())
 
-    def tangle(self, positions: FloatArray) -> _Tangle:
+    def find_crossings(self, positions: FloatArray) -> _Crossing:
         """Return what meets at these positions."""
         mesh = self._mesh(positions)
         outer = np.empty((0, 2), np.int32) if self._body is None else intersecting_faces(mesh, self._body)
-        return _Tangle(positions, self_intersections(mesh), outer)
+        return _Crossing(positions, self_intersections(mesh), outer)
 
-    def pushed(self, tangle: _Tangle) -> FloatArray:
+    def pushed(self, tangle: _Crossing) -> FloatArray:
         """Return the positions after a round."""
         x = tangle.positions
         crossing = crossings(x, self._faces, tangle.pairs)
         parts, pushed = push_rows(crossing, contours(crossing), self._sheet, x, self._thickness, self._step)
-        parts += self._apart(tangle, pushed)
+        parts += self._separation_rows(tangle, pushed)
         kinks = self._faces[tangle.pairs[(crossing.ends < 0).any(axis=1)]]
-        return relax(x, joined(parts), opened_at(self._bars, kinks, len(x)), _SWEEPS, _PRESSED)
+        return project_rows_and_lengths(
+            x, concatenate_rows(parts), with_kinks_opened(self._bars, kinks, len(x)), _SWEEPS, _PRESSED
+        )
 
-    def smoothed(self, tangle: _Tangle, rings: int) -> FloatArray:
+    def smoothed(self, tangle: _Crossing, rings: int) -> FloatArray:
         """Return the positions with the surroundings of all crossings smoothed."""
         met = np.concatenate([self._faces[tangle.pairs].ravel(), self._faces[tangle.body_pairs[:, 0]].ravel()])
         return smoothed(tangle.positions, self._laplacian, met, rings)
 
-    def recovered(self, tangle: _Tangle) -> _Tangle:
+    def recovered(self, tangle: _Crossing) -> _Crossing:
         """Return the cloth with its lengths as far back as goes without new pairs."""
         nothing, pressed = np.zeros(len(tangle.positions), np.bool_), 1.0
         for _ in range(_RECOVERY):
-            parts = self._apart(tangle, nothing)
-            found = self.tangle(relax(tangle.positions, joined(parts), self._bars, _SWEEPS, pressed))
+            parts = self._separation_rows(tangle, nothing)
+            found = self.find_crossings(
+                project_rows_and_lengths(tangle.positions, concatenate_rows(parts), self._bars, _SWEEPS, pressed)
+            )
             short, before = self._short(found), self._short(tangle)
-            if found.count > tangle.count or short >= before or self.growth(found.positions) > _GROWTH:
+            if found.count > tangle.count or short >= before or self.area_growth(found.positions) > _GROWTH:
                 pressed *= 0.5
                 continue
             tangle = found
@@ -182,7 +191,7 @@ class _Work:
                 break
         return tangle
 
-    def places(self, tangle: _Tangle) -> tuple[FloatArray, ...]:
+    def places(self, tangle: _Crossing) -> tuple[FloatArray, ...]:
         """Return the points of each contour."""
         made = crossings(tangle.positions, self._faces, tangle.pairs), self._with_body(tangle)
         return tuple(
@@ -194,11 +203,11 @@ class _Work:
             if len(part)
         )
 
-    def growth(self, positions: FloatArray) -> float:
+    def area_growth(self, positions: FloatArray) -> float:
         """Return by how much the area has grown, relative."""
         return _area(self._mesh(positions)) / self._area - 1.0
 
-    def _apart(self, tangle: _Tangle, pushed: np.ndarray) -> list[Rows]:
+    def _separation_rows(self, tangle: _Crossing, pushed: np.ndarray) -> list[SeparationRows]:
         """Return the rows that keep things apart that are, and lead out of the body."""
         x = tangle.positions
         parts = near_rows(self._tree, self._features, x, self._thickness + self._step, self._thickness, pushed)
@@ -207,7 +216,7 @@ class _Work:
             parts += self._walls.rows(x, crossing, self._thickness, self._step)
         return parts
 
-    def _with_body(self, tangle: _Tangle) -> Crossings | None:
+    def _with_body(self, tangle: _Crossing) -> Crossings | None:
         if self._body is None:
             return None
         count = len(tangle.positions)
@@ -217,8 +226,8 @@ class _Work:
             tangle.body_pairs + np.array([0, len(self._faces)], np.int32),
         )
 
-    def _short(self, tangle: _Tangle) -> float:
-        return shortfall(tangle.positions, self._bars)
+    def _short(self, tangle: _Crossing) -> float:
+        return length_violation(tangle.positions, self._bars)
 
     def _mesh(self, positions: FloatArray) -> TriangleMesh:
         return TriangleMesh(positions, self._faces)

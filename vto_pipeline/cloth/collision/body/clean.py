@@ -50,16 +50,16 @@ def clean_faces(keyframes: FloatArray, faces: IntArray) -> CleanFaces:
     _, first, label = np.unique(places, axis=0, return_index=True, return_inverse=True)
     own = first[label.reshape(-1)]
     mended: IntArray = own[faces].astype(np.int32)
-    kept = _useful(mended)
+    kept = _distinct_faces(mended)
     mended = mended[kept]
-    sealed, turned = _sealed(mended), 0
+    sealed, turned = _is_watertight(mended), 0
     if not sealed:
-        mended, turned = _turned_alike(keyframes[0], mended)
-        sealed = turned > 0 and _sealed(mended)
+        mended, turned = _orient_components(keyframes[0], mended)
+        sealed = turned > 0 and _is_watertight(mended)
     return CleanFaces(mended, sealed, int((own != np.arange(len(own))).sum()), int((~kept).sum()), turned)
 
 
-def _useful(faces: IntArray) -> NDArray[np.bool_]:
+def _distinct_faces(faces: IntArray) -> NDArray[np.bool_]:
     """Return which faces have three corners and are the first with them, shape (F,)."""
     corners = np.sort(faces, axis=1)
     first = np.zeros(len(faces), np.bool_)
@@ -67,7 +67,7 @@ def _useful(faces: IntArray) -> NDArray[np.bool_]:
     return np.asarray(first & (np.diff(corners, axis=1) > 0).all(axis=1))
 
 
-def _sealed(faces: IntArray) -> bool:
+def _is_watertight(faces: IntArray) -> bool:
     """Return whether each half-edge runs once, and once back."""
     start, end = faces.reshape(-1).astype(np.int64), np.roll(faces, -1, axis=1).reshape(-1)
     size = int(faces.max()) + 1
@@ -75,7 +75,7 @@ def _sealed(faces: IntArray) -> bool:
     return bool((np.diff(ahead) > 0).all() and np.array_equal(ahead, back))
 
 
-def _turned_alike(vertices: FloatArray, faces: IntArray) -> tuple[IntArray, int]:
+def _orient_components(vertices: FloatArray, faces: IntArray) -> tuple[IntArray, int]:
     """Return the faces, each oriented like most of its component by area, and how many were flipped."""
     import igl
 

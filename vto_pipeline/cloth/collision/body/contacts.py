@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from vto_pipeline.cloth.collision.body.clean import clean_faces
 from vto_pipeline.cloth.collision.body.crease import other_flank
-from vto_pipeline.cloth.collision.body.nearest import Nearest, Searched
+from vto_pipeline.cloth.collision.body.nearest import Nearest, SurfaceTree
 from vto_pipeline.cloth.collision.body.ray_march import march
 from vto_pipeline.cloth.collision.body.triangle_planes import INSIDE, OUTSIDE, RIM, sides, triangle_planes
 from vto_pipeline.cloth.collision.body.visible import Touchable, touchable
-from vto_pipeline.cloth.collision.contacts import Contacts, Round, ride
+from vto_pipeline.cloth.collision.contacts import Contacts, ContactSpan, surface_contacts
 from vto_pipeline.cloth.collision.shapes.solid import SLOW
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.arrays import FloatArray, IntArray
@@ -43,7 +43,7 @@ class _Surface(NamedTuple):
 
     faces: IntArray
     normals: Pseudonormals
-    searched: Searched
+    searched: SurfaceTree
     part: Touchable | None = None
     judge: SurfaceDistance | None = None
 
@@ -86,7 +86,7 @@ class BodyCollider:
         self._moves = len(self._frames) > 1 and bool(np.ptp(self._frames, axis=0).any())
         self._fitted_to = self.at(0.0)
         self._at_rest = not self._moves
-        self._surface = self._resting() if self._at_rest else self._whole()
+        self._surface = self._rest_surface() if self._at_rest else self._full_surface()
         if self._at_rest and not self._job.force_all:
             self._job.leave_out("refitting the body's tree", "the body is at rest")
 
@@ -115,7 +115,7 @@ class BodyCollider:
         return self._friction
 
     @property
-    def shown(self) -> NDArray[np.bool_]:
+    def touchable_faces(self) -> NDArray[np.bool_]:
         """Which faces can be touched, shape (F,)."""
         shown = np.ones(len(self.faces), np.bool_)
         if self._surface.part is not None:
@@ -123,12 +123,12 @@ class BodyCollider:
             shown[self._surface.part.parent] = True
         return shown
 
-    def nearest(self, count: int) -> IntArray:
+    def nearest_faces(self, count: int) -> IntArray:
         """Return the face nearest to each of this many vertices when contacts were last found; -1 for none, at rest."""
         known = len(self._guess) == count and not self._at_rest
         return self._guess if known else np.full(count, -1, np.int32)
 
-    def holds(self, count: int) -> NDArray[np.bool_]:
+    def contained_vertices(self, count: int) -> NDArray[np.bool_]:
         """Return which vertices of a cloth of this many were inside when contacts were last found, shape (count,)."""
         known = len(self._distance) == count
         return self._distance < 0.0 if known else np.zeros(count, np.bool_)
@@ -142,7 +142,7 @@ class BodyCollider:
         self._refit()
         return self.refits_left_out * (time.perf_counter() - began)
 
-    def contacts(self, positions: FloatArray, span: Round) -> Contacts:
+    def contacts(self, positions: FloatArray, span: ContactSpan) -> Contacts:
         """See `Collider.contacts`."""
         before, after = self._fit(span)
         surface = self._surface
@@ -164,12 +164,14 @@ class BodyCollider:
         self._flank = flank.triangle
         seen_from = positions
         if span.move is not None or after is not before:
-            way = self._way(before, after, span, found)
-            chosen = np.flatnonzero(self._heads_for_it(positions, before, span, side, found, way))
-            place, ahead = march(surface.searched, positions[chosen], way[chosen], near.of(chosen))
+            way = self._relative_motion(before, after, span, found)
+            chosen = np.flatnonzero(self._may_tunnel(positions, before, span, side, found, way))
+            place, ahead = march(surface.searched, positions[chosen], way[chosen], near.subset(chosen))
             ahead = surface.on_body(ahead)
-            clear = _clear(positions[chosen], place, ahead.on(before, surface.faces), span.skin[chosen])
-            found = found.replaced(chosen[clear], ahead.of(clear))
+            clear = _in_front_of_path_plane(
+                positions[chosen], place, ahead.points_on(before, surface.faces), span.skin[chosen]
+            )
+            found = found.with_replaced(chosen[clear], ahead.subset(clear))
             seen_from = positions.copy()
             seen_from[chosen[clear]] = place[clear]
 
@@ -177,7 +179,7 @@ class BodyCollider:
             distance, point, normal, there = triangle_planes(
                 before, after, surface.faces, surface.normals, positions, seen_from, side, *found
             )
-            return ride(distance, point, normal, there, self._friction, span)
+            return surface_contacts(distance, point, normal, there, self._friction, span)
 
         nearest = planes(seen_from, found)
         if not (flank.triangle >= 0).any():
@@ -186,7 +188,7 @@ class BodyCollider:
         return self._in_order(nearest, planes(positions, surface.on_body(flank)))
 
     def _in_order(self, nearest: Contacts, beside: Contacts) -> Contacts:
-        """Return both flanks in the order of the last round, as contacts are remembered by their place."""
+        """Return both flanks in the order of the last span, as contacts are remembered by their place."""
         normals = nearest.normal[0, :, 0], beside.normal[0, :, 0]
         like, unlike = (np.einsum("ij,ij->i", normal, self._first) for normal in normals)
         turned = beside.active[0] & (unlike > like)
@@ -209,25 +211,25 @@ class BodyCollider:
             side[doubtful] = np.where(surface.judge.inside(positions[doubtful], _SURELY), INSIDE, OUTSIDE)
         return side, distance
 
-    def _way(self, before: FloatArray, after: FloatArray, span: Round, found: Nearest) -> FloatArray:
+    def _relative_motion(self, before: FloatArray, after: FloatArray, span: ContactSpan, found: Nearest) -> FloatArray:
         """Return the motion of each vertex relative to its nearest place on the body [m], shape (V, 3)."""
         way = np.zeros((len(found.triangle), 3)) if span.move is None else span.move
         if after is before:
             return way
-        carried = found.on(after - before, self._surface.faces)
+        carried = found.points_on(after - before, self._surface.faces)
         return way - np.where((found.triangle >= 0)[:, None], carried, 0.0)
 
-    def _heads_for_it(
+    def _may_tunnel(
         self,
         positions: FloatArray,
         before: FloatArray,
-        span: Round,
+        span: ContactSpan,
         side: NDArray[np.int8],
         found: Nearest,
         way: FloatArray,
     ) -> NDArray[np.bool_]:
         """Return which vertices go far, and beyond the plane of the nearest place, shape (V,)."""
-        away = positions - found.on(before, self._surface.faces)
+        away = positions - found.points_on(before, self._surface.faces)
         distance = np.linalg.norm(away, axis=1)
         beyond = distance**2 + np.einsum("ij,ij->i", away, way) < span.skin * distance
         far = np.linalg.norm(way, axis=1) > SLOW * span.skin
@@ -238,8 +240,8 @@ class BodyCollider:
         vertices, faces, tree = self._surface.searched
         bvh.refit(tree, vertices, faces)
 
-    def _fit(self, span: Round) -> tuple[FloatArray, FloatArray]:
-        """Return the vertices at start and end of a round, with the surface fitted to the start."""
+    def _fit(self, span: ContactSpan) -> tuple[FloatArray, FloatArray]:
+        """Return the vertices at start and end of a span, with the surface fitted to the start."""
         if self._at_rest:
             if self._job.force_all:
                 self._refit()
@@ -249,7 +251,7 @@ class BodyCollider:
         before = self.at(span.start)
         if span.start >= self._seconds:
             self._at_rest, self._fitted_to, self._guess = True, before, np.empty(0, np.int32)
-            self._surface = self._resting()
+            self._surface = self._rest_surface()
             return before, before
         if not np.array_equal(before, self._fitted_to):
             faces, normals, searched = self._surface[:3]
@@ -259,13 +261,13 @@ class BodyCollider:
             self._fitted_to = before
         return before, self.at(span.end)
 
-    def _whole(self) -> _Surface:
+    def _full_surface(self) -> _Surface:
         vertices, faces = self._fitted_to, self._clean.faces
-        return _Surface(faces, pseudonormals(vertices, faces), Searched(vertices, faces, bvh.build(vertices, faces)))
+        return _Surface(faces, pseudonormals(vertices, faces), SurfaceTree(vertices, faces, bvh.build(vertices, faces)))
 
-    def _resting(self) -> _Surface:
+    def _rest_surface(self) -> _Surface:
         """Return the body at rest, without the parts that cannot be touched."""
-        whole = self._whole()
+        whole = self._full_surface()
         mesh = TriangleMesh(self._fitted_to, whole.faces)
         distance = SurfaceDistance(mesh)
         part = touchable(mesh, distance)
@@ -274,12 +276,14 @@ class BodyCollider:
                 f"body: {part.buried} faces lie inside its other parts and cannot be touched, "
                 f"{int(part.passing.sum())} faces pass through others"
             )
-            searched = Searched(part.vertices, part.faces, bvh.build(part.vertices, part.faces))
+            searched = SurfaceTree(part.vertices, part.faces, bvh.build(part.vertices, part.faces))
             return whole._replace(searched=searched, part=part, judge=distance)
         return whole if self._clean.sealed else whole._replace(judge=distance)
 
 
-def _clear(positions: FloatArray, place: FloatArray, on: FloatArray, skin: FloatArray) -> NDArray[np.bool_]:
+def _in_front_of_path_plane(
+    positions: FloatArray, place: FloatArray, on: FloatArray, skin: FloatArray
+) -> NDArray[np.bool_]:
     """Return which vertices are before the plane through a point that faces a place on their path, shape (N,)."""
     normal = place - on
     room = np.einsum("ij,ij->i", positions - on, normal)

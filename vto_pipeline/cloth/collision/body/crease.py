@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from vto_pipeline.cloth.collision.body.nearest import Nearest, Searched
+from vto_pipeline.cloth.collision.body.nearest import Nearest, SurfaceTree
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.numerics.distance import blend, closest_on_triangle
 from vto_pipeline.numerics.vector import dot, load, norm, sub
@@ -21,7 +21,7 @@ _OPPOSED = -0.3  # cosine from which on they are walls of a gap: cloth is pinche
 
 
 def other_flank(
-    surface: Searched, points: FloatArray, near: Nearest, last: tuple[IntArray, IntArray], reach: FloatArray
+    surface: SurfaceTree, points: FloatArray, near: Nearest, last: tuple[IntArray, IntArray], reach: FloatArray
 ) -> Nearest:
     """Return the place of the other flank of a crease nearest to each point; triangle -1 where there is none.
 
@@ -39,14 +39,14 @@ def other_flank(
         if len(asked) == 0:
             continue
         # the point has gone on along the crease, and so does the place: what is near the old one is on its flank
-        over = _over(surface.vertices, surface.faces, points[asked], triangles[asked])
+        over = _shift_across(surface.vertices, surface.faces, points[asked], triangles[asked])
         there = surface.nearest(over, reach[asked], triangles[asked])
         _take_flanks(surface.vertices, surface.faces, points, near, asked, there.triangle, best, found)
     return found
 
 
 @njit(cache=True)
-def _over(vertices, faces, points, triangles):  # type: ignore[no-untyped-def]
+def _shift_across(vertices, faces, points, triangles):  # type: ignore[no-untyped-def]
     """Return the points moved most of the way to these triangles [m], shape (N, 3)."""
     over = np.empty_like(points)
     for i in range(len(points)):

@@ -24,22 +24,22 @@ class Nearest(NamedTuple):
     weights: FloatArray
     feature: NDArray[np.int8]
 
-    def of(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> Nearest:
+    def subset(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> Nearest:
         """Return the places of these points."""
         return Nearest(self.triangle[chosen], self.weights[chosen], self.feature[chosen])
 
-    def replaced(self, chosen: NDArray[np.int64], others: Nearest) -> Nearest:
+    def with_replaced(self, chosen: NDArray[np.int64], others: Nearest) -> Nearest:
         """Return the places with others for these points."""
         triangle, weights, feature = self.triangle.copy(), self.weights.copy(), self.feature.copy()
         triangle[chosen], weights[chosen], feature[chosen] = others
         return Nearest(triangle, weights, feature)
 
-    def on(self, vertices: FloatArray, faces: IntArray) -> FloatArray:
+    def points_on(self, vertices: FloatArray, faces: IntArray) -> FloatArray:
         """Return the points there [m], shape (N, 3), for vertices (V, 3) and faces (F, 3)."""
         return np.asarray(np.einsum("nk,nkd->nd", self.weights, vertices[faces[self.triangle]]))
 
 
-class Searched(NamedTuple):
+class SurfaceTree(NamedTuple):
     """A surface and its tree, fitted.
 
     Args:

@@ -38,7 +38,7 @@ def sides(vertices, faces, normals, points, triangle, weights, feature):  # type
 
 @njit(cache=True)
 def triangle_planes(before, after, faces, normals, positions, seen_from, side, triangle, weights, feature):  # type: ignore[no-untyped-def]
-    """Return the planes of a round.
+    """Return the planes of a contact span.
 
     Args:
         before, after: The surface at start and end [m], shape (N, 3).

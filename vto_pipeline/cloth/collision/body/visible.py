@@ -53,7 +53,7 @@ class Touchable(NamedTuple):
         feature = np.where(zero.sum(axis=1) == 2, VERTEX + np.argmax(weights, axis=1), FACE)
         feature = np.where(zero.sum(axis=1) == 1, EDGE + (np.argmax(zero, axis=1) + 1) % 3, feature)
         there = Nearest(triangle[pieces], weights, feature.astype(np.int8))
-        return found._replace(triangle=triangle).replaced(pieces, there)
+        return found._replace(triangle=triangle).with_replaced(pieces, there)
 
 
 def touchable(mesh: TriangleMesh, distance: SurfaceDistance) -> Touchable:

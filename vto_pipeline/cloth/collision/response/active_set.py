@@ -54,19 +54,19 @@ class ActiveSet(NamedTuple):
     weights: NDArray[np.float64]
     normal: NDArray[np.float64]
     level: NDArray[np.float64]
-    lift: NDArray[np.float64]
+    rest_offset: NDArray[np.float64]
     carried: NDArray[np.float64]
     friction: NDArray[np.float64]
     pushing: NDArray[np.bool_]
-    spring: NDArray[np.float64]
-    cling: NDArray[np.float64]
-    grip: NDArray[np.float64]
+    normal_stiffness: NDArray[np.float64]
+    tangential_stiffness: NDArray[np.float64]
+    initial_friction: NDArray[np.float64]
     sliding: NDArray[np.bool_]
     trial: NDArray[np.float64]
-    across: NDArray[np.float64]
-    hold: NDArray[np.float64]
+    sliding_stiffness: NDArray[np.float64]
+    friction_limit: NDArray[np.float64]
     force: NDArray[np.float64]
-    rub: NDArray[np.float64]
+    friction_force: NDArray[np.float64]
 
 
 @njit(cache=True, error_model="numpy")
@@ -99,9 +99,9 @@ def active_set(contacts, pairs, t0, t1, inverse_mass, x, guess, drift, before):
     """Return the contacts where they are at the end of a step, with a guess which of them push.
 
     Args:
-        contacts: Planes of the round.
+        contacts: Planes of the span.
         pairs: Of the cloth with itself and with bodies.
-        t0, t1: Begin and end of the step as shares of the round.
+        t0, t1: Begin and end of the step as shares of the span.
         inverse_mass: [1/kg], shape (V,).
         x: Positions at the start [m], shape (V, 3).
         guess: How far vertices would go by themselves [m], shape (V, 3).
@@ -123,14 +123,14 @@ def active_set(contacts, pairs, t0, t1, inverse_mass, x, guess, drift, before):
             store(found.carried, count, carried)
             count += 1
     for p in range(len(pairs.key)):
-        _take_pair(found, count, pairs, p)
+        _fill_from_pair(found, count, pairs, p)
         count += 1
     for c in range(count):
-        _recall(found, c, before, x, guess, drift)
-    return _chosen(found, np.arange(count))
+        _warm_start(found, c, before, x, guess, drift)
+    return _subset(found, np.arange(count))
 
 
-def taken_on(contacts, pairs, x, guess):  # type: ignore[no-untyped-def]
+def add_pairs(contacts, pairs, x, guess):  # type: ignore[no-untyped-def]
     """Return the contacts with those of the pairs that are not among them.
 
     Args:
@@ -142,23 +142,23 @@ def taken_on(contacts, pairs, x, guess):  # type: ignore[no-untyped-def]
     unknown = ~np.isin(_PAIRS + pairs.key, contacts.key)
     if not unknown.any():
         return contacts
-    arriving = _arriving(pairs, np.flatnonzero(unknown), contacts, x, guess)
+    arriving = _new_contacts(pairs, np.flatnonzero(unknown), contacts, x, guess)
     both = [np.concatenate(parts) for parts in zip(contacts, arriving, strict=True)]
     order = np.argsort(both[0], kind="stable")
     return ActiveSet(*(part[order] for part in both))
 
 
 @njit(cache=True, error_model="numpy")
-def _arriving(pairs, places, contacts, x, guess):
+def _new_contacts(pairs, places, contacts, x, guess):
     found = no_contacts(len(places))
     for c in range(len(places)):
-        _take_pair(found, c, pairs, places[c])
-        _recall(found, c, contacts, x, guess, guess)
+        _fill_from_pair(found, c, pairs, places[c])
+        _warm_start(found, c, contacts, x, guess, guess)
     return found
 
 
 @njit(cache=True, error_model="numpy")
-def _take_pair(contacts, c, pairs, p):
+def _fill_from_pair(contacts, c, pairs, p):
     contacts.key[c] = _PAIRS + pairs.key[p]
     contacts.vertices[c], contacts.weights[c] = pairs.vertices[p], pairs.weights[p]
     n = load(pairs.normal, p)
@@ -167,7 +167,7 @@ def _take_pair(contacts, c, pairs, p):
 
 
 @njit(cache=True, error_model="numpy")
-def _chosen(contacts, places):
+def _subset(contacts, places):
     """Return the contacts at these places, in this order."""
     return ActiveSet(
         contacts.key[places],
@@ -175,24 +175,24 @@ def _chosen(contacts, places):
         contacts.weights[places],
         contacts.normal[places],
         contacts.level[places],
-        contacts.lift[places],
+        contacts.rest_offset[places],
         contacts.carried[places],
         contacts.friction[places],
         contacts.pushing[places],
-        contacts.spring[places],
-        contacts.cling[places],
-        contacts.grip[places],
+        contacts.normal_stiffness[places],
+        contacts.tangential_stiffness[places],
+        contacts.initial_friction[places],
         contacts.sliding[places],
         contacts.trial[places],
-        contacts.across[places],
-        contacts.hold[places],
+        contacts.sliding_stiffness[places],
+        contacts.friction_limit[places],
         contacts.force[places],
-        contacts.rub[places],
+        contacts.friction_force[places],
     )
 
 
 @njit(cache=True, error_model="numpy")
-def _recall(found, c, before, x, guess, drift):
+def _warm_start(found, c, before, x, guess, drift):
     """Guess whether contact c pushes and slides: as in the last step, or where its vertices are going."""
     n = load(found.normal, c)
     place = np.searchsorted(before.key, found.key[c])
@@ -201,8 +201,8 @@ def _recall(found, c, before, x, guess, drift):
         pushed, way = before.pushing[place], drift
         found.force[c], found.sliding[c] = before.force[place], before.sliding[place]
         store(found.trial, c, tangential(n, load(before.trial, place)))  # the normal has turned since
-        store(found.grip, c, tangential(n, load(before.rub, place)))
-        store(found.rub, c, load(found.grip, c))
+        store(found.initial_friction, c, tangential(n, load(before.friction_force, place)))
+        store(found.friction_force, c, load(found.initial_friction, c))
     found.sliding[c] |= found.force[c] == 0.0  # how hard it will push, and so rub, is not known
     reached = dot(n, sum_at(found, c, x)) + dot(n, sum_at(found, c, way))
     found.pushing[c] = reached < found.level[c] or pushed
@@ -218,7 +218,7 @@ def sum_at(contacts, c, x):
 
 
 @njit(cache=True, error_model="numpy")
-def yields(contacts, c, inverse_mass):
+def inverse_effective_mass(contacts, c, inverse_mass):
     """Return how far a unit of force times time squared moves what contact c keeps apart [1/kg]."""
     total = 0.0
     for s in range(4):

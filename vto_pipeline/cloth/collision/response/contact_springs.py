@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from vto_pipeline.cloth.collision.response.active_set import sum_at, tangential, yields
+from vto_pipeline.cloth.collision.response.active_set import inverse_effective_mass, sum_at, tangential
 from vto_pipeline.numerics.vector import axpy, dot, load, norm, scale, store, sub, unit
 
 _HARD = 30.0  # times the stiffness of what lies on a plane
@@ -37,10 +37,10 @@ def add_contacts(contacts, mass, held, h, x, y, matrix, right, blocks):
     for c in range(len(contacts.key)):
         if not contacts.pushing[c]:
             continue
-        n, spring = load(contacts.normal, c), contacts.spring[c]
+        n, spring = load(contacts.normal, c), contacts.normal_stiffness[c]
         _set_friction(contacts, c)
         pull = axpy(-spring * _gap(contacts, c, y), n, _friction(contacts, c, _slip(contacts, c, x, y)))
-        across, along, t = contacts.across[c], 0.0, unit(load(contacts.trial, c))
+        across, along, t = contacts.sliding_stiffness[c], 0.0, unit(load(contacts.trial, c))
         if contacts.sliding[c]:
             along = across
         for s in range(4):
@@ -102,20 +102,20 @@ def _set_springs(contacts, mass, held, h, matrix):
                 stiff_give += w * w / stiff
                 give += w * w / (_SOFT * inertia)
         if give == 0.0:  # nothing of it can move
-            contacts.spring[c] = contacts.cling[c] = contacts.lift[c] = 0.0
+            contacts.normal_stiffness[c] = contacts.tangential_stiffness[c] = contacts.rest_offset[c] = 0.0
             continue
         if lone:
-            contacts.spring[c] = _HARD / stiff_give
-            contacts.lift[c] = contacts.force[c] / contacts.spring[c]
+            contacts.normal_stiffness[c] = _HARD / stiff_give
+            contacts.rest_offset[c] = contacts.force[c] / contacts.normal_stiffness[c]
         else:
             borne = _FIRM * contacts.force[c] / max(contacts.level[c], _NO_LENGTH)
-            contacts.spring[c] = min(1.0 / stiff_give, max(1.0 / give, borne))
-            contacts.lift[c] = contacts.force[c] / contacts.spring[c]
-        contacts.cling[c] = min(1.0 / stiff_give, contacts.spring[c])
+            contacts.normal_stiffness[c] = min(1.0 / stiff_give, max(1.0 / give, borne))
+            contacts.rest_offset[c] = contacts.force[c] / contacts.normal_stiffness[c]
+        contacts.tangential_stiffness[c] = min(1.0 / stiff_give, contacts.normal_stiffness[c])
 
 
 @njit(cache=True, error_model="numpy")
-def keep_apart(contacts, inverse_mass, x, y, move):
+def project_to_contacts(contacts, inverse_mass, x, y, move):
     """Change a guess of the move from y so that contacts that push are reached, and what holds does not slip.
 
     Args:
@@ -127,7 +127,7 @@ def keep_apart(contacts, inverse_mass, x, y, move):
     for c in range(len(contacts.key)):
         if not contacts.pushing[c]:
             continue
-        give = yields(contacts, c, inverse_mass)
+        give = inverse_effective_mass(contacts, c, inverse_mass)
         if give == 0.0:
             continue
         n, now, moved = load(contacts.normal, c), sum_at(contacts, c, y), sum_at(contacts, c, move)
@@ -147,15 +147,17 @@ def contact_energy(contacts, x, y):
     for c in range(len(contacts.key)):
         if contacts.pushing[c]:
             gap = _gap(contacts, c, y)
-            off = _off(contacts, c, _slip(contacts, c, x, y))
-            energy += 0.5 * contacts.spring[c] * gap * gap + 0.5 * contacts.across[c] * dot(off, off)
+            off = _tangential_extension(contacts, c, _slip(contacts, c, x, y))
+            energy += 0.5 * contacts.normal_stiffness[c] * gap * gap + 0.5 * contacts.sliding_stiffness[c] * dot(
+                off, off
+            )
             if contacts.sliding[c]:
-                energy -= contacts.hold[c] * dot(unit(load(contacts.trial, c)), _slip(contacts, c, x, y))
+                energy -= contacts.friction_limit[c] * dot(unit(load(contacts.trial, c)), _slip(contacts, c, x, y))
     return energy
 
 
 @njit(cache=True, error_model="numpy")
-def taken_along(contacts, x):
+def displacement_by_planes(contacts, x):
     """Return how far planes on their path take along the vertices that would else be behind them [m], shape (V, 3).
 
     Args:
@@ -174,14 +176,14 @@ def add_last_forces(contacts, forces):
     """Add what the contacts did when last seen to the forces on the vertices [N], shape (V, 3), in place."""
     for c in range(len(contacts.key)):
         if contacts.force[c] > 0.0:
-            pull = axpy(contacts.force[c], load(contacts.normal, c), load(contacts.rub, c))
+            pull = axpy(contacts.force[c], load(contacts.normal, c), load(contacts.friction_force, c))
             for s in range(4):
                 i = contacts.vertices[c, s]
                 store(forces, i, axpy(contacts.weights[c, s], pull, load(forces, i)))
 
 
 @njit(cache=True, error_model="numpy")
-def revise(contacts, x, y, allowed):
+def update_active_set(contacts, x, y, allowed):
     """Update which contacts push and which slide after a solution, and record the forces.
 
     Args:
@@ -198,31 +200,33 @@ def revise(contacts, x, y, allowed):
         if not contacts.pushing[c]:
             if gap < 0.0:  # from now on; how hard, and so how it rubs, is not known yet
                 contacts.pushing[c] = contacts.sliding[c] = True
-                amiss += -contacts.spring[c] * gap if gap < -allowed else 0.0
+                amiss += -contacts.normal_stiffness[c] * gap if gap < -allowed else 0.0
             continue
         if gap > 0.0:
-            amiss += contacts.spring[c] * gap  # what pushes does not pull
+            amiss += contacts.normal_stiffness[c] * gap  # what pushes does not pull
             contacts.pushing[c] = contacts.sliding[c] = False
-            contacts.force[c] = contacts.lift[c] = 0.0
-            store(contacts.grip, c, (0.0, 0.0, 0.0))
-            store(contacts.rub, c, (0.0, 0.0, 0.0))
+            contacts.force[c] = contacts.rest_offset[c] = 0.0
+            store(contacts.initial_friction, c, (0.0, 0.0, 0.0))
+            store(contacts.friction_force, c, (0.0, 0.0, 0.0))
             continue
-        push = -contacts.spring[c] * gap
+        push = -contacts.normal_stiffness[c] * gap
         total += push
-        if not _is_against_other(contacts, c) and gap + contacts.lift[c] < -max(_LOST * contacts.level[c], _NOTHING):
+        if not _is_against_other(contacts, c) and gap + contacts.rest_offset[c] < -max(
+            _LOST * contacts.level[c], _NOTHING
+        ):
             amiss += push
         contacts.force[c] = push
         if contacts.friction[c] == 0.0:
             continue
         solved = _friction(contacts, c, slip)
-        trial = axpy(-contacts.cling[c], slip, load(contacts.grip, c))
+        trial = axpy(-contacts.tangential_stiffness[c], slip, load(contacts.initial_friction, c))
         most, asked = contacts.friction[c] * push, norm(trial)
         rub = scale(most / asked, trial) if asked > most else trial
         amiss += norm(sub(rub, solved))
         turned = contacts.sliding[c] and dot(trial, load(contacts.trial, c)) < 0.0  # between the two it holds
         contacts.sliding[c] = asked > most and not turned
         store(contacts.trial, c, trial)
-        store(contacts.rub, c, rub)
+        store(contacts.friction_force, c, rub)
     if total > 0.0:
         return amiss / total
     return 1.0 if amiss > 0.0 else 0.0
@@ -231,28 +235,28 @@ def revise(contacts, x, y, allowed):
 @njit(cache=True, error_model="numpy")
 def _set_friction(contacts, c):
     """Set the stiffness of what slides, and the friction at most, from what was last seen."""
-    contacts.hold[c] = contacts.friction[c] * contacts.force[c]
-    contacts.across[c] = contacts.cling[c] if contacts.friction[c] > 0.0 else 0.0
+    contacts.friction_limit[c] = contacts.friction[c] * contacts.force[c]
+    contacts.sliding_stiffness[c] = contacts.tangential_stiffness[c] if contacts.friction[c] > 0.0 else 0.0
     if contacts.sliding[c]:
         asked = norm(load(contacts.trial, c))
-        contacts.across[c] *= min(1.0, contacts.hold[c] / asked) if asked > 0.0 else 0.0
+        contacts.sliding_stiffness[c] *= min(1.0, contacts.friction_limit[c] / asked) if asked > 0.0 else 0.0
 
 
 @njit(cache=True, error_model="numpy")
 def _friction(contacts, c, slip):
     """Return the friction after a slip, as the linear system has it [N]."""
-    rub = scale(-contacts.across[c], _off(contacts, c, slip))
+    rub = scale(-contacts.sliding_stiffness[c], _tangential_extension(contacts, c, slip))
     if contacts.sliding[c]:
-        rub = axpy(contacts.hold[c], unit(load(contacts.trial, c)), rub)
+        rub = axpy(contacts.friction_limit[c], unit(load(contacts.trial, c)), rub)
     return rub
 
 
 @njit(cache=True, error_model="numpy")
-def _off(contacts, c, slip):
+def _tangential_extension(contacts, c, slip):
     """Return by how much the spring is drawn after a slip, were the slider to hold [m]; what slides, sideways only."""
-    if contacts.across[c] == 0.0:
+    if contacts.sliding_stiffness[c] == 0.0:
         return (0.0, 0.0, 0.0)
-    off = axpy(-1.0 / contacts.cling[c], load(contacts.grip, c), slip)
+    off = axpy(-1.0 / contacts.tangential_stiffness[c], load(contacts.initial_friction, c), slip)
     if contacts.sliding[c]:
         t = unit(load(contacts.trial, c))
         off = axpy(-dot(t, off), t, off)
@@ -262,7 +266,7 @@ def _off(contacts, c, slip):
 @njit(cache=True, error_model="numpy")
 def _gap(contacts, c, y):
     """Return how far contact c is from where its spring begins to push [m]; negative where it does."""
-    return dot(load(contacts.normal, c), sum_at(contacts, c, y)) - contacts.level[c] - contacts.lift[c]
+    return dot(load(contacts.normal, c), sum_at(contacts, c, y)) - contacts.level[c] - contacts.rest_offset[c]
 
 
 @njit(cache=True, error_model="numpy")

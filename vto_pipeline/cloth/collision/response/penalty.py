@@ -14,7 +14,13 @@ import numpy as np
 from numba import njit
 
 from vto_pipeline.cloth.collision.contacts import Contacts
-from vto_pipeline.cloth.collision.response.active_set import active_set, no_contacts, sum_at, tangential, yields
+from vto_pipeline.cloth.collision.response.active_set import (
+    active_set,
+    inverse_effective_mass,
+    no_contacts,
+    sum_at,
+    tangential,
+)
 from vto_pipeline.cloth.collision.self_collision.pairs import Pairs
 from vto_pipeline.cloth.model.build import ClothModel
 from vto_pipeline.model.arrays import FloatArray
@@ -46,9 +52,9 @@ class Penalty:
         """Take the contacts to a step.
 
         Args:
-            contacts: Planes of the round.
+            contacts: Planes of the span.
             pairs: Of the cloth with itself and with bodies.
-            t0, t1: Begin and end of the step as shares of the round.
+            t0, t1: Begin and end of the step as shares of the span.
             x: Positions at its begin [m], shape (V, 3).
             h: How long it takes [s].
         """
@@ -92,9 +98,13 @@ class Penalty:
 def _set_springs(contacts, inverse_mass, x):
     """Set how stiff contacts are, and the friction at most, from what they push with at the start of a step."""
     for c in range(len(contacts.key)):
-        give = yields(contacts, c, inverse_mass)
-        contacts.spring[c] = contacts.cling[c] = GRAVITY / (give * _SINKS) if give > 0.0 else 0.0
-        contacts.hold[c] = contacts.friction[c] * contacts.spring[c] * max(0.0, -_gap(contacts, c, x))
+        give = inverse_effective_mass(contacts, c, inverse_mass)
+        contacts.normal_stiffness[c] = contacts.tangential_stiffness[c] = (
+            GRAVITY / (give * _SINKS) if give > 0.0 else 0.0
+        )
+        contacts.friction_limit[c] = (
+            contacts.friction[c] * contacts.normal_stiffness[c] * max(0.0, -_gap(contacts, c, x))
+        )
 
 
 @njit(cache=True, error_model="numpy")
@@ -103,25 +113,28 @@ def _gap(contacts, c, y):
 
 
 @njit(cache=True, error_model="numpy")
-def _drawn(contacts, c, x, y):
+def _tangential_extension(contacts, c, x, y):
     """Return by how much the spring of the friction is drawn [m], were its slider to hold."""
     moved = sub(sub(sum_at(contacts, c, y), sum_at(contacts, c, x)), load(contacts.carried, c))
     slip = tangential(load(contacts.normal, c), moved)
-    return axpy(-1.0 / contacts.cling[c], load(contacts.grip, c), slip)
+    return axpy(-1.0 / contacts.tangential_stiffness[c], load(contacts.initial_friction, c), slip)
 
 
 @njit(cache=True, error_model="numpy")
-def _rub(contacts, c, drawn):
+def _friction_force(contacts, c, drawn):
     """Return the friction [N]."""
-    asked = contacts.cling[c] * norm(drawn)
-    return scale(-contacts.cling[c] * (min(1.0, contacts.hold[c] / asked) if asked > 0.0 else 1.0), drawn)
+    asked = contacts.tangential_stiffness[c] * norm(drawn)
+    return scale(
+        -contacts.tangential_stiffness[c] * (min(1.0, contacts.friction_limit[c] / asked) if asked > 0.0 else 1.0),
+        drawn,
+    )
 
 
 @njit(cache=True, error_model="numpy")
 def _add_forces(contacts, x, y, forces):
     energy = 0.0
     for c in range(len(contacts.key)):
-        spring, hold = contacts.spring[c], contacts.hold[c]
+        spring, hold = contacts.normal_stiffness[c], contacts.friction_limit[c]
         if spring == 0.0:
             continue
         pull, gap = (0.0, 0.0, 0.0), _gap(contacts, c, y)
@@ -129,13 +142,13 @@ def _add_forces(contacts, x, y, forces):
             energy += 0.5 * spring * gap * gap
             pull = scale(-spring * gap, load(contacts.normal, c))
         if hold > 0.0:
-            drawn = _drawn(contacts, c, x, y)
+            drawn = _tangential_extension(contacts, c, x, y)
             length = norm(drawn)
-            if contacts.cling[c] * length <= hold:
-                energy += 0.5 * contacts.cling[c] * length * length
+            if contacts.tangential_stiffness[c] * length <= hold:
+                energy += 0.5 * contacts.tangential_stiffness[c] * length * length
             else:
-                energy += hold * (length - 0.5 * hold / contacts.cling[c])
-            pull = axpy(1.0, _rub(contacts, c, drawn), pull)
+                energy += hold * (length - 0.5 * hold / contacts.tangential_stiffness[c])
+            pull = axpy(1.0, _friction_force(contacts, c, drawn), pull)
         for s in range(4):
             i = contacts.vertices[c, s]
             store(forces, i, axpy(contacts.weights[c, s], pull, load(forces, i)))
@@ -145,17 +158,17 @@ def _add_forces(contacts, x, y, forces):
 @njit(cache=True, error_model="numpy")
 def _note_friction(contacts, x, y):
     for c in range(len(contacts.key)):
-        store(contacts.rub, c, (0.0, 0.0, 0.0))
-        if contacts.hold[c] > 0.0 and _gap(contacts, c, y) < 0.0:
-            store(contacts.rub, c, _rub(contacts, c, _drawn(contacts, c, x, y)))
+        store(contacts.friction_force, c, (0.0, 0.0, 0.0))
+        if contacts.friction_limit[c] > 0.0 and _gap(contacts, c, y) < 0.0:
+            store(contacts.friction_force, c, _friction_force(contacts, c, _tangential_extension(contacts, c, x, y)))
 
 
 @njit(cache=True, error_model="numpy")
 def _damper(contacts, c, inverse_mass, x):
     """Return the strength of the damper of contact c [N s/m]: critical, where its spring pushes."""
-    if contacts.spring[c] == 0.0 or _gap(contacts, c, x) >= 0.0:
+    if contacts.normal_stiffness[c] == 0.0 or _gap(contacts, c, x) >= 0.0:
         return 0.0
-    return 2.0 * np.sqrt(contacts.spring[c] / yields(contacts, c, inverse_mass))
+    return 2.0 * np.sqrt(contacts.normal_stiffness[c] / inverse_effective_mass(contacts, c, inverse_mass))
 
 
 @njit(cache=True, error_model="numpy")
@@ -178,18 +191,18 @@ def _add_resistance(contacts, inverse_mass, h, x, v, forces):
 @njit(cache=True, error_model="numpy")
 def _add_stiffness(contacts, inverse_mass, x, y, rate, matrix):
     for c in range(len(contacts.key)):
-        if contacts.spring[c] == 0.0:
+        if contacts.normal_stiffness[c] == 0.0:
             continue
         n = load(contacts.normal, c)
-        normal = contacts.spring[c] if _gap(contacts, c, y) < 0.0 else 0.0
+        normal = contacts.normal_stiffness[c] if _gap(contacts, c, y) < 0.0 else 0.0
         normal += rate * _damper(contacts, c, inverse_mass, x)
         along, slack, t = 0.0, 0.0, (0.0, 0.0, 0.0)
-        if contacts.hold[c] > 0.0:
-            drawn = _drawn(contacts, c, x, y)
-            asked = contacts.cling[c] * norm(drawn)
-            along = contacts.cling[c]
-            if asked > _GIVES * contacts.hold[c]:
-                along *= min(1.0, contacts.hold[c] / asked)
+        if contacts.friction_limit[c] > 0.0:
+            drawn = _tangential_extension(contacts, c, x, y)
+            asked = contacts.tangential_stiffness[c] * norm(drawn)
+            along = contacts.tangential_stiffness[c]
+            if asked > _GIVES * contacts.friction_limit[c]:
+                along *= min(1.0, contacts.friction_limit[c] / asked)
                 slack, t = along, unit(drawn)
         whole = np.sum(np.abs(contacts.weights[c]))
         for s in range(4):

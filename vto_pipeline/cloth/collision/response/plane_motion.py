@@ -1,4 +1,4 @@
-"""Position of a contact plane within its round."""
+"""Position of a contact plane within its contact span."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ def plane_at(contacts, s, i, t0, t1):
     """Return the plane of surface s for vertex i at the end of a step.
 
     Args:
-        contacts: Planes of a round.
+        contacts: Planes of a span.
         s, i: Which.
-        t0, t1: Begin and end of the step, as shares of the round.
+        t0, t1: Begin and end of the step, as shares of the span.
 
     Returns:
         Unit normal; the point on the surface [m]; the distance to keep from it along the normal [m]; and how far the

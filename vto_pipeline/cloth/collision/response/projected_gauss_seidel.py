@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from vto_pipeline.cloth.collision.response.active_set import sum_at, yields
+from vto_pipeline.cloth.collision.response.active_set import inverse_effective_mass, sum_at
 from vto_pipeline.numerics.vector import add, axpy, dot, load, norm, scale, store, sub
 
 _SWEEPS = 20
 
 
 @njit(cache=True, error_model="numpy")
-def hold_apart(pairs, inverse_mass, start, x):
+def separate_pairs(pairs, inverse_mass, start, x):
     """Move vertices so that no pair is nearer than it may, in place.
 
     The sum of the pushes of each pair, not each of them, is kept above zero, and friction inside the cone of that sum
@@ -27,7 +27,7 @@ def hold_apart(pairs, inverse_mass, start, x):
     pushed, rubbed = np.zeros(len(pairs.key)), np.zeros((len(pairs.key), 3))
     for _ in range(_SWEEPS):
         for p in range(len(pairs.key)):
-            give = yields(pairs, p, inverse_mass)
+            give = inverse_effective_mass(pairs, p, inverse_mass)
             if give == 0.0:
                 continue
             n, now, before = load(pairs.normal, p), sum_at(pairs, p, x), sum_at(pairs, p, start)

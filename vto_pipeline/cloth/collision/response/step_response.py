@@ -12,7 +12,7 @@ _CHUNK = 512  # vertices a thread takes at a time
 
 
 @njit(cache=True, error_model="numpy")
-def respond(x, v, start, inverse_mass, contacts, t0, t1, h, longest, finish, threaded):
+def resolve_plane_contacts(x, v, start, inverse_mass, contacts, t0, t1, h, longest, finish, threaded):
     """Put all vertices in front of their contact planes, with friction; to finish a step, take their speed.
 
     Args:
@@ -28,20 +28,20 @@ def respond(x, v, start, inverse_mass, contacts, t0, t1, h, longest, finish, thr
         threaded: Whether to use threads.
     """
     if threaded:
-        _respond_parallel(x, v, start, inverse_mass, contacts, t0, t1, h, longest, finish)
+        _resolve_parallel(x, v, start, inverse_mass, contacts, t0, t1, h, longest, finish)
     else:
-        _respond(x, v, start, inverse_mass, contacts, t0, t1, h, longest, finish, 0, len(x))
+        _resolve(x, v, start, inverse_mass, contacts, t0, t1, h, longest, finish, 0, len(x))
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
-def _respond_parallel(x, v, start, inverse_mass, contacts, t0, t1, h, longest, finish):
+def _resolve_parallel(x, v, start, inverse_mass, contacts, t0, t1, h, longest, finish):
     for chunk in prange((len(x) + _CHUNK - 1) // _CHUNK):
         first, last = _CHUNK * chunk, min(len(x), _CHUNK * chunk + _CHUNK)
-        _respond(x, v, start, inverse_mass, contacts, t0, t1, h, longest, finish, first, last)
+        _resolve(x, v, start, inverse_mass, contacts, t0, t1, h, longest, finish, first, last)
 
 
 @njit(cache=True, error_model="numpy")
-def _respond(x, v, start, inverse_mass, contacts, t0, t1, h, longest, finish, first, last):
+def _resolve(x, v, start, inverse_mass, contacts, t0, t1, h, longest, finish, first, last):
     for i in range(first, last):
         if inverse_mass[i] == 0.0:
             continue

@@ -7,5 +7,5 @@ body_features: the vertices and edges of a body against the cloth's faces and ed
 proximity_bound: a proof that no search is needed
 safe_step: the largest part of a move that lets nothing through
 self_contact: all of it for one cloth
-tally: what it took, and what was left out
+counters: what it took, and what was left out
 """

@@ -33,16 +33,16 @@ class Candidates(NamedTuple):
     to_edge: IntArray
 
     @property
-    def number(self) -> int:
+    def size(self) -> int:
         """How many."""
         return len(self.to_face) + len(self.to_edge)
 
-    def chosen(self, kept: NDArray[np.bool_]) -> Candidates:
+    def subset(self, kept: NDArray[np.bool_]) -> Candidates:
         """Return those kept, of all of them in their order, shape (N + M,)."""
         count = len(self.to_face)
         return Candidates(self.to_face[kept[:count]], self.to_edge[kept[count:]])
 
-    def joined(self, other: Candidates) -> Candidates:
+    def concatenated(self, other: Candidates) -> Candidates:
         """Return these, then those."""
         return Candidates(np.vstack([self.to_face, other.to_face]), np.vstack([self.to_edge, other.to_edge]))
 
@@ -77,16 +77,16 @@ class BodyFeatures:
         self._own = features(faces, int(first[-1]))
         self.features = features(np.vstack([cloth.faces, faces + np.int32(count)]), count + int(first[-1]))
         self.friction = np.repeat([body.friction for body in bodies], counts)
-        self._beside = _faces_beside(self._own)
+        self._beside = _adjacent_faces(self._own)
         self._shown = np.empty(0, np.bool_)
         self._shown_vertices = np.empty(0, np.bool_)
         self.begin = self.end = self._places(0.0)
         self._fitted_to = (self.begin, self.end)
         self._normals = pseudonormals(self.begin, faces)
         self._tree = bvh.build(self.begin, faces)
-        self.at(0.0, 0.0)
+        self.set_time_span(0.0, 0.0)
 
-    def at(self, begin: float, end: float) -> None:
+    def set_time_span(self, begin: float, end: float) -> None:
         """Take the bodies to a step between these times [s]."""
         self.begin, self.end = self._places(begin), self._places(end)
         self.moves = (self.begin != self.end).any(axis=1)
@@ -95,7 +95,7 @@ class BodyFeatures:
             update(self._normals, self.begin, self._own.faces)
             bvh.refit_swept(self._tree, *now, self._own.faces, np.zeros(len(self.begin)))
             self._fitted_to = now
-        shown = np.concatenate([body.shown for body in self._bodies])
+        shown = np.concatenate([body.touchable_faces for body in self._bodies])
         if not np.array_equal(shown, self._shown):
             self._shown = shown
             self._shown_vertices = np.zeros(len(self.begin), np.bool_)
@@ -121,13 +121,15 @@ class BodyFeatures:
         to_cloth[:, 0] += np.int32(self._count)
         to_edge[:, 1] += edges
         candidates = Candidates(np.vstack([to_body, to_cloth]), to_edge)
-        return candidates.chosen(self._ways(candidates, x, np.abs(end - x) + radius[:, None], radius)[1])
+        return candidates.subset(self._separation_vectors(candidates, x, np.abs(end - x) + radius[:, None], radius)[1])
 
-    def beside(self, x: FloatArray, after: bool) -> FloatArray:
+    def with_bodies(self, x: FloatArray, after: bool) -> FloatArray:
         """Return positions of the cloth [m] (V, 3), then of the bodies before or after the step."""
         return np.concatenate([x, self.end if after else self.begin])
 
-    def outside(self, candidates: Candidates, x: FloatArray, end: FloatArray, reach: FloatArray) -> Candidates:
+    def approached_from_outside(
+        self, candidates: Candidates, x: FloatArray, end: FloatArray, reach: FloatArray
+    ) -> Candidates:
         """Return those that may come nearer than they may, if the cloth comes from outside: planes lead out the rest.
 
         A vertex is outside a face before its plane; a face is, where it is nearest, outside a vertex on the side of
@@ -139,11 +141,11 @@ class BodyFeatures:
             x, end: Positions of the cloth, which moves straight between them [m], shape (V, 3).
             reach: How far each vertex wants to be from bodies [m], shape (V,).
         """
-        way, near = self._ways(candidates, x, end - x, reach)
-        candidates, way = candidates.chosen(near), way[near]
+        way, near = self._separation_vectors(candidates, x, end - x, reach)
+        candidates, way = candidates.subset(near), way[near]
         inside = np.zeros(self._count + len(self.begin), np.bool_)
         for body in self._bodies:
-            inside[: self._count] |= body.holds(self._count)
+            inside[: self._count] |= body.contained_vertices(self._count)
         to_body = candidates.to_face[:, 0] < self._count
         vertex, face = candidates.to_face[~to_body, 0] - self._count, candidates.to_face[to_body, 1]
         first = len(to_body)
@@ -151,9 +153,9 @@ class BodyFeatures:
         out[:first][to_body] &= self._outside_faces(face - len(self._cloth.faces), way[:first][to_body])
         out[:first][~to_body] &= self._outside_vertices(vertex, -way[:first][~to_body])
         out[first:] &= self._outside_edges(candidates.to_edge[:, 1] - len(self._cloth.edges), way[first:])
-        return candidates.chosen(out)
+        return candidates.subset(out)
 
-    def _ways(
+    def _separation_vectors(
         self, candidates: Candidates, x: FloatArray, most: FloatArray, reach: FloatArray
     ) -> tuple[FloatArray, NDArray[np.bool_]]:
         """Return the ways from the second features to the first [m], shape (N + M, 3), and which may become too short.
@@ -164,7 +166,7 @@ class BodyFeatures:
             reach: How far each wants to be from bodies [m], shape (V,).
         """
         steps = np.concatenate([np.linalg.norm(most, axis=1) + reach, np.linalg.norm(self.end - self.begin, axis=1)])
-        return _ways(self.beside(x, False), self.features, *candidates, steps * (1.0 + _ROUNDING))
+        return _separation_vectors(self.with_bodies(x, False), self.features, *candidates, steps * (1.0 + _ROUNDING))
 
     def _outside_faces(self, face: IntArray, way: FloatArray) -> NDArray[np.bool_]:
         return np.asarray(self._shown[face] & (_dot(way, self._normals.faces[face]) > 0.0))
@@ -194,7 +196,7 @@ class BodyFeatures:
         moves = np.concatenate([np.zeros(self._count, np.bool_), self.moves])
         return np.asarray(moves[self._corners(candidates)].any(axis=1))
 
-    def carried(self, candidates: Candidates) -> FloatArray:
+    def carried_displacement(self, candidates: Candidates) -> FloatArray:
         """Return how far the bodies carry each vertex of the cloth along in the step [m], shape (V, 3).
 
         As far as what it may meet goes on average; what meets nothing, as the nearest face of a body does.
@@ -213,7 +215,7 @@ class BodyFeatures:
         total /= np.maximum(met, 1)[:, None]
         first = 0
         for body in self._bodies:
-            face = body.nearest(self._count)
+            face = body.nearest_faces(self._count)
             near = np.flatnonzero((face >= 0) & (met == 0))
             total[near] = step[first + body.faces[face[near]]].mean(axis=1)
             met[near] = 1
@@ -224,7 +226,7 @@ class BodyFeatures:
         return np.concatenate([body.at(time) for body in self._bodies])
 
 
-def _faces_beside(surface: Features) -> IntArray:
+def _adjacent_faces(surface: Features) -> IntArray:
     """Return the face in which each edge runs from its smaller vertex to the other, and the one where it runs back.
 
     Where there is none of a kind, it is any at that edge. Shape (E, 2).
@@ -246,7 +248,7 @@ def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 @njit(cache=True, error_model="numpy")
-def _ways(x, features, to_face, to_edge, steps):
+def _separation_vectors(x, features, to_face, to_edge, steps):
     """Return the way to the first from the second feature where they are nearest, and whether their steps cover it.
 
     Args:

@@ -5,7 +5,7 @@ A vertex and a face give all but the last; what lies on an edge or a corner of t
 that a fold is not held as many times as faces meet there, and not at all where the vertex is nearer to another face
 that has this edge or corner: the way there is slanted, and what slides over the mesh would catch on every edge. For the
 same reason what has yet to come near is seen from where it will pass, and left out where it will pass by: it is found
-again, on its path as solved, by the search for what would pass through (`safe`).
+again, on its path as solved, by the search for what would pass through (`safe_step`).
 """
 
 from __future__ import annotations
@@ -146,7 +146,7 @@ def near_pairs(x, end, drift, features, owners, to_face, to_edge, reach, recover
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
         on, feature = load(on_faces, p), features_at[p]
         if feature != FACE and (
-            not _answers(owners, faces, v, f, feature) or _is_passed(faces, to_face, features_at, distance, p)
+            not _owns_feature(owners, faces, v, f, feature) or _is_passed(faces, to_face, features_at, distance, p)
         ):
             continue
         vertices[count, 0], vertices[count, 1], vertices[count, 2], vertices[count, 3] = v, a, b, c
@@ -155,7 +155,7 @@ def near_pairs(x, end, drift, features, owners, to_face, to_edge, reach, recover
         way, comes = _sum(x, vertices[count], weights[count]), True
         if feature != FACE:
             begin = norm(way)
-            way, comes = _passing(way, _sum(drift, vertices[count], weights[count]), own)
+            way, comes = _closest_approach(way, _sum(drift, vertices[count], weights[count]), own)
             if coming and not comes and begin > _CLOSE * own:
                 continue
         if _is_near(x, end, vertices[count], weights[count], way, own, recovery, regained, apart, normal, gap, count):
@@ -196,7 +196,7 @@ def near_pairs(x, end, drift, features, owners, to_face, to_edge, reach, recover
 
 
 @njit(cache=True, error_model="numpy")
-def _answers(owners, faces, v, f, feature):
+def _owns_feature(owners, faces, v, f, feature):
     """Return whether face f answers for the edge or corner of it that vertex v is near; of two vertices the first."""
     if feature >= EDGE:
         owner = owners.of_side[f, feature - EDGE]
@@ -243,7 +243,7 @@ def _is_passed(faces, to_face, feature, distance, p):
 
 
 @njit(cache=True, error_model="numpy")
-def _passing(way, moved, own):
+def _closest_approach(way, moved, own):
     """Return the way between two points where, going on as they do, they are nearest to each other [m].
 
     What slides on the other side of a rim before a vertex is on its path past it, not into it. Where they meet head on

@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from vto_pipeline.model.arrays import IntArray
 
 
-class Pieces(NamedTuple):
+class SurfaceComponents(NamedTuple):
     """The connected pieces of a surface and their rims.
 
     Args:
@@ -34,7 +34,7 @@ class Pieces(NamedTuple):
     flaw: str
 
 
-def pieces(faces: NDArray[np.int32], count: int) -> Pieces:
+def surface_components(faces: NDArray[np.int32], count: int) -> SurfaceComponents:
     """Return the pieces of these faces, shape (F, 3), on this many vertices."""
     halves = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2).astype(np.int64)
     forth, back = halves[:, 0] * count + halves[:, 1], halves[:, 1] * count + halves[:, 0]
@@ -54,7 +54,7 @@ def pieces(faces: NDArray[np.int32], count: int) -> Pieces:
     loops, loop = connected_components(ring, directed=False) if len(rim) > 0 else (0, np.empty(0))
     piece_of_loop = np.zeros(loops, np.int32)
     piece_of_loop[loop.astype(np.int64)] = of_vertex[rim[:, 0]]
-    return Pieces(
+    return SurfaceComponents(
         np.array(faces, np.int32),
         of_vertex,
         rim.astype(np.int32),

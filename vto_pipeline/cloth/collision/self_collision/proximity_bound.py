@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from vto_pipeline.cloth.collision.self_collision.pieces import Pieces
+from vto_pipeline.cloth.collision.self_collision.pieces import SurfaceComponents
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.numerics.planar import gap_sq, least_turn, longest_sq, segment_distance, way_to
 from vto_pipeline.numerics.spatial.boxes import EMPTY, join, load_box, overlap, store_box, swept_boxes
@@ -32,14 +32,16 @@ from vto_pipeline.numerics.vector import add, cross, dot, load, scale, store, su
 _ROUNDING = 1e-9  # share of a length or an area, far above what rounding can do
 
 
-class Reach(NamedTuple):
+class SeparationProof(NamedTuple):
     """Whether the cloth certainly stays out of its own reach, and why, or why that is not certain."""
 
     out: bool
     why: str
 
 
-def reach(cloth: Pieces, start: FloatArray, end: FloatArray, radius: FloatArray) -> Reach:
+def prove_separation(
+    cloth: SurfaceComponents, start: FloatArray, end: FloatArray, radius: FloatArray
+) -> SeparationProof:
     """Return whether no two features without a common vertex can come nearer than their radii on straight paths.
 
     Args:
@@ -48,21 +50,21 @@ def reach(cloth: Pieces, start: FloatArray, end: FloatArray, radius: FloatArray)
         radius: Half the thickness at each vertex [m], shape (V,).
     """
     if cloth.flaw:
-        return Reach(False, cloth.flaw)
+        return SeparationProof(False, cloth.flaw)
     thickness = 2.0 * float(radius.max(initial=0.0))
     flat, way = _projected(cloth.faces, cloth.of_vertex, start, end)
     if not _shows_one_side(cloth.faces, flat, way, 2.0 * thickness):
-        return Reach(False, "the cloth folds, or is seen too nearly edge-on")
+        return SeparationProof(False, "the cloth folds, or is seen too nearly edge-on")
     if not _corners_are_open(cloth.rim, cloth.after, flat, way):
-        return Reach(False, "the rim has a narrow notch")
+        return SeparationProof(False, "the rim has a narrow notch")
     if not _one_rim_around(cloth.faces, cloth.of_vertex, cloth.rim, cloth.loop, cloth.piece_of_loop, flat):
-        return Reach(False, "a piece has no rim that runs around all of it")
+        return SeparationProof(False, "a piece has no rim that runs around all of it")
     if not _rim_keeps_apart(cloth.rim, cloth.of_vertex, flat, way, thickness):
-        return Reach(False, "the rim comes near itself")
+        return SeparationProof(False, "the rim comes near itself")
     several = cloth.of_vertex.max(initial=0) > 0
     if several and not _pieces_keep_apart(cloth.faces, cloth.of_vertex, swept_boxes(start, end, radius)):
-        return Reach(False, "two pieces are near each other")
-    return Reach(True, "seen along one direction, no piece overlaps itself, and the pieces are far apart")
+        return SeparationProof(False, "two pieces are near each other")
+    return SeparationProof(True, "seen along one direction, no piece overlaps itself, and the pieces are far apart")
 
 
 @njit(cache=True, error_model="numpy")

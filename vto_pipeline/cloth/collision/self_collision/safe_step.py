@@ -16,7 +16,7 @@ _SERIAL_BELOW = 500  # pairs; starting the threads costs as much as their work
 
 
 @njit(cache=True, error_model="numpy")
-def safe_way(x, end, back, features, to_face, to_edge, reach, new):
+def collision_free_step(x, end, back, features, to_face, to_edge, reach, new):
     """Return how far each vertex may go towards its end so that no pair meets, and which pairs would have met.
 
     What hits goes to the moment before; since that bends other ways, all is tested again until nothing hits. Shares

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vto_pipeline.cloth.collision.contacts import Contacts, Round
+from vto_pipeline.cloth.collision.contacts import Contacts, ContactSpan
 from vto_pipeline.cloth.collision.shapes.pose import Pose, Turn, Vector, along_y, pose
 from vto_pipeline.cloth.collision.shapes.solid import solid_contacts
 from vto_pipeline.errors import InputError
@@ -27,7 +27,7 @@ class Sphere:
     def __post_init__(self) -> None:
         _check_sizes("sphere radius", self.radius)
 
-    def contacts(self, positions: FloatArray, span: Round) -> Contacts:
+    def contacts(self, positions: FloatArray, span: ContactSpan) -> Contacts:
         """See `Collider.contacts`."""
         size = (0.0, 0.0, 0.0, self.radius)
         return solid_contacts(ROUNDED_BOX, size, pose(self.center), self.friction, positions, span)
@@ -45,7 +45,7 @@ class Capsule:
     def __post_init__(self) -> None:
         _check_sizes("capsule radius", self.radius)
 
-    def contacts(self, positions: FloatArray, span: Round) -> Contacts:
+    def contacts(self, positions: FloatArray, span: ContactSpan) -> Contacts:
         """See `Collider.contacts`."""
         axis, middle = np.subtract(self.end, self.start), 0.5 * np.add(self.start, self.end)
         length = float(np.linalg.norm(axis))
@@ -66,7 +66,7 @@ class Ellipsoid:
     def __post_init__(self) -> None:
         _check_sizes("ellipsoid radius", *self.radii)
 
-    def contacts(self, positions: FloatArray, span: Round) -> Contacts:
+    def contacts(self, positions: FloatArray, span: ContactSpan) -> Contacts:
         """See `Collider.contacts`."""
         x, y, z = self.radii
         where = pose(self.center, self.rotation)
@@ -85,7 +85,7 @@ class Box:
     def __post_init__(self) -> None:
         _check_sizes("half size of a box", *self.half_sizes)
 
-    def contacts(self, positions: FloatArray, span: Round) -> Contacts:
+    def contacts(self, positions: FloatArray, span: ContactSpan) -> Contacts:
         """See `Collider.contacts`."""
         x, y, z = self.half_sizes
         where = pose(self.center, self.rotation)
@@ -104,7 +104,7 @@ class Plane:
         if not np.linalg.norm(self.normal) > 0.0:
             raise InputError(f"plane normal is {self.normal}; expected a direction")
 
-    def contacts(self, positions: FloatArray, span: Round) -> Contacts:
+    def contacts(self, positions: FloatArray, span: ContactSpan) -> Contacts:
         """See `Collider.contacts`."""
         where = Pose(along_y(self.normal), np.asarray(self.point, dtype=np.float64))
         return solid_contacts(HALF_SPACE, (0.0, 0.0, 0.0, 0.0), where, self.friction, positions, span)

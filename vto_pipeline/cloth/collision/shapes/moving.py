@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vto_pipeline.cloth.collision.contacts import Collider, Contacts, Round
+from vto_pipeline.cloth.collision.contacts import Collider, Contacts, ContactSpan
 from vto_pipeline.cloth.collision.shapes.colliders import MeshCollider
 from vto_pipeline.cloth.collision.shapes.pose import Path
 from vto_pipeline.errors import InputError
@@ -26,7 +26,7 @@ class Moving:
     shape: Collider | MeshCollider
     path: Path
 
-    def contacts(self, positions: FloatArray, span: Round) -> Contacts:
+    def contacts(self, positions: FloatArray, span: ContactSpan) -> Contacts:
         """See `Collider.contacts`."""
         if isinstance(self.shape, MeshCollider):
             raise InputError("a moving mesh must be given as a BodyCollider", hint="Moving(BodyCollider(...), path)")

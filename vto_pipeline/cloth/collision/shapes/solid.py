@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from vto_pipeline.cloth.collision.contacts import Contacts, Round, ride
+from vto_pipeline.cloth.collision.contacts import Contacts, ContactSpan, surface_contacts
 from vto_pipeline.cloth.collision.shapes.pose import Pose
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.numerics.solids import first_touch, signed_distance
@@ -14,7 +14,7 @@ from vto_pipeline.numerics.vector import axpy, dot, load, norm, store, sub
 _TOUCHES = 1.5  # skins: what is nearer, touches
 
 SLOW = 0.5
-"""Of the skin: what moves no farther in a round cannot come through, nor need be foreseen."""
+"""Of the skin: what moves no farther in a span cannot come through, nor need be foreseen."""
 
 
 def solid_contacts(
@@ -23,7 +23,7 @@ def solid_contacts(
     where: Pose,
     friction: float,
     positions: FloatArray,
-    span: Round,
+    span: ContactSpan,
 ) -> Contacts:
     """Return contacts with a solid at rest.
 
@@ -32,12 +32,12 @@ def solid_contacts(
         where: Its pose.
         friction: Coulomb coefficient.
         positions: Of the cloth [m], shape (V, 3).
-        span: The round.
+        span: For which they hold.
     """
     move = np.zeros_like(positions) if span.move is None else where.own_direction(span.move)
     distance, point, normal, near = _planes(kind, size, where.own(positions), move, span.skin, span.travel)
     point, normal = where.world(point), where.world_direction(normal)
-    return ride(distance, np.stack([point, point], 1), np.stack([normal, normal], 1), near, friction, span)
+    return surface_contacts(distance, np.stack([point, point], 1), np.stack([normal, normal], 1), near, friction, span)
 
 
 @njit(cache=True, error_model="numpy")

@@ -17,7 +17,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from vto_pipeline.cloth.constraints.bending.hinge import add_moment, fold, fold_weight, folded
+from vto_pipeline.cloth.constraints.bending.hinge import (
+    add_moment,
+    apply_hinge_multiplier,
+    hinge_angle_gradients,
+    hinge_mobility,
+)
 from vto_pipeline.cloth.constraints.kind import Kind
 from vto_pipeline.numerics.linear.coloured_blocks import blocks
 from vto_pipeline.numerics.mechanics.slider import huber, secant, slipped, wrapped
@@ -86,20 +91,20 @@ def _extension(i, angle, data):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _project(i, x, start, inverse_mass, data, multipliers, h):
-    angle, slopes = folded(i, x, data)
-    weight = fold_weight(i, inverse_mass, data, slopes)
+    angle, slopes = hinge_angle_gradients(i, x, data)
+    weight = hinge_mobility(i, inverse_mass, data, slopes)
     if weight == 0.0:
         return
     before, soft = multipliers[i, 0], data.compliance[i] / (h * h)
     most = h * h * data.limit[i]
     shift = bounded_step(weight + soft, -_extension(i, angle, data) - soft * before, before, -most, most)
     multipliers[i, 0] = before + shift
-    fold(i, x, inverse_mass, data, slopes, shift)
+    apply_hinge_multiplier(i, x, inverse_mass, data, slopes, shift)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _force(i, x, data, forces):
-    angle, slopes = folded(i, x, data)
+    angle, slopes = hinge_angle_gradients(i, x, data)
     energy, moment = huber(_extension(i, angle, data), data.compliance[i], data.limit[i])
     add_moment(i, data, slopes, -moment, forces)
     return energy
@@ -107,7 +112,7 @@ def _force(i, x, data, forces):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _linearise(i, x, data, values, gradients, compliance):
-    angle, slopes = folded(i, x, data)
+    angle, slopes = hinge_angle_gradients(i, x, data)
     values[0] = _extension(i, angle, data)
     for s in range(4):
         store_at(gradients, 0, s, slopes[s])
@@ -116,7 +121,7 @@ def _linearise(i, x, data, values, gradients, compliance):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _slip(i, x, data):
-    angle, slopes = folded(i, x, data)
+    angle, slopes = hinge_angle_gradients(i, x, data)
     if dot(slopes[2], slopes[2]) > 0.0:  # a hinge without area has no angle
         data.slider[i, 0] += slipped(_extension(i, angle, data), data.compliance[i], data.limit[i])
 

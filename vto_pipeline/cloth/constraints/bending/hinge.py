@@ -119,7 +119,7 @@ def hinge_angles(x, hinges):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def folded(i, x, data):
+def hinge_angle_gradients(i, x, data):
     """Return the angle of hinge i and its gradients."""
     a, b, c, d = data.vertices[i, 0], data.vertices[i, 1], data.vertices[i, 2], data.vertices[i, 3]
     angle, ga, gb, gc, gd = dihedral(load(x, a), load(x, b), load(x, c), load(x, d))
@@ -127,7 +127,7 @@ def folded(i, x, data):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def fold_weight(i, inverse_mass, data, slopes):
+def hinge_mobility(i, inverse_mass, data, slopes):
     """Return ∇θ W ∇θᵀ."""
     weight = 0.0
     for s in range(4):
@@ -136,7 +136,7 @@ def fold_weight(i, inverse_mass, data, slopes):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def fold_change(i, x, start, data, slopes):
+def hinge_angle_change(i, x, start, data, slopes):
     """Return ∇θ·(x - xⁿ)."""
     change = 0.0
     for s in range(4):
@@ -146,7 +146,7 @@ def fold_change(i, x, start, data, slopes):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def fold(i, x, inverse_mass, data, slopes, shift):
+def apply_hinge_multiplier(i, x, inverse_mass, data, slopes, shift):
     """Move the vertices of hinge i by W ∇θᵀ Δλ."""
     for s in range(4):
         v = data.vertices[i, s]
@@ -163,20 +163,20 @@ def add_moment(i, data, slopes, moment, forces):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _project(i, x, start, inverse_mass, data, multipliers, h):
-    angle, slopes = folded(i, x, data)
-    weight = fold_weight(i, inverse_mass, data, slopes)
+    angle, slopes = hinge_angle_gradients(i, x, data)
+    weight = hinge_mobility(i, inverse_mass, data, slopes)
     if weight == 0.0:
         return
-    change = fold_change(i, x, start, data, slopes) if data.damping > 0.0 else 0.0
+    change = hinge_angle_change(i, x, start, data, slopes) if data.damping > 0.0 else 0.0
     soft, viscous = data.compliance[i] / (h * h), data.damping / h
     shift = multiplier_step(angle - data.rest[i], weight, soft, multipliers[i, 0], change, viscous)
     multipliers[i, 0] += shift
-    fold(i, x, inverse_mass, data, slopes, shift)
+    apply_hinge_multiplier(i, x, inverse_mass, data, slopes, shift)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _force(i, x, data, forces):
-    angle, slopes = folded(i, x, data)
+    angle, slopes = hinge_angle_gradients(i, x, data)
     moment = -(angle - data.rest[i]) / data.compliance[i]
     add_moment(i, data, slopes, moment, forces)
     return -0.5 * moment * (angle - data.rest[i])
@@ -184,7 +184,7 @@ def _force(i, x, data, forces):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _linearise(i, x, data, values, gradients, compliance):
-    angle, slopes = folded(i, x, data)
+    angle, slopes = hinge_angle_gradients(i, x, data)
     values[0] = angle - data.rest[i]
     for s in range(4):
         store_at(gradients, 0, s, slopes[s])

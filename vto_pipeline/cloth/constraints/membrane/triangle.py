@@ -82,7 +82,7 @@ def add_pulls(t, x, data, pull_u, pull_v):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def system(t, x, start, inverse_mass, data, soft, lambdas, values, slopes, h):
+def xpbd_strain_system(t, x, start, inverse_mass, data, soft, lambdas, values, slopes, h):
     """Return the XPBD system of three strains: its matrix, upper triangle by rows, and its right-hand side.
 
     Macklin et al. 2016, eq. 26, with the damping γ = β / h, for three rows at once: (1 + γ) ∇C W ∇Cᵀ + α̃ and
@@ -121,7 +121,7 @@ def system(t, x, start, inverse_mass, data, soft, lambdas, values, slopes, h):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def move(t, x, inverse_mass, data, slopes, shift):
+def apply_strain_multipliers(t, x, inverse_mass, data, slopes, shift):
     """Move the corners of triangle t by W ∇Cᵀ Δλ."""
     i, j, k = data.vertices[t, 0], data.vertices[t, 1], data.vertices[t, 2]
     g = shape_gradients(t, data)
@@ -133,27 +133,27 @@ def move(t, x, inverse_mass, data, slopes, shift):
 
 @njit(cache=True, error_model="numpy", inline="always")
 def solve_strains(t, x, start, inverse_mass, data, soft, multipliers, values, slopes, h):
-    """Do one XPBD step on the three strains together, in place; see `system`."""
+    """Do one XPBD step on the three strains together, in place; see `xpbd_strain_system`."""
     lambdas = load(multipliers, t)
-    matrix, right = system(t, x, start, inverse_mass, data, soft, lambdas, values, slopes, h)
+    matrix, right = xpbd_strain_system(t, x, start, inverse_mass, data, soft, lambdas, values, slopes, h)
     shift = solve_symmetric(*matrix, *right)
     store(multipliers, t, add(lambdas, shift))
-    move(t, x, inverse_mass, data, slopes, shift)
+    apply_strain_multipliers(t, x, inverse_mass, data, slopes, shift)
 
 
 @njit(cache=True, error_model="numpy", inline="always")
 def solve_bounded(t, x, start, inverse_mass, data, soft, multipliers, values, slopes, h, low, high):
-    """Do one XPBD step on the three strains one after the other, with λ kept between low and high; see `system`.
+    """Do one XPBD step on the three strains in turn, with λ kept between low and high; as `xpbd_strain_system`.
 
     For a coupling of the rows by `soft` there is no use: only its first three count.
     """
     l0, l1, l2 = load(multipliers, t)
-    matrix, right = system(t, x, start, inverse_mass, data, soft, (l0, l1, l2), values, slopes, h)
+    matrix, right = xpbd_strain_system(t, x, start, inverse_mass, data, soft, (l0, l1, l2), values, slopes, h)
     d0 = bounded_step(matrix[0], right[0], l0, low[0], high[0])
     d1 = bounded_step(matrix[3], right[1] - matrix[1] * d0, l1, low[1], high[1])
     d2 = bounded_step(matrix[5], right[2] - matrix[2] * d0 - matrix[4] * d1, l2, low[2], high[2])
     store(multipliers, t, (l0 + d0, l1 + d1, l2 + d2))
-    move(t, x, inverse_mass, data, slopes, (d0, d1, d2))
+    apply_strain_multipliers(t, x, inverse_mass, data, slopes, (d0, d1, d2))
 
 
 @njit(cache=True, error_model="numpy", inline="always")

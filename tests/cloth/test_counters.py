@@ -9,8 +9,8 @@ from numpy.testing import assert_array_equal
 from test_self_contact import crosses, stack, triangles
 
 from vto_pipeline.cloth.collision.self_collision import self_contact
+from vto_pipeline.cloth.collision.self_collision.counters import CollisionCounters, report_counters
 from vto_pipeline.cloth.collision.self_collision.self_contact import SelfContact
-from vto_pipeline.cloth.collision.self_collision.tally import Tally, tell
 from vto_pipeline.model.job import Job
 
 
@@ -30,45 +30,45 @@ def test_of_a_move_that_was_found_free_only_what_changes_is_looked_at_again(seed
     x, faces, free, other = two_ways(seed)
     reach = np.full(len(x), 1e-3)
     knows, asks, forced = (SelfContact(faces, reach, 0.3, force_all=every) for every in (False, False, True))
-    assert_array_equal(knows.safe(x, free)[0], free)
-    assert knows.tally.impacts_known == 0
+    assert_array_equal(knows.collision_free(x, free)[0], free)
+    assert knows.counters.impacts_known == 0
     for contact in (knows, forced):
-        found, pairs = contact.safe(x, other)
-        there, met = asks.safe(x, other)
+        found, pairs = contact.collision_free(x, other)
+        there, met = asks.collision_free(x, other)
         assert_array_equal(found, there)
         assert_array_equal(pairs.key, met.key)
-        asks.at(0.0, 1.0)
-    assert knows.tally.impacts_known > 0
-    assert forced.tally.impacts_known == 0 == asks.tally.impacts_known
+        asks.set_time_span(0.0, 1.0)
+    assert knows.counters.impacts_known > 0
+    assert forced.counters.impacts_known == 0 == asks.counters.impacts_known
 
 
 def test_the_same_move_is_not_looked_at_twice_in_a_step_but_in_the_next_and_from_elsewhere():
     x, faces = triangles(40, 2)
     contact = SelfContact(faces, np.full(len(x), 0.02), 0.3)
     end = x.copy()
-    contact.safe(x, end)
-    looked = contact.tally.impacts
+    contact.collision_free(x, end)
+    looked = contact.counters.impacts
     assert looked > 0
     end += 0.0  # the caller's own, which it may write to
-    found, met = contact.safe(x, end)
+    found, met = contact.collision_free(x, end)
     assert_array_equal(found, x)
     assert len(met.key) == 0
-    assert (contact.tally.impacts, contact.tally.impacts_known) == (looked, looked)
-    contact.safe(x + np.array([0.0, 1e-4, 0.0]), end)
-    assert contact.tally.impacts >= 2 * looked
-    looked = contact.tally.impacts
-    contact.at(0.0, 1.0)
-    contact.safe(x + np.array([0.0, 1e-4, 0.0]), end)
-    assert contact.tally.impacts > looked
+    assert (contact.counters.impacts, contact.counters.impacts_known) == (looked, looked)
+    contact.collision_free(x + np.array([0.0, 1e-4, 0.0]), end)
+    assert contact.counters.impacts >= 2 * looked
+    looked = contact.counters.impacts
+    contact.set_time_span(0.0, 1.0)
+    contact.collision_free(x + np.array([0.0, 1e-4, 0.0]), end)
+    assert contact.counters.impacts > looked
 
 
 def test_what_the_caller_does_to_its_positions_is_not_taken_for_free():
     x, faces, free, other = two_ways(0)
     contact = SelfContact(faces, np.full(len(x), 1e-3), 0.3)
     end = free.copy()
-    contact.safe(x, end)
+    contact.collision_free(x, end)
     end[:] = other
-    assert not crosses(contact.safe(x, end)[0], faces)
+    assert not crosses(contact.collision_free(x, end)[0], faces)
 
 
 def test_what_cannot_be_proven_at_first_but_later_is_not_looked_at():
@@ -78,21 +78,21 @@ def test_what_cannot_be_proven_at_first_but_later_is_not_looked_at():
     for _ in range(30):
         falls = x - np.array([0.0, 0.05, 0.0])
         falls[[0, 16]] = x[[0, 16]]
-        assert len(contact.near(x, falls, 1.0 / 15.0).key) == 0
+        assert len(contact.find_pairs(x, falls, 1.0 / 15.0).key) == 0
         x = x + 1e-4 * np.sin(np.arange(289))[:, None]
-        contact.safe(x, x + 1e-4)
-    assert contact.tally.searched == 1
-    assert contact.tally.out_of_reach == 30
-    assert contact.tally.impacts == contact.tally.impacts_known == 0
+        contact.collision_free(x, x + 1e-4)
+    assert contact.counters.searched == 1
+    assert contact.counters.out_of_reach == 30
+    assert contact.counters.impacts == contact.counters.impacts_known == 0
 
 
 def test_proofs_that_fail_are_seldom_tried():
     mesh = stack(*(moved(sheet(9, 9, 0.1, 0.1, upright=False), 0.0, 0.0, 3e-3 * k) for k in range(2)))
     contact = SelfContact(mesh.faces, np.full(162, 2e-3), 0.3)
-    with patch.object(self_contact, "reach", wraps=self_contact.reach) as tried:
+    with patch.object(self_contact, "prove_separation", wraps=self_contact.prove_separation) as tried:
         for _ in range(100):
-            contact.near(mesh.vertices, mesh.vertices, 1.0 / 60.0)
-    assert contact.tally.searched == 1
+            contact.find_pairs(mesh.vertices, mesh.vertices, 1.0 / 60.0)
+    assert contact.counters.searched == 1
     assert tried.call_count < 20
 
 
@@ -104,23 +104,23 @@ def test_what_hardly_moves_is_searched_once_and_held_as_if_always():
     for _ in range(40):
         x = x + rng.uniform(-1e-6, 1e-6, x.shape)
         end = x + rng.uniform(-1e-7, 1e-7, x.shape)
-        pairs = [contact.near(x, end, 1.0 / 60.0) for contact in (sleepy, forced)]
+        pairs = [contact.find_pairs(x, end, 1.0 / 60.0) for contact in (sleepy, forced)]
         assert len(pairs[0].key) > 100
         for one, other in zip(*pairs, strict=True):
             assert_array_equal(one, other)
-    assert sleepy.tally.searched == 1
-    assert sleepy.tally.rested == sleepy.tally.reused == 39
-    assert forced.tally.searched == 40
+    assert sleepy.counters.searched == 1
+    assert sleepy.counters.rested == sleepy.counters.reused == 39
+    assert forced.counters.searched == 40
     x[0] += [0.0, 2e-4, 0.0]  # one leaves the room it was looked for in
-    sleepy.near(x, x, 1.0 / 60.0)
-    assert sleepy.tally.searched == 2
+    sleepy.find_pairs(x, x, 1.0 / 60.0)
+    assert sleepy.counters.searched == 2
 
 
 def test_times_saved_are_those_of_what_was_done_times_what_was_not():
     job = Job()
-    one = Tally(asked=10, out_of_reach=2, reused=4, searched=4, rested=1, search_s=2.0)
-    other = Tally(body_asked=6, body_searched=2, body_s=1.0, impacts=100, impacts_known=50, impact_s=4.0)
-    tell([one, other], [], job)
+    one = CollisionCounters(asked=10, out_of_reach=2, reused=4, searched=4, rested=1, search_s=2.0)
+    other = CollisionCounters(body_asked=6, body_searched=2, body_s=1.0, impacts=100, impacts_known=50, impact_s=4.0)
+    report_counters([one, other], [], job)
     assert job.metrics["self_searches_left_out"] == 6
     assert job.metrics["self_searches_saved_s"] == 3.0
     assert (job.metrics["body_searches_left_out"], job.metrics["body_searches_saved_s"]) == (4, 2.0)
@@ -130,6 +130,6 @@ def test_times_saved_are_those_of_what_was_done_times_what_was_not():
 
 def test_nothing_asked_is_nothing_told():
     job = Job()
-    tell([Tally()], [], job)
+    report_counters([CollisionCounters()], [], job)
     assert job.metrics == {}
     assert job.left_out == []

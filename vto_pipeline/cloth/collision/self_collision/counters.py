@@ -10,7 +10,7 @@ from vto_pipeline.model.job import Job
 
 
 @dataclass
-class Tally:
+class CollisionCounters:
     """What was done and what was not.
 
     Args:
@@ -66,9 +66,11 @@ class Tally:
         return {**asdict(self), **{name: getattr(self, name) for name in saved}}
 
 
-def tell(tallies: Sequence[Tally], bodies: Sequence[BodyCollider], job: Job) -> None:
+def report_counters(counters: Sequence[CollisionCounters], bodies: Sequence[BodyCollider], job: Job) -> None:
     """Record, for `run.json`, what was left out, how often, and the time that saved."""
-    whole = Tally(**{one.name: sum(getattr(tally, one.name) for tally in tallies) for one in fields(Tally)})
+    whole = CollisionCounters(
+        **{one.name: sum(getattr(one_cloth, one.name) for one_cloth in counters) for one in fields(CollisionCounters)}
+    )
     needless = whole.out_of_reach + whole.reused
     if needless > 0:
         job.leave_out(
