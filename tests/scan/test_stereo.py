@@ -15,7 +15,7 @@ from vto_pipeline.model.mesh import PointCloud
 from vto_pipeline.scan.photos.consistency import consensus
 from vto_pipeline.scan.photos.disparity import _in_second
 from vto_pipeline.scan.photos.neighbours import choose_pairs, visibility
-from vto_pipeline.scan.photos.rectify import View, depth_in_view, rectify, warp
+from vto_pipeline.scan.photos.rectify import StereoView, depth_in_view, rectify, warp
 from vto_pipeline.scan.photos.stereo import StereoConfig, estimate_depth_maps
 from vto_pipeline.scan.photos.subpixel import refine_disparity
 
@@ -98,7 +98,7 @@ def test_a_point_falls_on_the_same_row_of_both_windows(true_cameras):
     points = cluster()
     camera = bent_view(-0.2)
     ramp = np.tile(np.arange(160, dtype=np.uint8), (120, 1))
-    first, second = (View(ramp, camera, true_cameras.world_from_cam[k]) for k in (3, 4))
+    first, second = (StereoView(ramp, camera, true_cameras.world_from_cam[k]) for k in (3, 4))
     frame = rectify(first, second, points, 0.1)
     for view, shift in ((first, 0), (second, frame.min_disparity)):
         window = warp(view, frame, shift)
@@ -118,7 +118,7 @@ def test_a_point_falls_on_the_same_row_of_both_windows(true_cameras):
 def test_depth_of_a_plane_comes_back(true_cameras):
     """A constant disparity is a plane at f B / d in the rectified frame."""
     camera = bent_view(0.0)
-    views = [View(np.zeros((120, 160), np.uint8), camera, true_cameras.world_from_cam[k]) for k in (3, 4)]
+    views = [StereoView(np.zeros((120, 160), np.uint8), camera, true_cameras.world_from_cam[k]) for k in (3, 4)]
     frame = rectify(*views, cluster(), 0.1)
     disparity = np.full(frame.size[::-1], frame.focal * frame.baseline / 0.9, np.float32)
     depth = depth_in_view(views[0], frame, disparity, 0)

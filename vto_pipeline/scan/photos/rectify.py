@@ -13,7 +13,7 @@ from vto_pipeline.model.camera import Intrinsics
 
 
 @dataclass(frozen=True)
-class View:
+class StereoView:
     """One photo as stereo sees it.
 
     Args:
@@ -49,7 +49,7 @@ class Rectification:
     disparities: int
 
 
-def rectify(first: View, second: View, points: FloatArray, margin: float) -> Rectification:
+def rectify(first: StereoView, second: StereoView, points: FloatArray, margin: float) -> Rectification:
     """Choose the rectified frame and the window that the given scene points need.
 
     Args:
@@ -85,7 +85,7 @@ def rectify(first: View, second: View, points: FloatArray, margin: float) -> Rec
 
 
 def _inside_picture(
-    view: View, rotation: FloatArray, focal: float, low: FloatArray, high: FloatArray
+    view: StereoView, rotation: FloatArray, focal: float, low: FloatArray, high: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Limit a window to the part that the picture covers."""
     camera = view.camera
@@ -99,7 +99,7 @@ def _inside_picture(
     return low, np.maximum(np.minimum(high, image.max(0)), low + 1)
 
 
-def warp(view: View, frame: Rectification, shift: int) -> NDArray[np.uint8]:
+def warp(view: StereoView, frame: Rectification, shift: int) -> NDArray[np.uint8]:
     """The part of a photo that the window shows, moved by `shift` pixels to the left; 0 beyond the photo."""
     import cv2
 
@@ -115,7 +115,9 @@ def warp(view: View, frame: Rectification, shift: int) -> NDArray[np.uint8]:
     return warped
 
 
-def depth_in_view(view: View, frame: Rectification, disparity: NDArray[np.float32], shift: int) -> NDArray[np.float32]:
+def depth_in_view(
+    view: StereoView, frame: Rectification, disparity: NDArray[np.float32], shift: int
+) -> NDArray[np.float32]:
     """Depth for each pixel of the undistorted view from a disparity map of the window.
 
     Args:

@@ -22,7 +22,7 @@ from vto_pipeline.model.settings import Config
 from vto_pipeline.scan.photos.consistency import agreeing_views, consensus
 from vto_pipeline.scan.photos.disparity import MatchConfig, match_pair
 from vto_pipeline.scan.photos.neighbours import choose_pairs, visibility
-from vto_pipeline.scan.photos.rectify import View, rectify
+from vto_pipeline.scan.photos.rectify import StereoView, rectify
 
 
 class StereoConfig(Config):
@@ -78,7 +78,7 @@ def estimate_depth_maps(
     return replace(merged, depth=checked)
 
 
-def _load(photos: PhotoSet, cameras: CameraSet, max_side: int) -> list[View]:
+def _load(photos: PhotoSet, cameras: CameraSet, max_side: int) -> list[StereoView]:
     import cv2
 
     paths = {path.name: path for path in photos.paths}
@@ -91,12 +91,12 @@ def _load(photos: PhotoSet, cameras: CameraSet, max_side: int) -> list[View]:
         if scale < 1:
             size = (round(gray.shape[1] * scale), round(gray.shape[0] * scale))
             gray = cv2.resize(gray, size, interpolation=cv2.INTER_AREA)
-            camera = scaled(camera, *size)
-        views.append(View(gray, camera, pose))
+            camera = resized_camera(camera, *size)
+        views.append(StereoView(gray, camera, pose))
     return views
 
 
-def scaled(camera: Intrinsics, width: int, height: int) -> Intrinsics:
+def resized_camera(camera: Intrinsics, width: int, height: int) -> Intrinsics:
     """The same camera with another number of pixels."""
     x, y = width / camera.width, height / camera.height
     cx, cy = (camera.cx + 0.5) * x - 0.5, (camera.cy + 0.5) * y - 0.5
@@ -108,7 +108,7 @@ def _undistorted(camera: Intrinsics) -> Intrinsics:
 
 
 def _merge(
-    views: list[View],
+    views: list[StereoView],
     pairs: list[tuple[int, int]],
     cloud: PointCloud,
     seen: NDArray[np.bool_],
