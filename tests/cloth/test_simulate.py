@@ -118,24 +118,42 @@ def test_a_falling_sheet_comes_to_its_terminal_speed_in_air():
         cloth.simulate(mesh, fabric(), seconds=0.1, settings={"solver": "xpbd", "air_drag": 1.0})
 
 
-@pytest.mark.xfail(reason="open: the corners end 0.1 m low, 90 times the closed form; pin_compliance is not right yet")
-def test_pins_that_give_way_sink_by_the_weight_they_bear():
-    mesh, compliance = sheet(7, 5, 0.3, 0.2), 2e-2
-    settings = {"until": "rest", "target_error_mm": 0.01, "damping": 5.0, "pin_compliance": compliance}
-    pinned = [0, 6]  # the upper corners, which bear half each
-    found = cloth.simulate(mesh, fabric(density=0.2, bending=1e-5), pinned=pinned, seconds=20.0, settings=settings)
-    sunk = (mesh.vertices - found.positions)[pinned, 1]
-    assert_allclose(sunk, 0.5 * compliance * 0.2 * 0.3 * 0.2 * G, rtol=0, atol=1e-5)  # as near as was asked for
+# relative errors: of balance to rounding, or of what is still to come after the 1 µm of 336 that is asked for
+GIVING_WAY = {"newton": 1e-9, "backward_euler": 1e-9, "imex": 1e-9, "projective": 1e-6, "gauss_seidel": 1e-6}
+GIVING_WAY |= {"xpbd": 1e-4, "verlet": 1e-3, "rk4": 1e-3}
+
+
+@pytest.mark.parametrize("solver", GIVING_WAY)
+def test_pins_that_give_way_sink_by_the_weight_they_bear(solver):
+    mesh, compliance, pinned = sheet(7, 5, 0.3, 0.2), 2e-2, list(range(7))
+    settings = {"until": "rest", "target_error_mm": 1e-3, "damping": 20.0, "pin_compliance": compliance}
+    stuff = fabric(density=0.2, bending=1e-5)
+    found = cloth.simulate(mesh, stuff, pinned=pinned, seconds=20.0, settings={**settings, "solver": solver})
+    assert found.report["settled"]
+    moved = (found.positions - mesh.vertices)[pinned]
+    weight = 0.2 * 0.3 * 0.2 * G
+    assert_allclose(-moved[:, 1].sum(), compliance * weight, rtol=GIVING_WAY[solver])
+    assert_allclose(moved.sum(axis=0)[[0, 2]], 0.0, rtol=0, atol=compliance * weight * GIVING_WAY[solver])
+
+
+def test_what_hangs_on_a_pin_that_gives_way_is_held_and_what_lies_beside_it_falls():
+    one = sheet(4, 3, 0.1, 0.1)
+    beside = one.vertices + np.array([1.0, 0.0, 0.0])
+    both = TriangleMesh(np.vstack([one.vertices, beside]), np.vstack([one.faces, one.faces + 12]))
+    settings = {"solver": "newton", "damping": 0.0, "pin_compliance": 1e-3}
+    found = cloth.simulate(both, fabric(), pinned=range(4), seconds=0.5, settings=settings)
+    steps, h = 30, 1 / 60
+    assert_allclose((both.vertices - found.positions)[12:, 1], G * h * h * steps * (steps + 1) / 2, rtol=1e-9)
+    assert np.abs(found.positions - both.vertices)[:12].max() < 0.02
+
+
+def test_pins_that_give_way_are_pins_at_rest():
+    mesh, settings = sheet(7, 5, 0.3, 0.2), {"pin_compliance": 2e-2}
     with pytest.raises(InputError, match="pinned vertex 99"):
-        cloth.simulate(mesh, fabric(), pinned=[99], seconds=0.1, settings={"pin_compliance": compliance})
+        cloth.simulate(mesh, fabric(), pinned=[99], seconds=0.1, settings=settings)
     with pytest.raises(ConfigError, match="pins on a path"):
         cloth.simulate(
-            mesh,
-            fabric(),
-            pinned=[0],
-            pin_path=lambda t: mesh.vertices[[0]],
-            seconds=0.1,
-            settings={"pin_compliance": compliance},
+            mesh, fabric(), pinned=[0], pin_path=lambda t: mesh.vertices[[0]], seconds=0.1, settings=settings
         )
 
 

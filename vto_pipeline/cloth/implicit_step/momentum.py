@@ -8,6 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from vto_pipeline.cloth.constraints.points.combination import Combination, holds_to_place
+from vto_pipeline.cloth.model.build import ClothModel
 from vto_pipeline.numerics.linear.block_matrix import BlockMatrix
 
 
@@ -16,18 +18,22 @@ class ClothComponents(NamedTuple):
 
     Args:
         of: The piece of each vertex, shape (V,).
-        held: Whether anything holds a piece, shape (P,).
+        held: Whether a held vertex or an attachment holds a piece, shape (P,).
     """
 
     of: NDArray[np.int32]
     held: NDArray[np.bool_]
 
 
-def free_components(matrix: BlockMatrix, held: NDArray[np.bool_]) -> ClothComponents | None:
-    """Return the pieces of a cloth, None if all are held somewhere."""
+def free_components(model: ClothModel, matrix: BlockMatrix) -> ClothComponents | None:
+    """Return the pieces of a cloth, of whose stiffness this is the pattern; None if all are held somewhere."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
 
+    held = model.inverse_mass == 0.0
+    for data in model.constraints:
+        if isinstance(data, Combination):
+            held[data.vertices[holds_to_place(data)]] = True
     count = len(held)
     ones = np.ones(len(matrix.columns), np.int8)
     of = connected_components(csr_array((ones, matrix.columns, matrix.starts), shape=(count, count)))[1]

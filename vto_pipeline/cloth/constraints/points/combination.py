@@ -16,6 +16,8 @@ from vto_pipeline.numerics.linear.coloured_blocks import blocks
 from vto_pipeline.numerics.mechanics.xpbd_row import multiplier_step
 from vto_pipeline.numerics.vector import add, axpy, dot, load, scale, store, sub
 
+_CANCELLED = 1e-9  # of the weights: what rounding leaves of them
+
 
 class Combination(NamedTuple):
     """Weighted sums, in the order in which they are solved.
@@ -68,6 +70,12 @@ def combinations(
         starts,
         colours,
     )
+
+
+def holds_to_place(data: Combination) -> NDArray[np.bool_]:
+    """Return which sums resist a shift of the whole cloth, shape (N,): those whose weights do not cancel."""
+    weights = data.weights
+    return np.abs(weights.sum(axis=1)) > _CANCELLED * np.abs(weights).sum(axis=1)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
