@@ -209,7 +209,7 @@ def run_steps(
     stiff: float = 1.0,
     begun: int = 0,
 ) -> Solution:
-    """Take some steps, each with a smaller reach; `begun` of them were taken before. The rest as `gauss_newton_step` has it."""
+    """Take some steps as `gauss_newton_step` does, each with a smaller reach; `begun` were taken before."""
     for k in range(begun, begun + steps):
         reach = max(_REACH_M * _FALL**k, _LAST_REACH_M)
         solution = gauss_newton_step(space, views, evidence, trust, reach, noise, stiff)

@@ -86,7 +86,7 @@ def run_scene(scene: Scene, config: StepConfig) -> Ended:
 
 
 def timed_run(scene: Scene, config: StepConfig, *, budget: float, most: float = inf) -> tuple[Ended | None, Timing]:
-    """Return what `run_scene` returns, and how long it takes: the method's own preparation counts, building the model not.
+    """Return what `run_scene` returns, and how long it takes: preparing the method counts, building the model does not.
 
     Args:
         scene: The scene.
