@@ -104,7 +104,7 @@ class Newton:
         self._system = LinearSystem(self._stiffness.matrix, self._held)
         self._stiffness.write_to(self._system.blocks)
         self.active: ActiveSet = no_contacts(0)
-        self._pieces = free_components(model, self._stiffness.matrix)
+        self._components = free_components(model, self._stiffness.matrix)
         self._allowed = 0.0  # what a step may cost in energy by being solved in part [J]
         self._whole = np.zeros((len(model.mass), 3))  # what the residuals of a step are measured against [N]
 
@@ -295,8 +295,8 @@ class Newton:
 
         Pieces that push each other count as one.
         """
-        if self._pieces is not None:
-            keep_momentum(self._pieces, self.active, self._model.mass, move, wanted)
+        if self._components is not None:
+            keep_momentum(self._components, self.active, self._model.mass, move, wanted)
 
     def _shortened(
         self,
