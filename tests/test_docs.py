@@ -10,7 +10,7 @@ import pytest
 
 from vto_pipeline.bench import BENCHES
 from vto_pipeline.bench.docs.__main__ import faults
-from vto_pipeline.bench.docs.pages import FIGURES, RESULTS, SOURCES, render
+from vto_pipeline.bench.docs.pages import FIGURES, RESULTS, SOURCES, render_pages
 from vto_pipeline.bench.docs.prose import LONGEST, count_words, long_sentences, typed_figures
 from vto_pipeline.bench.docs.results import Results
 from vto_pipeline.cli.work import catalogue, planned
@@ -62,7 +62,7 @@ def project(tmp_path):
     source = '# Toy\n\nIt takes {{ figure("toy", "seconds", method="newton") }} s for {{ chosen("1 m") }}.\n'
     (tmp_path / SOURCES / "benchmarks" / "toy.md.j2").write_text(source)
     (tmp_path / SOURCES / "README.md.j2").write_text("# A project\n")
-    for name, text in render(tmp_path).items():
+    for name, text in render_pages(tmp_path).items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
     return tmp_path
@@ -109,7 +109,7 @@ def test_what_no_result_has_is_an_error_that_names_the_page(project, asked, prob
     source = project / SOURCES / "benchmarks" / "toy.md.j2"
     source.write_text(f"{{{{ {asked} }}}}")
     with pytest.raises(ConfigError, match=re.escape(problem)) as raised:
-        render(project)
+        render_pages(project)
     assert str(source) in raised.value.where
 
 

@@ -10,7 +10,7 @@ from vto_pipeline.avatar.from_scan import ScanConfig, fit_scan
 from vto_pipeline.avatar.measure import measure
 from vto_pipeline.avatar.model.pose import joint_transforms
 from vto_pipeline.avatar.template.template import JOINTS
-from vto_pipeline.bench.body.clothed import dressed, someone
+from vto_pipeline.bench.body.clothed import random_wearer, visible_clothed_surface
 from vto_pipeline.io.bodies.measurements import write_measurements
 from vto_pipeline.model.body import Avatar
 from vto_pipeline.model.job import Job
@@ -28,8 +28,8 @@ def test_the_body_inside_loose_clothes(sex: str, seed: int, tmp_path) -> None:
 
     Two of his eleven girths are outside their intervals, waist and navel, each by less than half as much again.
     """
-    body = someone(sex, seed)
-    scan = dressed(body, EASE)
+    body = random_wearer(sex, seed)
+    scan = visible_clothed_surface(body, EASE)
     job = Job()
     found = fit_scan(scan, ScanConfig(sex=sex, clothed=True), job)
     read, true = measure(found), measure(body).values

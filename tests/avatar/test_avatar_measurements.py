@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from vto_pipeline.avatar.from_measurements import MeasurementsConfig, fit_measurements
 from vto_pipeline.avatar.measure import measure
 from vto_pipeline.avatar.measuring import population as population_module
-from vto_pipeline.avatar.measuring.population import complete, population
+from vto_pipeline.avatar.measuring.population import complete_measurements, population
 from vto_pipeline.errors import AvatarError, InputError
 from vto_pipeline.model.body import Measurements
 from vto_pipeline.model.job import Job
@@ -33,7 +33,7 @@ SIZES = [
 @pytest.mark.parametrize(("sex", "stature", "chest"), SIZES)
 def test_given_measurements_are_met(sex: str, stature: float, chest: float) -> None:
     job = Job()
-    rest = complete(Measurements({"stature": stature, "chest_girth": chest / 100}, sex=sex)).values
+    rest = complete_measurements(Measurements({"stature": stature, "chest_girth": chest / 100}, sex=sex)).values
     # a customer's waist and hip are never exactly the expected ones
     given = {
         "stature": stature,
@@ -53,7 +53,7 @@ def test_given_measurements_are_met(sex: str, stature: float, chest: float) -> N
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     assert mesh.is_watertight
     assert not crossing(vertices, faces)
-    expected = complete(Measurements(given, sex=sex)).values["mass"] / 1000
+    expected = complete_measurements(Measurements(given, sex=sex)).values["mass"] / 1000
     assert_allclose(mesh.volume, expected, rtol=0.08)  # issue 6: 8 % of mass / density
 
 
@@ -69,15 +69,15 @@ def test_all_means_of_ansur_at_once() -> None:
 
 def test_conditional_mean_is_the_regression_of_ansur() -> None:
     """From stature and weight: the regression printed in the reference table, computed from the raw subjects."""
-    got = complete(Measurements({"stature": 1.80, "mass": 90.0}, sex="male")).values
+    got = complete_measurements(Measurements({"stature": 1.80, "mass": 90.0}, sex="male")).values
     # ansur2_regressions.csv, male, stature_weight: mm from mm and kg
     assert_allclose(got["chest_girth"], 1.03699867 - 0.28995 * 1.80 + 6.2087e-3 * 90, rtol=0, atol=2e-3)  # 400 left out
     assert_allclose(got["navel_girth"], 1.02110207 - 0.43357 * 1.80 + 7.96019e-3 * 90, rtol=0, atol=2e-3)
 
 
 def test_uncertainty_falls_as_more_is_known() -> None:
-    little = complete(Measurements({"stature": 1.70}, sex="female")).sigmas
-    more = complete(Measurements({"stature": 1.70, "hip_girth": 1.0}, sex="female")).sigmas
+    little = complete_measurements(Measurements({"stature": 1.70}, sex="female")).sigmas
+    more = complete_measurements(Measurements({"stature": 1.70, "hip_girth": 1.0}, sex="female")).sigmas
     assert "hip_girth" not in more
     assert all(more[name] <= little[name] + 1e-12 for name in more)
     assert more["waist_girth"] < 0.8 * little["waist_girth"]

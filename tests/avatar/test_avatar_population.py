@@ -13,7 +13,7 @@ from scipy.spatial import ConvexHull
 
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.measure import measure
-from vto_pipeline.avatar.measuring.population import complete, population
+from vto_pipeline.avatar.measuring.population import complete_measurements, population
 from vto_pipeline.avatar.measuring.tape import DENSITY_KG_M3
 from vto_pipeline.avatar.template.template import beyond_armscye, template
 from vto_pipeline.model.body import Measurements
@@ -33,7 +33,7 @@ SIZES = {
 def of_size(sex: str, letter: str) -> dict[str, float]:
     stature = {"female": 1.66, "male": 1.78}[sex]
     given = {"stature": stature, "chest_girth": SIZES[sex][letter] / 100}
-    return dict(complete(Measurements(given, sex=sex)).values)
+    return dict(complete_measurements(Measurements(given, sex=sex)).values)
 
 
 def people(count: int, seed: int) -> list[tuple[str, dict[str, float]]]:

@@ -9,7 +9,14 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from vto_pipeline.avatar.from_measurements import fit_measurements
-from vto_pipeline.avatar.model.pose import blend, clear_pose, joint_transforms, morph, named_pose, pose_avatar
+from vto_pipeline.avatar.model.pose import (
+    blend_transforms,
+    clear_pose,
+    joint_transforms,
+    morph,
+    named_pose,
+    pose_avatar,
+)
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.intersections import self_intersections
@@ -94,7 +101,7 @@ def test_every_vertex_moves_rigidly_and_alone_with_its_own_joint() -> None:
     body = template(0.5)
     rng = np.random.default_rng(4)
     rotation, offset = joint_transforms(body.joints, body.parents, rng.normal(0, 0.3, body.joints.shape))
-    turn, place = blend(body.weights, rotation, offset)
+    turn, place = blend_transforms(body.weights, rotation, offset)
     assert_allclose(turn @ turn.swapaxes(1, 2), np.tile(np.eye(3), (len(turn), 1, 1)), rtol=0, atol=1e-12)
     alone = body.weights.max(axis=1) == 1.0
     owner = body.weights[alone].argmax(axis=1)

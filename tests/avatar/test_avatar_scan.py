@@ -13,16 +13,16 @@ from scipy.spatial.transform import Rotation
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.from_scan import ScanConfig, fit_scan
 from vto_pipeline.avatar.measure import measure
-from vto_pipeline.avatar.measuring.measuring_levels import find_levels, with_rows_at
-from vto_pipeline.avatar.model.fit import Fit, model
+from vto_pipeline.avatar.measuring.measuring_levels import find_levels, with_rows_at_levels
+from vto_pipeline.avatar.model.fit import Fit, posed_vertices
 from vto_pipeline.avatar.model.pose import pose_avatar
 from vto_pipeline.avatar.model.shape import shape_space
 from vto_pipeline.avatar.model.stance import ARM, stance
 from vto_pipeline.avatar.scan.bind_pose import to_bind_pose
 from vto_pipeline.avatar.scan.initial_pose import upright_initial_poses
-from vto_pipeline.avatar.scan.upright import in_metres, inside_out, turns_upright, without_floor
+from vto_pipeline.avatar.scan.upright import candidate_up_rotations, in_metres, inside_out, without_floor
 from vto_pipeline.avatar.template.template import beyond_armscye, membership
-from vto_pipeline.bench.body.people import cloud_of, person
+from vto_pipeline.bench.body.people import poor_scan, random_body
 from vto_pipeline.bench.samples.customer import CELL, SHAPE
 from vto_pipeline.bench.samples.solids.body import body_distance
 from vto_pipeline.bench.samples.solids.surface_nets import zero_surface
@@ -141,7 +141,7 @@ def test_units_axes_and_floors_are_found_out() -> None:
     body = true_body().mesh
     floor = trimesh.creation.box((1.2, 0.01, 1.2), trimesh.transformations.translation_matrix((0, -0.006, 0)))
     whole = trimesh.util.concatenate([trimesh.Trimesh(body.vertices, body.faces, process=False), floor])
-    for name, turn in turns_upright(body).items():
+    for name, turn in candidate_up_rotations(body).items():
         job = Job()
         found = in_metres(TriangleMesh(1000.0 * whole.vertices @ turn, whole.faces), job)
         assert any("millimetres" in note for note in job.notes)
@@ -231,7 +231,7 @@ def test_rows_come_to_their_levels() -> None:
     bind = space.vertices(zero)
     level = {row: float(bind[space.base.loops[row], 1].mean()) for row in ("waist", "chest", "hip", "neck_base")}
     wanted = {"waist": level["waist"] + 0.02, "chest": level["chest"] - 0.01}
-    slid = with_rows_at(space, zero, bind, wanted)
+    slid = with_rows_at_levels(space, zero, bind, wanted)
     moved = slid.vertices(zero)
     for row, height in wanted.items():
         assert_allclose(moved[space.base.loops[row], 1].mean(), height, rtol=0, atol=1e-3)
@@ -249,7 +249,7 @@ def test_posture_stays_and_arms_do_not() -> None:
     for joint, turn in {"chest": (0.1, 0, 0), "left_hip": (0, 0, 0.1), "left_shoulder": (0, 0, 0.15)}.items():
         pose[names.index(joint)] = turn
     fit = Fit(np.zeros(len(space.names)), pose, np.array([0.3, 0.1, -0.2]), np.zeros(len(space.names)))
-    posed = model(space, fit)
+    posed = posed_vertices(space, fit)
     stands = stance(space, fit)
     body, tangled = to_bind_pose(space, fit, stands, posed, posed)
     assert stands.stands
@@ -281,8 +281,8 @@ def test_a_crouch_is_told() -> None:
 @pytest.mark.parametrize(("sex", "seed"), [("female", 0), ("male", 1), ("female", 2), ("male", 3)])
 def test_own_bodies_are_found_again(sex: str, seed: int) -> None:
     """20,000 points, 2 mm noise, 5 % outliers, 10 % holes; random shape, stance and facing."""
-    body = person(sex, seed)
-    scan = reconstruct_cloud(cloud_of(body, seed), SurfaceConfig(), Job())
+    body = random_body(sex, seed)
+    scan = reconstruct_cloud(poor_scan(body, seed), SurfaceConfig(), Job())
     fitted = fit_scan(scan, ScanConfig(sex=sex))
     on_body, face = trimesh.sample.sample_surface(trimesh.Trimesh(body.vertices, body.faces), 6000, seed=1)
     ends = [k for k, name in enumerate(body.joint_names) if name.rpartition("_")[2] in ("head", "wrist", "ankle")]
@@ -367,8 +367,8 @@ def test_a_quarter_of_the_faces_will_do() -> None:
 
 def test_normals_of_a_drawn_person_point_out() -> None:
     """Of one whose cloud is a fifth inside out when signs are spread along a tree."""
-    body = person("female", 168)
-    points = cloud_of(body, 168).points
+    body = random_body("female", 168)
+    points = poor_scan(body, 168).points
     face, _, away = closest_points(points, body.vertices, body.faces)
     near = away < 0.006  # three times the noise; the rest are outliers
     normals = oriented_normals(PointCloud(points), 20, Job())

@@ -17,8 +17,15 @@ from vto_pipeline.avatar.measuring.population import population
 from vto_pipeline.avatar.model.fit import Fit
 from vto_pipeline.avatar.model.pose import joint_transforms
 from vto_pipeline.avatar.model.shape import shape_space
-from vto_pipeline.avatar.silhouettes.backdrop import person
-from vto_pipeline.avatar.silhouettes.fit import View, _camera_rows, _eye_row, _feet_rows, _moved, _posture_rows
+from vto_pipeline.avatar.silhouettes.backdrop import segment_person
+from vto_pipeline.avatar.silhouettes.fit import (
+    SilhouetteView,
+    _camera_rows,
+    _eye_row,
+    _feet_rows,
+    _moved,
+    _posture_rows,
+)
 from vto_pipeline.avatar.silhouettes.outline import Camera, ImageOutline, model_outline
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.bench.body.silhouettes import photograph as shot
@@ -84,13 +91,13 @@ def test_turns_of_pose_and_camera_follow_their_derivatives() -> None:
     space, rng = shape_space(0.0), np.random.default_rng(3)
     count, block = len(space.names), 3 * len(space.base.joints) + 5
 
-    def view(yaw: float) -> View:
+    def view(yaw: float) -> SilhouetteView:
         nominal = np.zeros((len(space.base.joints), 3))
         nominal[0] = [0.0, yaw, 0.0]
         pose = nominal + rng.normal(0.0, 0.01, nominal.shape)
         zero = np.zeros(count)
         fit = Fit(zero, pose, np.array([0.0, -0.8, -2.5]), zero)
-        return View(ImageOutline(np.pad(np.ones((8, 8), dtype=bool), 4)), nominal, fit, Camera(900.0, 16, 16))
+        return SilhouetteView(ImageOutline(np.pad(np.ones((8, 8), dtype=bool), 4)), nominal, fit, Camera(900.0, 16, 16))
 
     front, side = view(0.0), view(np.pi / 2)
     rows = np.vstack([_posture_rows(space, front, side)[0], _camera_rows(front, side)[0]])
@@ -127,7 +134,7 @@ def test_feet_that_tip_are_held_flat() -> None:
     assert_allclose(tipped(pose)[1], 0.0, rtol=0, atol=1e-9)
     pose[1:] = rng.normal(0.0, 0.003, pose[1:].shape)
     fit = Fit(zero, pose, np.array([0.0, -0.8, -2.5]), zero)
-    view = View(ImageOutline(np.pad(np.ones((8, 8), dtype=bool), 4)), pose, fit, Camera(900.0, 16, 16))
+    view = SilhouetteView(ImageOutline(np.pad(np.ones((8, 8), dtype=bool), 4)), pose, fit, Camera(900.0, 16, 16))
     rows, step = tipped(pose)[0], 1e-5
     for column in range(pose.size):
         move = np.zeros(pose.size + 5)
@@ -154,7 +161,7 @@ def test_the_lens_is_as_high_as_it_is() -> None:
     pose[0] = [0.1, 1.5, -0.05]
     pose[1:] = rng.normal(0.0, 0.1, pose[1:].shape)
     fit = Fit(zero, pose, np.array([0.1, -1.1, -2.5]), zero)
-    view = View(ImageOutline(np.pad(np.ones((8, 8), dtype=bool), 4)), pose, fit, Camera(900.0, 16, 16))
+    view = SilhouetteView(ImageOutline(np.pad(np.ones((8, 8), dtype=bool), 4)), pose, fit, Camera(900.0, 16, 16))
     row, step = seen(fit)[0], 1e-5
     for column in range(len(row)):
         move = np.zeros(len(row))
@@ -326,7 +333,7 @@ def with_figure(*boxes: tuple[int, int, int, int]) -> np.ndarray:
 
 
 def test_the_person_is_cut_out_to_the_pixel_before_a_shaded_backdrop() -> None:
-    mask = person(with_figure((20, 190, 50, 90)), "f.png")
+    mask = segment_person(with_figure((20, 190, 50, 90)), "f.png")
     true = np.zeros((200, 150), dtype=bool)
     true[20:190, 50:90] = True
     assert (mask != true).sum() <= 4  # rounded corners
@@ -344,4 +351,4 @@ def test_the_person_is_cut_out_to_the_pixel_before_a_shaded_backdrop() -> None:
 )
 def test_bad_pictures_are_told(image: np.ndarray, problem: str) -> None:
     with pytest.raises(AvatarError, match=problem):
-        person(image, "f.png")
+        segment_person(image, "f.png")

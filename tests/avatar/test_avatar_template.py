@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from vto_pipeline.avatar.measure import measure
 from vto_pipeline.avatar.model.shape import shape_space
-from vto_pipeline.avatar.template.regions import trunk
+from vto_pipeline.avatar.template.regions import trunk_vertices
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.errors import InputError
 
@@ -75,7 +75,7 @@ def test_loops_go_round_and_landmarks_lie_where_they_should() -> None:
     assert at["left_bust_point"][2] > 0.1 > 0 > at["back_neck"][2]
     assert at["left_toe"][2] > at["left_heel"][2]
     assert at["left_wrist_point"][0] > 0 > at["right_wrist_point"][0]
-    share = trunk(body).mean()
+    share = trunk_vertices(body).mean()
     assert 0.3 < share < 0.6
 
 

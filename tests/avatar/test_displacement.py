@@ -9,7 +9,7 @@ from vto_pipeline.avatar.measure import measure
 from vto_pipeline.avatar.scan.correspondence import Target
 from vto_pipeline.avatar.scan.displacement import displace
 from vto_pipeline.bench.body.extremes import _one_armed
-from vto_pipeline.bench.body.people import person
+from vto_pipeline.bench.body.people import random_body
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -46,7 +46,7 @@ def test_what_the_scan_has_is_followed_however_far() -> None:
 @pytest.mark.slow
 def test_an_arm_that_the_scan_lacks_is_a_likely_one() -> None:
     """It reaches for nothing: neither into the trunk, nor in its girths."""
-    body, job = person("female", 0), Job()
+    body, job = random_body("female", 0), Job()
     found = fit_scan(_one_armed(body), ScanConfig(sex="female"), job)
     assert job.metrics["tangled_faces"] == 0
     assert any("0% of the left arm is in the scan" in warning for warning in job.warnings)

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from vto_pipeline.avatar.measure import measure
 from vto_pipeline.avatar.model.shape import ShapeSpace, shape_space
 from vto_pipeline.avatar.scan.correspondence import Target
-from vto_pipeline.avatar.scan.report import check_build
+from vto_pipeline.avatar.scan.report import refuse_implausible_build
 from vto_pipeline.avatar.scan.unobserved_uncertainty import unseen_sigmas
 from vto_pipeline.avatar.template.template import beyond_armscye
 from vto_pipeline.errors import AvatarError
@@ -64,6 +64,8 @@ def test_what_was_bent_is_less_sure() -> None:
 def test_people_are_made_out_and_monsters_are_not(size: float) -> None:
     read = measure(shape_space(0.5).base)
     scaled = {name: size * value for name, value in read.values.items()}
-    check_build(Measurements(scaled, sex="neutral"), 0.8)
+    refuse_implausible_build(Measurements(scaled, sex="neutral"), 0.8)
     with pytest.raises(AvatarError, match="leans 46 degrees and cannot be reconstructed: its back_shoulder_width"):
-        check_build(Measurements(scaled | {"back_shoulder_width": 0.4 * scaled["back_shoulder_width"]}), 0.8)
+        refuse_implausible_build(
+            Measurements(scaled | {"back_shoulder_width": 0.4 * scaled["back_shoulder_width"]}), 0.8
+        )

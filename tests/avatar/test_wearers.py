@@ -6,11 +6,11 @@ from numpy.testing import assert_allclose
 from scipy.stats import gamma
 
 from vto_pipeline.avatar.measuring.population import Population, population
-from vto_pipeline.avatar.scan import body_under_clothes as ease
+from vto_pipeline.avatar.scan import body_under_clothes as under_clothes
 from vto_pipeline.avatar.scan.body_under_clothes import ZONES, Zone, likely_wearers
 from vto_pipeline.model.body import Measurements
 
-SEEN = ease._SEEN_M
+SEEN = under_clothes._SEEN_M
 
 
 def girth(found: Population, row: str) -> tuple[float, float]:
@@ -29,7 +29,10 @@ def test_what_is_surely_tight_is_measured() -> None:
     read = Measurements(clothes, {"neck_girth": 0.012})  # as near a collar
     tight = (Zone(("chest",), 1 - 1e-12), Zone(("neck",), 1 - 1e-12))
     draws = [likely_wearers(people, read, seed, tight) for seed in (1, 2, 3)]
-    sigmas = SEEN | {"chest_girth": ease._TIGHT_M, "neck_girth": float(np.hypot(ease._TIGHT_M, 0.012))}
+    sigmas = SEEN | {
+        "chest_girth": under_clothes._TIGHT_M,
+        "neck_girth": float(np.hypot(under_clothes._TIGHT_M, 0.012)),
+    }
     true = people.given({name: clothes[name] for name in sigmas}, sigmas)
     # the population's own widening for the unusual is not in question here
     wide = people.given({name: clothes[name] for name in SEEN}, SEEN)
@@ -47,7 +50,7 @@ def test_what_is_surely_loose_is_smaller_as_the_ease_says() -> None:
     found = likely_wearers(people, Measurements(clothes), 2, (Zone(("chest",), 1e-12),))
     mean, spread = girth(people.given({name: clothes[name] for name in SEEN}, SEEN), "chest")
     at = np.linspace(0.5, 1.5, 20001)
-    density = np.exp(-0.5 * ((at - mean) / spread) ** 2) * gamma.pdf(1.10 - at, 2, scale=ease._EASE_M)
+    density = np.exp(-0.5 * ((at - mean) / spread) ** 2) * gamma.pdf(1.10 - at, 2, scale=under_clothes._EASE_M)
     density /= density.sum()
     true = float(density @ at)
     assert_allclose(girth(found, "chest")[0], true, rtol=0, atol=0.003)
@@ -60,7 +63,7 @@ def test_nobody_is_larger_than_the_clothes() -> None:
     found = likely_wearers(people, Measurements(narrow), 3)
     for zone in ZONES:
         for row in zone.rows:
-            assert girth(found, row)[0] < narrow[f"{row}_girth"] + ease._TIGHT_M
+            assert girth(found, row)[0] < narrow[f"{row}_girth"] + under_clothes._TIGHT_M
 
 
 @pytest.mark.slow
@@ -74,9 +77,9 @@ def test_intervals_hold_people_who_dress_as_assumed() -> None:
         for name, sigma in SEEN.items():
             clothes[name] += rng.normal(0.0, sigma)
         for zone in ZONES:
-            tight = rng.random() < zone.tight
-            least = rng.normal(0.0, ease._TIGHT_M) if tight else rng.gamma(2.0, ease._EASE_M)
-            more = rng.gamma(2.0, ease._EASE_M, len(zone.rows))
+            tight = rng.random() < zone.tight_probability
+            least = rng.normal(0.0, under_clothes._TIGHT_M) if tight else rng.gamma(2.0, under_clothes._EASE_M)
+            more = rng.gamma(2.0, under_clothes._EASE_M, len(zone.rows))
             more -= more.min()
             for row, extra in zip(zone.rows, more, strict=True):
                 clothes[f"{row}_girth"] += least + extra

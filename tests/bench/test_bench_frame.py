@@ -14,7 +14,7 @@ from vto_pipeline.bench import BENCHES
 from vto_pipeline.bench import record as record_module
 from vto_pipeline.bench.bench import Bench, Row, Watch
 from vto_pipeline.bench.machine import same_machine, this_machine
-from vto_pipeline.bench.record import Files, carry_out
+from vto_pipeline.bench.record import Files, run_bench
 from vto_pipeline.bench.timing import Timing, timed
 
 ROOT = Path(__file__).parents[2]
@@ -50,7 +50,7 @@ def bench_of(monkeypatch):
 
 
 def run(bench_of, folder, counted, **options):
-    return carry_out("toy", bench_of(counted), folder, **options)
+    return run_bench("toy", bench_of(counted), folder, **options)
 
 
 def test_document_and_picture(bench_of, tmp_path):

@@ -11,14 +11,14 @@ from vto_pipeline.bench.scaling import direct_solvers
 from vto_pipeline.bench.scaling.direct_solvers import direct_rows
 from vto_pipeline.bench.scaling.overhead import _spinning
 from vto_pipeline.bench.scaling.roofline import bandwidth
-from vto_pipeline.bench.scaling.sizes import power_law
+from vto_pipeline.bench.scaling.sizes import fit_power_law
 from vto_pipeline.bench.scaling.throughput import _KERNELS, kernel_rows
 from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM
 
 
 def test_exponent_of_an_exact_power():
     vertices = np.array([1e3, 4e3, 1.6e4, 6.4e4])
-    found = power_law(vertices, 3e-6 * vertices**1.15)
+    found = fit_power_law(vertices, 3e-6 * vertices**1.15)
     assert found.exponent == pytest.approx(1.15, rel=1e-12)
     assert found.uncertainty == pytest.approx(0.0, abs=1e-12)
 
@@ -28,13 +28,13 @@ def test_exponent_and_uncertainty_are_those_of_regression():
     vertices = np.geomspace(1e3, 1e6, 7)
     seconds = vertices**1.3 * np.exp(0.2 * rng.standard_normal(7))
     truth = linregress(np.log(vertices), np.log(seconds))
-    found = power_law(vertices, seconds)
+    found = fit_power_law(vertices, seconds)
     assert found.exponent == pytest.approx(truth.slope, rel=1e-12)
     assert found.uncertainty == pytest.approx(truth.stderr, rel=1e-9)
 
 
 def test_two_sizes_have_no_uncertainty():
-    assert np.isnan(power_law([1.0, 2.0], [1.0, 2.0]).uncertainty)
+    assert np.isnan(fit_power_law([1.0, 2.0], [1.0, 2.0]).uncertainty)
 
 
 def test_cache_is_faster_than_memory_and_both_are_possible():

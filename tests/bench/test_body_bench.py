@@ -13,7 +13,7 @@ from vto_pipeline.avatar.measuring.definitions import DEFINITIONS
 from vto_pipeline.bench import BENCHES
 from vto_pipeline.bench.body.coverage import interval_errors
 from vto_pipeline.bench.body.iso20685 import CLASSES, LIMITS_MM
-from vto_pipeline.bench.body.people import as_standing, cloud_of, person
+from vto_pipeline.bench.body.people import as_standing, poor_scan, random_body
 from vto_pipeline.bench.body.silhouettes import photograph
 from vto_pipeline.bench.body.slices import slice_girth
 from vto_pipeline.bench.plots.body_plot import draw_body
@@ -58,8 +58,8 @@ def test_the_second_tape_goes_round_a_trunk_whose_arms_are_cut_off() -> None:
 
 
 def test_a_poor_scan_is_as_poor_as_it_says() -> None:
-    body = person("female", 4)
-    cloud = cloud_of(body, 4, count=6000)
+    body = random_body("female", 4)
+    cloud = poor_scan(body, 4, count=6000)
     assert len(cloud.points) == 6000
     away = closest_points(cloud.points[:5700], body.vertices, body.faces)[2]
     # of isotropic noise the surface sees one direction: rms 2 mm, a little less where it is curved
@@ -69,7 +69,7 @@ def test_a_poor_scan_is_as_poor_as_it_says() -> None:
 
 
 def test_a_person_as_they_stand_is_the_same_surface_with_the_arms_put_aside() -> None:
-    body = person("male", 5)
+    body = random_body("male", 5)
     kept = as_standing(body)
     assert_allclose(kept.vertices, body.vertices, rtol=0, atol=1e-6)
     cos, sin = np.cos(body.pose[0, 1]), np.sin(body.pose[0, 1])

@@ -156,7 +156,7 @@ def test_left_out_compares_with_all_of_it(monkeypatch):
         return Trajectory(self.rest + shift, 0.0 * self.rest, {"self_contact": counters.as_report()})
 
     monkeypatch.setattr(ContactScene, "run", run)
-    rows = list(left_out.left_out_rows(True, Watch()))
+    rows = list(left_out.collision_left_out_rows(True, Watch()))
     assert len(rows) == 2
     for row in rows:
         assert_allclose(row.errors["difference_mm"], 0.05, rtol=1e-9)

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from vto_pipeline.bench.bench import Row, Watch
 from vto_pipeline.bench.drape import budget, left_out, refinement, scanned
-from vto_pipeline.bench.drape.case import Case
+from vto_pipeline.bench.drape.case import DrapeCase
 from vto_pipeline.bench.measures import distance_mm, edge_strain
 from vto_pipeline.bench.plots.drape_plot import draw_drape
 from vto_pipeline.bench.samples.garments.wearer import wearer
@@ -35,14 +35,14 @@ def draped(mesh, predicted_mm, **audit):
 @pytest.fixture
 def shirt(monkeypatch):
     """A drape that moves the garment by its target error along x, but predicts half of that."""
-    case = Case("shirt", "average", "denim", 40.0)
+    case = DrapeCase("shirt", "average", "denim", 40.0)
 
     def drape(self, settings, fabric=None):
         mesh = self.made().mesh
         shift = 1e-3 * settings["target_error_mm"] * np.array([1.0, 0.0, 0.0])
         return draped(TriangleMesh(mesh.vertices + shift, mesh.faces), 0.5 * settings["target_error_mm"])
 
-    monkeypatch.setattr(Case, "drape", drape)
+    monkeypatch.setattr(DrapeCase, "drape", drape)
     budget._reference.cache_clear()
     yield case
     budget._reference.cache_clear()
@@ -59,7 +59,7 @@ def test_a_prediction_that_promises_too_much_is_found_out(shirt):
 
 
 def test_a_reference_that_has_not_come_to_rest_judges_nobody(shirt, monkeypatch):
-    monkeypatch.setattr(Case, "drape", lambda self, settings: draped(self.made().mesh, 1.0, settled=False))
+    monkeypatch.setattr(DrapeCase, "drape", lambda self, settings: draped(self.made().mesh, 1.0, settled=False))
     found = budget._measure(shirt, {"target_error_mm": 1.0}, {"target_error_mm": 0.5})[1]
     assert found["distance_mm"] == 0.0
     assert found["honest"] is None
@@ -69,13 +69,13 @@ def test_a_failed_drape_is_a_row_too(shirt, monkeypatch):
     def fail(self, settings, fabric=None):
         raise IntersectingError("7 pairs still cross")
 
-    monkeypatch.setattr(Case, "drape", fail)
+    monkeypatch.setattr(DrapeCase, "drape", fail)
     row = Watch().row("shirt", "drape", {}, 0, partial(budget._measure, shirt, {}, {}))
     assert row.errors == {"status": "7 pairs still cross"}
 
 
 def test_there_are_ten_cases_of_every_garment_and_body():
-    cases = [Case(*names, edge_mm=30.0) for names in budget._CASES]
+    cases = [DrapeCase(*names, edge_mm=30.0) for names in budget._CASES]
     assert len({case.name for case in cases}) == 10
     assert {case.garment for case in cases} == {"shirt", "dress", "skirt", "trousers"}
     assert {case.size for case in cases} == {"slim", "average", "large"}
@@ -127,7 +127,7 @@ def test_what_leaving_out_changes_is_seen(shirt, monkeypatch):
         mesh, shift = self.made().mesh, [2e-4 * job.force_all, 0.0, 0.0]
         return draped(TriangleMesh(mesh.vertices + shift, mesh.faces), 0.5)
 
-    monkeypatch.setattr(Case, "drape", drape)
+    monkeypatch.setattr(DrapeCase, "drape", drape)
     timing, found = left_out._measure(shirt)
     assert_allclose(found["difference_mm"], 0.2, rtol=1e-9)
     assert_allclose(found["saved_share"], 1.0 - timing.seconds / found["whole_s"], rtol=1e-12)
@@ -151,7 +151,7 @@ def test_rows_of_nothing_known_are_refused():
 @pytest.mark.parametrize("names", budget._CASES, ids=", ".join)
 def test_what_a_drape_promises_is_kept(names):
     """True against predicted error at the end of a run, the truth being the same run continued."""
-    case, patient = Case(*names, edge_mm=25.0), {"settle_seconds": 60.0}
+    case, patient = DrapeCase(*names, edge_mm=25.0), {"settle_seconds": 60.0}
     truth = case.drape({**patient, "target_error_mm": 0.005})
     assert truth.audit["settled"]
     for target in budget.TARGETS_MM:
@@ -166,7 +166,7 @@ def test_quick_rows_name_what_they_measure(monkeypatch):
     for module in (budget, refinement, scanned, left_out):
         monkeypatch.setattr(module, "_measure", lambda *given: (Timing(1.0), {}))
     monkeypatch.setattr(budget, "_exact", lambda *given: (Timing(1.0), {}))
-    parts = (budget.budget_rows, refinement.refinement_rows, scanned.scanned_rows, left_out.left_out_rows)
+    parts = (budget.budget_rows, refinement.refinement_rows, scanned.scanned_rows, left_out.drape_left_out_rows)
     found = [row for part in parts for row in part(True, Watch())]
     assert len({row.key for row in found}) == len(found) > 6
     assert all(200 < row.vertices < 3000 for row in found)

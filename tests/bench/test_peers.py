@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from vto_pipeline.bench import peers
 from vto_pipeline.bench.bench import Watch
 from vto_pipeline.bench.cloth.scenes import hang
-from vto_pipeline.bench.peers.peer import Peer, measure
+from vto_pipeline.bench.peers.peer import Peer, measure_peer
 from vto_pipeline.cloth.model.build import ClothState
 from vto_pipeline.errors import DivergedError, MissingDependencyError
 
@@ -42,15 +42,15 @@ def stretched(monkeypatch) -> Peer:
 
 
 def test_two_seconds_of_frames_are_run_and_measured(stretched):
-    timing, errors = measure(stretched, hang(8), {"share": 1e-4})
+    timing, errors = measure_peer(stretched, hang(8), {"share": 1e-4})
     assert errors["status"] == "ended"
     assert_allclose(errors["rms_stretch"], 120 * 1e-4, rtol=1e-6)  # 120 frames of 1/60 s; rounding only
     assert timing.runs == 3
 
 
 def test_cloth_that_blows_up_is_a_row_that_says_so(stretched):
-    assert measure(stretched, hang(8), {"share": 2.0})[1] == {"status": "blew up"}
-    assert measure(stretched, hang(8), {"share": np.nan})[1] == {"status": "diverged"}
+    assert measure_peer(stretched, hang(8), {"share": 2.0})[1] == {"status": "blew up"}
+    assert measure_peer(stretched, hang(8), {"share": np.nan})[1] == {"status": "diverged"}
 
 
 def test_none_installed_is_a_missing_dependency(monkeypatch):
@@ -65,7 +65,7 @@ def test_an_installed_peer_hangs_the_sheet_where_statics_has_it(peer):
     if not peer.installed:
         pytest.skip(f"no package {peer.package}")
     scene = hang(8)
-    _, errors = measure(peer, scene, peer.budgets(scene)[0])
+    _, errors = measure_peer(peer, scene, peer.budgets(scene)[0])
     # a sheet that hardly stretches hangs flat from its corners: its middle half a metre below them
     assert_allclose(errors["mean_height_m"], 0.5, rtol=0, atol=0.01)
     assert errors["rms_stretch"] < 0.01

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from vto_pipeline.bench.samples.solids.clip import clip
+from vto_pipeline.bench.samples.solids.clip import clip_snapped
 from vto_pipeline.bench.samples.solids.primitives import cone, ellipsoid, smooth_cut, smooth_union
 from vto_pipeline.bench.samples.solids.surface_nets import zero_surface
 
@@ -62,7 +62,7 @@ def test_joins_are_exact_away_from_the_fillet_and_on_the_safe_side_in_it():
 @pytest.mark.parametrize("height", [0.0, 0.03, -0.0301])
 def test_a_cut_sphere_is_a_cap_with_one_round_border(height):
     mesh = zero_surface(lambda p: np.linalg.norm(p, axis=1) - 0.1, *BOX, 0.004)
-    cap = clip(mesh, mesh.vertices[:, 1] - height)
+    cap = clip_snapped(mesh, mesh.vertices[:, 1] - height)
     uses = edge_uses(cap.faces)
     assert len(uses) == 3
     assert cap.vertices[:, 1].min() == pytest.approx(height, abs=1e-6)

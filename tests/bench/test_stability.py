@@ -8,13 +8,13 @@ from numpy.testing import assert_allclose
 
 from vto_pipeline.bench.bench import Watch
 from vto_pipeline.bench.cloth.closed_forms import growth_and_frequency
-from vto_pipeline.bench.stability.frequency import highest_frequency
+from vto_pipeline.bench.stability.frequency import highest_mode
 from vto_pipeline.bench.stability.limits import LIMIT, measured_growth, predicted_break
 from vto_pipeline.bench.stability.refused import REFUSED, refuse
 from vto_pipeline.bench.stability.sheets import quiet_sheet, sheet_cases
 from vto_pipeline.bench.stability.strands import strand_cases
 from vto_pipeline.bench.stability.table import measured_limit, rows
-from vto_pipeline.bench.stability.trial import VERDICTS, attempt
+from vto_pipeline.bench.stability.trial import VERDICTS, run_trial
 from vto_pipeline.cloth.constraints.points.spring import springs
 from vto_pipeline.cloth.dynamics.methods import METHODS
 from vto_pipeline.cloth.model.build import ClothState, model_of
@@ -24,7 +24,7 @@ PATIENCE = 60.0  # s; nothing here takes a second when compiled
 
 
 def verdict(name, method, **changes):
-    found = attempt(replace(CASES[name], **changes), METHODS[method], PATIENCE)[1]
+    found = run_trial(replace(CASES[name], **changes), METHODS[method], PATIENCE)[1]
     assert found["verdict"] in VERDICTS
     return found
 
@@ -59,7 +59,7 @@ def test_integrators_of_forces_do_not_take_what_is_rigid():
 
 
 def test_out_of_patience():
-    assert attempt(CASES["h 1/60"], METHODS["xpbd"], 0.0)[1]["verdict"] == "too slow"
+    assert run_trial(CASES["h 1/60"], METHODS["xpbd"], 0.0)[1]["verdict"] == "too slow"
 
 
 class Cheat:
@@ -106,11 +106,11 @@ class Stretched(Cheat):
 )
 def test_a_cheat_is_found_out(method, said):
     case = replace(CASES["h 1/60"], frames=3 if method is Stretched else 60)
-    assert attempt(case, method, PATIENCE)[1]["verdict"] == said
+    assert run_trial(case, method, PATIENCE)[1]["verdict"] == said
 
 
 def test_not_recovering_is_found_out():
-    found = attempt(replace(CASES["collapsed to a line"], frames=3), Frozen, PATIENCE)[1]
+    found = run_trial(replace(CASES["collapsed to a line"], frames=3), Frozen, PATIENCE)[1]
     assert found["verdict"] == "does not recover"
     assert found["recovery_frames"] is None
 
@@ -131,7 +131,7 @@ def test_the_highest_frequency_of_a_chain():
     points = np.outer(np.arange(count + 1), [0.1, 0.0, 0.0])
     pairs = np.column_stack([np.arange(count), np.arange(1, count + 1)])
     model = model_of((springs(pairs, points, 1.0 / stiffness),), np.full(count + 1, mass), pinned=[0])
-    found, mode = highest_frequency(model, points)
+    found, mode = highest_mode(model, points)
     closed = 2.0 * np.sqrt(stiffness / mass) * np.sin((2 * count - 1) * np.pi / (4 * count + 2))
     assert_allclose(found, closed, rtol=1e-12)  # dense eigenvalues, to rounding
     assert_allclose(mode[:, 1:], 0.0, atol=1e-12)

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from vto_pipeline.bench.bench import Watch
-from vto_pipeline.bench.drape.case import Case
+from vto_pipeline.bench.drape.case import DrapeCase
 from vto_pipeline.bench.stability import worn
 from vto_pipeline.bench.timing import Timing
 from vto_pipeline.errors import IntersectingError
@@ -15,7 +15,7 @@ from vto_pipeline.io.fabrics import read_fabric
 from vto_pipeline.model.cloth import Draped
 from vto_pipeline.model.mesh import TriangleMesh
 
-SHIRT = Case("shirt", "average", "denim", 40.0)
+SHIRT = DrapeCase("shirt", "average", "denim", 40.0)
 CLEAN = {
     "finite": True,
     "settled": True,
@@ -42,7 +42,7 @@ def draped(**audit):
     ],
 )
 def test_the_worst_is_the_verdict(monkeypatch, audit, word):
-    monkeypatch.setattr(Case, "drape", lambda self, settings, fabric=None: draped(**audit))
+    monkeypatch.setattr(DrapeCase, "drape", lambda self, settings, fabric=None: draped(**audit))
     assert worn._measure(SHIRT, read_fabric("denim"), {})[1]["verdict"] == word
 
 
@@ -61,7 +61,7 @@ def test_a_failed_drape_is_a_row_too(monkeypatch):
     def fail(self, settings, fabric=None):
         raise IntersectingError("7 pairs still cross")
 
-    monkeypatch.setattr(Case, "drape", fail)
+    monkeypatch.setattr(DrapeCase, "drape", fail)
     assert worn._measure(SHIRT, read_fabric("denim"), {})[1]["verdict"] == "IntersectingError"
 
 
@@ -83,7 +83,7 @@ def test_rows_name_what_they_measure(monkeypatch):
 @pytest.mark.parametrize(("what", "value"), [(what, value) for what in worn.EXTREMES for value in worn.EXTREMES[what]])
 def test_extreme_fabrics_end_finite_and_clean(what, value):
     base = read_fabric("cotton_poplin")
-    case = Case("shirt", "average", base.name, 40.0)
+    case = DrapeCase("shirt", "average", base.name, 40.0)
     found = case.drape({"target_error_mm": 2.0}, worn.extreme(base, what, value))
     assert np.isfinite(found.mesh.vertices).all()
     assert found.audit["finite"] is True

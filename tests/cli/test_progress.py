@@ -9,7 +9,7 @@ from rich.progress import Progress
 from toy_tables import STAGES
 
 from vto_pipeline.cli import progress as progress_module
-from vto_pipeline.cli.progress import Bars, Lines
+from vto_pipeline.cli.progress import BarProgress, LineProgress
 from vto_pipeline.cli.session import Session
 from vto_pipeline.pipeline.execution.record import StageRecord
 
@@ -17,7 +17,7 @@ from vto_pipeline.pipeline.execution.record import StageRecord
 def test_plain_lines_are_throttled(monkeypatch, capsys):
     now = [100.0]
     monkeypatch.setattr(progress_module.time, "monotonic", lambda: now[0])
-    lines = Lines(Session())
+    lines = LineProgress(Session())
     lines.started(3, 12, STAGES[2])
     for second in range(1, 13):
         now[0] = 100.0 + second
@@ -35,7 +35,7 @@ def test_plain_lines_are_throttled(monkeypatch, capsys):
 def test_bars_leave_one_line_per_stage():
     page = io.StringIO()
     with Progress(console=Console(file=page, width=100, force_terminal=False), transient=True) as progress:
-        bars = Bars(Session(), progress)
+        bars = BarProgress(Session(), progress)
         bars.started(1, 2, STAGES[0])
         bars.progress(0.5, "half [way]")
         assert [task.completed for task in progress.tasks] == [0.5]

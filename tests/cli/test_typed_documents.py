@@ -21,7 +21,7 @@ def typed(vto, monkeypatch):
     def note(document, base, output, overrides, force_all, session, tables):
         caught.update(data=document.data, output=output, overrides=overrides, force_all=force_all)
 
-    monkeypatch.setattr(work, "carry_out", note)
+    monkeypatch.setattr(work, "run_document", note)
     Path("cloud.ply").write_text(CLOUD)
     Path("mesh.ply").write_text(MESH)
 

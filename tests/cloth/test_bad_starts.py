@@ -6,7 +6,7 @@ from bad_starts import finned, shifted, sleeves_up, two, upside_down
 from ipc_judge import crosses
 from numpy.testing import assert_allclose
 
-from vto_pipeline.bench.samples.garments.shirt import make_shirt
+from vto_pipeline.bench.samples.garments.shirt import make_hanging_shirt
 from vto_pipeline.bench.samples.solids.form import make_form
 from vto_pipeline.cloth.drape import drape
 from vto_pipeline.errors import IntersectingError
@@ -25,7 +25,7 @@ STAYS = {"place": "as_it_stands"}
 def dressed():
     """The sample's form, and its shirt in some 1,400 vertices."""
     form = make_form()
-    shirt = remesh_for_simulation(make_shirt(form), COARSE, Job())
+    shirt = remesh_for_simulation(make_hanging_shirt(form), COARSE, Job())
     assert 1000 < len(shirt.vertices) < 2000
     return shirt, form.mesh
 

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 
 from vto_pipeline.cloth.dynamics.body_motion import VariableSpeedBody, body_travel, run_body_motion
 from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
-from vto_pipeline.cloth.model.build import at_rest, build
+from vto_pipeline.cloth.model.build import at_rest, build_cloth
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.mesh import TriangleMesh
@@ -44,7 +44,7 @@ def test_the_way_is_that_of_the_body_near_the_cloth():
 def test_the_body_waits_for_cloth_that_is_deep_in_it_and_ends_as_it_should(deep):
     """A ball swells by a fifth in a twentieth of a second, far faster than a tube in it is led out."""
     mesh = tube(0.092, 0.05, 48, 5, base=-0.025)  # up to 8 mm inside the ball
-    model = build(mesh, RestShape(mesh.vertices), fabric())
+    model = build_cloth(mesh, RestShape(mesh.vertices), fabric())
     body, done = VariableSpeedBody(swelling(0.1, 0.12), 0.15, 0.3), []
     stepper = Stepper(model, [body], np.full(len(mesh.vertices), 2e-3), StepConfig(recovery_speed=0.05), damping=5.0)
     state = run_body_motion(stepper, at_rest(mesh.vertices), body, deep, done.append)
@@ -57,7 +57,7 @@ def test_the_body_waits_for_cloth_that_is_deep_in_it_and_ends_as_it_should(deep)
 def test_depth_is_that_of_the_deepest_vertex_inside():
     body = VariableSpeedBody(swelling(0.1), 0.0, 0.3)
     ring = TriangleMesh(tube(0.094, 0.002, 48, 3, base=-0.001).vertices, tube(0.094, 0.002, 48, 3).faces)
-    model = build(ring, RestShape(ring.vertices), fabric())
+    model = build_cloth(ring, RestShape(ring.vertices), fabric())
     assert body.depth(0.0, ring.vertices) == 0.0  # nothing is known before contacts are found
     stepper = Stepper(model, [body], np.full(len(ring.vertices), 1e-3), StepConfig(recovery_speed=0.01))
     state = stepper.run(at_rest(ring.vertices), 1 / 60)

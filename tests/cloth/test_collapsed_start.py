@@ -7,7 +7,7 @@ from numpy.testing import assert_array_equal
 
 from vto_pipeline.cloth.collision.contacts import empty_contacts
 from vto_pipeline.cloth.dynamics.methods import METHODS
-from vto_pipeline.cloth.model.build import at_rest, build
+from vto_pipeline.cloth.model.build import at_rest, build_cloth
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.placement.collapsed_start import expand_collapsed_triangles
 from vto_pipeline.model.garment import RestShape
@@ -54,7 +54,7 @@ def test_a_triangle_without_area_at_rest_is_not_opened():
 @pytest.mark.parametrize("membrane", ["green", "springs"])
 def test_a_sheet_grows_from_a_point_and_would_not_by_itself(membrane):
     materials = Materials.model_validate({"membrane": membrane})
-    model = build(MESH, RestShape(MESH.vertices), fabric(bending=0.05), gravity=(0, 0, 0), materials=materials)
+    model = build_cloth(MESH, RestShape(MESH.vertices), fabric(bending=0.05), gravity=(0, 0, 0), materials=materials)
     point, whole = np.zeros_like(MESH.vertices), areas(MESH.vertices, MESH.faces).sum()
 
     def grown(start):

@@ -12,7 +12,7 @@ from vto_pipeline.cloth.constraints.sweep import add_forces
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.dynamics.residual import elastic_energy
 from vto_pipeline.cloth.dynamics.stepper import Stepper
-from vto_pipeline.cloth.model.build import at_rest, build
+from vto_pipeline.cloth.model.build import at_rest, build_cloth
 from vto_pipeline.cloth.outfit.combined_cloth import MultiFrictionBody, combine_garments
 from vto_pipeline.model.garment import Garment, RestShape
 from vto_pipeline.model.job import Job
@@ -38,7 +38,7 @@ def test_energies_forces_and_masses_are_those_of_each_alone():
         layer("two", crumpled(two, 1), soft, two.vertices, rest_angles=True),
     ]
     joined = combine_garments(layers, DrapeConfig())
-    alone = [build(each.garment.mesh, each.garment.rest, each.fabric) for each in layers]
+    alone = [build_cloth(each.garment.mesh, each.garment.rest, each.fabric) for each in layers]
     x = joined.mesh.vertices
     energies = [elastic_energy(model, each.garment.mesh.vertices) for model, each in zip(alone, layers, strict=True)]
     # rest shapes stand 10 m apart: lengths of 0.01 m lose four digits of sixteen

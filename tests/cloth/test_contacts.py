@@ -13,7 +13,7 @@ from vto_pipeline import cloth
 from vto_pipeline.cloth.collision.body.contacts import BodyCollider
 from vto_pipeline.cloth.collision.contacts import ContactSpan
 from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
-from vto_pipeline.cloth.model.build import at_rest, build
+from vto_pipeline.cloth.model.build import at_rest, build_cloth
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.job import Job
@@ -76,7 +76,7 @@ def test_a_capsule_carries_a_sheet():
 
 
 def stepper_on(body, seconds, mesh, job=None, friction=0.6, skin=2e-3):
-    model = build(mesh, RestShape(mesh.vertices), fabric(bending=1e-6))
+    model = build_cloth(mesh, RestShape(mesh.vertices), fabric(bending=1e-6))
     collider = BodyCollider(body, seconds, friction, job)
     return Stepper(model, [collider], np.full(len(mesh.vertices), skin), StepConfig(), damping=2.0, max_speed=2.0)
 

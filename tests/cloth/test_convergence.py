@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 
 from vto_pipeline.cloth.constraints.points.spring import springs
 from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
-from vto_pipeline.cloth.model.build import at_rest, build, model_of
+from vto_pipeline.cloth.model.build import at_rest, build_cloth, model_of
 from vto_pipeline.cloth.rest.convergence import SettleLimits, relax_to_rest
 from vto_pipeline.cloth.rest.equilibrium import equilibrium
 from vto_pipeline.errors import FallenError
@@ -45,7 +45,7 @@ def test_coarse_answers_are_not_waited_for():
 def test_a_hanging_cloth_is_as_near_to_rest_as_it_says(target):
     """Against the same run, which goes on to a hundredth of the error."""
     mesh = sheet(12, 12, 0.5, 0.5, upright=False)
-    model = build(mesh, RestShape(mesh.vertices), fabric(bending=1e-6), pinned=[0, 11])
+    model = build_cloth(mesh, RestShape(mesh.vertices), fabric(bending=1e-6), pinned=[0, 11])
     ends = []
     for error in (target, target / 100.0):
         stepper = Stepper(model, [], np.full(144, 2e-3), StepConfig(), damping=5.0)
@@ -61,7 +61,7 @@ def test_a_hanging_cloth_is_as_near_to_rest_as_it_says(target):
 def test_what_steps_solved_in_part_falsify_is_promised_too(solver):
     """Against the minimum of the energy, by Newton."""
     mesh = sheet(8, 8, 0.4, 0.4)
-    model = build(mesh, RestShape(mesh.vertices), fabric(stretch=100.0, shear=50.0), pinned=[56, 63])
+    model = build_cloth(mesh, RestShape(mesh.vertices), fabric(stretch=100.0, shear=50.0), pinned=[56, 63])
     start = mesh.vertices + np.outer(0.4 - mesh.vertices[:, 1], [0.0, 0.0, 0.05])
     stepper = Stepper(model, [], np.full(64, 2e-3), StepConfig(solver=solver, sweeps=1), damping=5.0)
     found = relax_to_rest(stepper, at_rest(start), SettleLimits(3e-3, 0.01, 60.0, 320))
@@ -115,7 +115,7 @@ def test_steps_are_as_before_when_it_is_over():
 def test_cloth_that_nothing_holds_has_fallen_off():
     """It falls freely, 1 m in 0.45 s; what is held above the same height stays."""
     mesh = sheet(3, 3, 0.2, 0.2)
-    free = build(mesh, RestShape(mesh.vertices), fabric())
+    free = build_cloth(mesh, RestShape(mesh.vertices), fabric())
     lowest = float(mesh.vertices[:, 1].min()) - 1.0
     with pytest.raises(FallenError, match="nothing holds it"):
         relax_to_rest(
@@ -123,7 +123,7 @@ def test_cloth_that_nothing_holds_has_fallen_off():
             at_rest(mesh.vertices),
             SettleLimits(1e-3, 0.01, 30.0, 320, lowest=lowest),
         )
-    held = build(mesh, RestShape(mesh.vertices), fabric(), pinned=[0])
+    held = build_cloth(mesh, RestShape(mesh.vertices), fabric(), pinned=[0])
     stepper = Stepper(held, [], np.full(len(held.mass), 1e-3), StepConfig(), damping=5.0)
     off = 1e-6 * np.random.default_rng(0).standard_normal(mesh.vertices.shape)  # flat, it would stand on a saddle
     assert relax_to_rest(

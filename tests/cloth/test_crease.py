@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from vto_pipeline.cloth.collision.body.contacts import BodyCollider
 from vto_pipeline.cloth.collision.contacts import ContactSpan
 from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
-from vto_pipeline.cloth.model.build import at_rest, build
+from vto_pipeline.cloth.model.build import at_rest, build_cloth
 from vto_pipeline.cloth.outfit.combined_cloth import MultiFrictionBody
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.body import MovingBody
@@ -56,7 +56,7 @@ def strip_over(width=0.06, length=0.16, cells=6):
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_a_strip_pulled_into_a_groove_comes_to_rest(degrees, friction):
     body, flat = groove(np.radians(degrees)), strip_over()
-    model = build(flat, RestShape(flat.vertices), fabric(bending=1e-7))
+    model = build_cloth(flat, RestShape(flat.vertices), fabric(bending=1e-7))
     start = flat.vertices + np.array([0.004, 0.05, 0.0])
     collider = BodyCollider(MovingBody(body.vertices[None], body.faces), 0.0, friction)
     config = StepConfig(solver="newton", substeps=0.5)

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from vto_pipeline.cloth.constraints.points.spring import springs
 from vto_pipeline.cloth.constraints.sweep import add_forces
 from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
-from vto_pipeline.cloth.model.build import build, model_of
+from vto_pipeline.cloth.model.build import build_cloth, model_of
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.rest.equilibrium import EquilibriumConfig, equilibrium
 from vto_pipeline.errors import DivergedError
@@ -30,7 +30,9 @@ def chain(count, length=1.0, mass=0.3, stiffness=50.0):
 
 def hung(columns=9, rows=9, model="hinge", **made):
     mesh, materials = sheet(columns, rows, 0.2, 0.2), Materials(bending=model)
-    return mesh, build(mesh, RestShape(mesh.vertices), fabric(**made), pinned=(0, columns - 1), materials=materials)
+    return mesh, build_cloth(
+        mesh, RestShape(mesh.vertices), fabric(**made), pinned=(0, columns - 1), materials=materials
+    )
 
 
 @pytest.mark.parametrize("count", [1, 2, 7, 40])
@@ -44,7 +46,9 @@ def test_hanging_chain(count):
 def test_hanging_strip():
     mesh = sheet(5, 21, 0.1, 0.4)
     top = np.flatnonzero(mesh.vertices[:, 1] > -1e-9)
-    model = build(mesh, RestShape(mesh.vertices), fabric(stretch=20.0, shear=10.0, density=0.2), pinned=tuple(top))
+    model = build_cloth(
+        mesh, RestShape(mesh.vertices), fabric(stretch=20.0, shear=10.0, density=0.2), pinned=tuple(top)
+    )
     found = equilibrium(model, mesh.vertices).positions
     bottom = mesh.vertices[:, 1] < -0.4 + 1e-9
     longer = 0.2 * GRAVITY * 0.4**2 / (2.0 * 20.0)

@@ -11,7 +11,7 @@ from vto_pipeline.cloth.collision.contacts import ContactSpan, empty_contacts
 from vto_pipeline.cloth.collision.shapes.colliders import Plane
 from vto_pipeline.cloth.constraints.points.spring import springs
 from vto_pipeline.cloth.integrators import INTEGRATORS
-from vto_pipeline.cloth.model.build import ClothState, at_rest, build, model_of
+from vto_pipeline.cloth.model.build import ClothState, at_rest, build_cloth, model_of
 from vto_pipeline.cloth.solvers.xpbd import Xpbd
 from vto_pipeline.model.garment import RestShape
 
@@ -213,7 +213,7 @@ def test_angular_momentum(name):
 def test_linear_momentum_is_conserved_to_rounding(name):
     mesh = sheet(6, 5, 0.3, 0.25)
     cloth = fabric(stretch=300.0, shear=80.0, poisson=0.2, bending=1e-3)
-    model = build(mesh, RestShape(mesh.vertices), cloth, gravity=(0, 0, 0))
+    model = build_cloth(mesh, RestShape(mesh.vertices), cloth, gravity=(0, 0, 0))
     rng = np.random.default_rng(5)
     start = ClothState(mesh.vertices + rng.normal(0, 5e-3, (30, 3)), rng.normal((0.5, -0.2, 0.7), 1, (30, 3)))
     method = method_of(name, model)
@@ -270,7 +270,7 @@ def test_hanging_strip(name):
     rows, length, width, density, stiffness = 9, 1.0, 0.2, 0.3, 40.0
     mesh = sheet(3, rows, width, length)
     cloth = fabric(stretch=stiffness, shear=10.0, density=density)
-    made = build(mesh, RestShape(mesh.vertices), cloth)
+    made = build_cloth(mesh, RestShape(mesh.vertices), cloth)
     mass = (
         np.outer(np.r_[0.5, np.ones(rows - 2), 0.5], [0.25, 0.5, 0.25]).ravel() * density * width * length / (rows - 1)
     )

@@ -14,7 +14,7 @@ from vto_pipeline.cloth.constraints.points.attachment import attachments
 from vto_pipeline.cloth.integrators import INTEGRATORS
 from vto_pipeline.cloth.integrators.potential import IncrementalPotential
 from vto_pipeline.cloth.integrators.system import ForceSystem
-from vto_pipeline.cloth.model.build import ClothState, at_rest, build, model_of
+from vto_pipeline.cloth.model.build import ClothState, at_rest, build_cloth, model_of
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.errors import ConfigError
 from vto_pipeline.model.garment import RestShape
@@ -48,7 +48,7 @@ def flag(*, rayleigh=0.0, pinned=(0, 3)):
     """A small soft sheet, strained and moving."""
     mesh = sheet(4, 4, 0.3, 0.3)
     cloth = fabric(stretch=3.0, shear=1.5, poisson=0.2, bending=1e-4)
-    model = build(mesh, RestShape(mesh.vertices), cloth, pinned=pinned, materials=Materials(rayleigh=rayleigh))
+    model = build_cloth(mesh, RestShape(mesh.vertices), cloth, pinned=pinned, materials=Materials(rayleigh=rayleigh))
     x, y, _ = mesh.vertices.T
     start = mesh.vertices * [1.02, 1.05, 1.0] + np.column_stack([0 * x, 0 * x, 0.02 * np.sin(8 * x) * y])
     velocities = np.column_stack([0.2 * y, 0.3 * x, 0.5 * np.cos(5 * y)])
@@ -104,7 +104,9 @@ def test_gradient_of_the_incremental_potential():
 def test_matrix_is_the_slope_of_the_resistance():
     """With no elastic stress, what is left of the Hessian is exact."""
     mesh = sheet(4, 4, 0.3, 0.3)
-    model = build(mesh, RestShape(mesh.vertices), fabric(bending=1e-4), pinned=(0,), materials=Materials(rayleigh=3e-3))
+    model = build_cloth(
+        mesh, RestShape(mesh.vertices), fabric(bending=1e-4), pinned=(0,), materials=Materials(rayleigh=3e-3)
+    )
     system = ForceSystem(model, 2.0, 0.5 * 1.2 * 1.2)
     x, v = mesh.vertices, np.random.default_rng(2).normal(0, 1, mesh.vertices.shape)
     rate = 40.0
@@ -125,7 +127,7 @@ def test_matrix_is_the_slope_of_the_resistance():
 def plate(coefficient, name, *, damping=0.0, h=0.01, seconds=1.0):
     """Let a flat sheet fall face down, and return its speed."""
     mesh = sheet(4, 3, 0.3, 0.2, upright=False)
-    mass = build(mesh, RestShape(mesh.vertices), fabric(density=0.15)).mass
+    mass = build_cloth(mesh, RestShape(mesh.vertices), fabric(density=0.15)).mass
     model = model_of((), mass, faces=mesh.faces)
     method = method_of(name, model, damping=damping, air=0.5 * 1.2 * coefficient)
     end = method.advance(at_rest(mesh.vertices), empty_contacts(12), h, round(seconds / h))
@@ -240,7 +242,7 @@ def test_rigid_constraints_are_refused(name):
 def test_implicit_methods_stand_a_large_step():
     """Where the stability limit of explicit ones is passed a hundred times."""
     mesh = sheet(6, 6, 0.3, 0.3)
-    stiff = build(mesh, RestShape(mesh.vertices), fabric(stretch=1e5, shear=2e4), pinned=(0, 5))
+    stiff = build_cloth(mesh, RestShape(mesh.vertices), fabric(stretch=1e5, shear=2e4), pinned=(0, 5))
     lightest = stiff.mass.min()
     h = 1 / 30
     assert h * np.sqrt(1e5 / lightest) > 200.0

@@ -11,7 +11,7 @@ from vto_pipeline.cloth.constraints.bending.hinge import bend, solid_hinges
 from vto_pipeline.cloth.constraints.membrane.strain_friction import strain_friction
 from vto_pipeline.cloth.constraints.membrane.stretch import stretch
 from vto_pipeline.cloth.constraints.sweep import add_forces
-from vto_pipeline.cloth.model.build import ClothState, at_rest, build, model_of
+from vto_pipeline.cloth.model.build import ClothState, at_rest, build_cloth, model_of
 from vto_pipeline.cloth.model.internal_friction import copy_sliders, restore_sliders, slip, with_own_sliders
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.solvers import SOLVERS
@@ -142,7 +142,7 @@ def test_plastic_bending_yields_hardens_and_keeps_a_crease():
     yields, hardening = 5.0, 0.25
     fabric = Fabric("paper", 0.2, 3e-4, 1e3, 1e3, 100, 0, RIGIDITY, RIGIDITY, 0, 0.3)
     materials = Materials(yield_curvature=yields, hardening=hardening)
-    built = build(STRIP, RestShape(STRIP.vertices), fabric, materials=materials)
+    built = build_cloth(STRIP, RestShape(STRIP.vertices), fabric, materials=materials)
     model = with_own_sliders(model_of(built.constraints[:2], built.mass))  # without the membrane
     path = np.linspace(0.0, 20.0, 201)
     moments = cycled(model, path)

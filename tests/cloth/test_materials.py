@@ -8,7 +8,7 @@ from scipy.spatial import Delaunay
 
 from vto_pipeline.cloth.constraints.membrane.stretch import stretch
 from vto_pipeline.cloth.constraints.sweep import add_forces
-from vto_pipeline.cloth.model.build import build
+from vto_pipeline.cloth.model.build import build_cloth
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.errors import ConfigError, InputError
 from vto_pipeline.geometry.topology import boundary_loops
@@ -45,7 +45,7 @@ MESHES = {"grid": sheet(13, 17, WIDTH, HEIGHT), "irregular": irregular()}
 
 
 def model_of(mesh, cloth, **settings):
-    return build(mesh, RestShape(mesh.vertices), cloth, materials=Materials(**settings))
+    return build_cloth(mesh, RestShape(mesh.vertices), cloth, materials=Materials(**settings))
 
 
 def strained(mesh, warp, weft, shear):
@@ -167,14 +167,16 @@ def test_rest_angles_keep_a_crease(bending):
     mesh = tube(0.2, 0.4, 20, 12)
     for keep, check in ((False, lambda e: e > 1e-5), (True, lambda e: e < 1e-20)):
         shape = RestShape(mesh.vertices, rest_angles=keep)
-        data = build(mesh, shape, fabric(bending=1e-3), materials=Materials(bending=bending)).constraints[0]
+        data = build_cloth(mesh, shape, fabric(bending=1e-3), materials=Materials(bending=bending)).constraints[0]
         assert check(add_forces(mesh.vertices, (data,), np.zeros_like(mesh.vertices)))
 
 
 def test_isometric_bending_refuses_rest_angles():
     mesh = tube(0.2, 0.4, 20, 12)
     with pytest.raises(ConfigError, match="needs a flat rest shape"):
-        build(mesh, RestShape(mesh.vertices, True), fabric(bending=1e-3), materials=Materials(bending="isometric"))
+        build_cloth(
+            mesh, RestShape(mesh.vertices, True), fabric(bending=1e-3), materials=Materials(bending="isometric")
+        )
 
 
 def test_a_measured_curve_is_followed():
@@ -245,7 +247,7 @@ def test_bending_energy_of_a_cylinder_on_an_isotropic_mesh(bending):
 
 def test_what_has_no_effect_is_left_out_and_said():
     mesh, job = sheet(3, 3, 0.1, 0.1), Job()
-    model = build(mesh, RestShape(mesh.vertices), WOVEN, materials=Materials(hysteresis=True), job=job)
+    model = build_cloth(mesh, RestShape(mesh.vertices), WOVEN, materials=Materials(hysteresis=True), job=job)
     assert [type(data).__name__ for data in model.constraints] == ["Stretch"]
     assert {what for what, _ in job.left_out} >= {"hinges", "strain limits", "friction of stretch and shear"}
 
@@ -253,7 +255,7 @@ def test_what_has_no_effect_is_left_out_and_said():
 def test_losses_of_a_fabric_become_sliders():
     mesh = sheet(3, 3, 0.1, 0.1)
     cloth = Fabric("f", 0.2, 3e-4, 900, 500, 100, 0.3, 1e-5, 1e-5, 1e-3, 0.3, shear_hysteresis=4.0, damping=0.01)
-    model = build(mesh, RestShape(mesh.vertices), cloth, materials=Materials(hysteresis=True))
+    model = build_cloth(mesh, RestShape(mesh.vertices), cloth, materials=Materials(hysteresis=True))
     kinds = {type(data).__name__: data for data in model.constraints}
     assert set(kinds) == {"Bend", "BendFriction", "Stretch", "StrainFriction"}
     assert kinds["Stretch"].damping == 0.01

@@ -11,7 +11,7 @@ from vto_pipeline.cloth.collision.shapes.colliders import Sphere
 from vto_pipeline.cloth.constraints.points.spring import springs
 from vto_pipeline.cloth.dynamics.methods import FRAME, METHODS, choose_method, highest_frequency
 from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
-from vto_pipeline.cloth.model.build import ClothState, build, model_of
+from vto_pipeline.cloth.model.build import ClothState, build_cloth, model_of
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.simulation import simulate
 from vto_pipeline.errors import ConfigError, DivergedError
@@ -26,7 +26,7 @@ ROD = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.2, 0.0, 0.0]])
 def cloth(side=8, stretch=300.0, pinned=(0,), materials=None):
     mesh = sheet(side, side, 0.05 * (side - 1), 0.05 * (side - 1))
     stuff = fabric(stretch=stretch, shear=0.3 * stretch, poisson=0.2, bending=1e-4)
-    return build(mesh, RestShape(mesh.vertices), stuff, pinned=pinned, materials=materials), mesh.vertices
+    return build_cloth(mesh, RestShape(mesh.vertices), stuff, pinned=pinned, materials=materials), mesh.vertices
 
 
 def rods(compliance, mass=0.01):
@@ -132,7 +132,7 @@ SLOW = {"projective": 1, "vertex_descent": 2}
 def test_the_same_bits_with_one_thread_and_two(name):
     """Over the size from which threads share the work, onto a ball."""
     mesh = sheet(52, 52, 0.5, 0.5, upright=False)
-    model = build(mesh, RestShape(mesh.vertices), fabric(stretch=100.0, shear=30.0, bending=1e-5), pinned=(0, 51))
+    model = build_cloth(mesh, RestShape(mesh.vertices), fabric(stretch=100.0, shear=30.0, bending=1e-5), pinned=(0, 51))
     ball = Sphere((0.25, -0.102, 0.25), 0.1, 0.4)
     h, count = 1.0 / 2000.0, len(mesh.vertices)
     start = ClothState(mesh.vertices, np.tile([0.1, -2.0, 0.0], (count, 1)))

@@ -12,7 +12,7 @@ from vto_pipeline.cloth.collision.shapes.colliders import Plane, Sphere
 from vto_pipeline.cloth.constraints.points.spring import springs
 from vto_pipeline.cloth.constraints.sweep import add_damping_forces, add_forces
 from vto_pipeline.cloth.integrators import INTEGRATORS
-from vto_pipeline.cloth.model.build import ClothState, at_rest, build, model_of
+from vto_pipeline.cloth.model.build import ClothState, at_rest, build_cloth, model_of
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.solvers.newton import Newton
 from vto_pipeline.model.garment import RestShape
@@ -26,7 +26,7 @@ def cloth(side, pinned=(), *, upright=True, gravity=(0.0, -G, 0.0), stretch=500.
     mesh = sheet(side, side, width, width, upright)
     stuff = fabric(stretch=stretch, shear=0.3 * stretch, poisson=0.2, bending=1e-5, density=0.15)
     materials = Materials(rayleigh=rayleigh)
-    model = build(mesh, RestShape(mesh.vertices), stuff, pinned=pinned, gravity=gravity, materials=materials)
+    model = build_cloth(mesh, RestShape(mesh.vertices), stuff, pinned=pinned, gravity=gravity, materials=materials)
     return model, mesh.vertices
 
 

@@ -13,7 +13,7 @@ from vto_pipeline.cloth.collision.contacts import ContactSpan, gather_contacts
 from vto_pipeline.cloth.collision.response.penalty import Penalty
 from vto_pipeline.cloth.collision.self_collision.self_contact import SelfContact
 from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
-from vto_pipeline.cloth.model.build import build
+from vto_pipeline.cloth.model.build import build_cloth
 from vto_pipeline.cloth.simulation import AnyCollider
 from vto_pipeline.errors import ConfigError
 from vto_pipeline.geometry.intersections import self_intersections
@@ -36,7 +36,7 @@ def two_sheets(gap):
 def pressed(slide):
     """Two sheets pressed into each other and into a plane, after a step with friction, and their model."""
     mesh, count = two_sheets(2e-4)
-    model = build(mesh, RestShape(mesh.vertices), FABRIC, gravity=(0.0, -GRAVITY, 0.0))
+    model = build_cloth(mesh, RestShape(mesh.vertices), FABRIC, gravity=(0.0, -GRAVITY, 0.0))
     x = mesh.vertices + np.random.default_rng(0).uniform(-2e-5, 2e-5, mesh.vertices.shape)
     span = ContactSpan(0.0, 0.01, 0.01, np.full(len(x), 1e-4), 0.5)
     contacts = gather_contacts([Plane((0, 0, 0), (0, 1, 0), 0.3)], x, span)

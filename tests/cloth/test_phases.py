@@ -8,7 +8,7 @@ from cloth_scenes import ball, fabric, sheet
 
 import vto_pipeline.cloth.rest.phases as module
 from vto_pipeline.cloth.drape_config import DrapeConfig
-from vto_pipeline.cloth.model.build import at_rest, build
+from vto_pipeline.cloth.model.build import at_rest, build_cloth
 from vto_pipeline.cloth.rest.convergence import SettlingResult
 from vto_pipeline.cloth.rest.phases import Phases
 from vto_pipeline.model.garment import RestShape
@@ -29,7 +29,7 @@ class Ready:
 def ended(monkeypatch, clearings):
     """How a cloth ends that settles at once, each time; the clearing moves it, or not, and leaves pairs, in turn."""
     mesh = sheet(4, 4, 0.1, 0.1)
-    model, rest = build(mesh, RestShape(mesh.vertices), fabric()), RestShape(mesh.vertices)
+    model, rest = build_cloth(mesh, RestShape(mesh.vertices), fabric()), RestShape(mesh.vertices)
     left = list(clearings)
 
     def clear(stepper, state, *given):

@@ -18,7 +18,7 @@ from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
 from vto_pipeline.cloth.judge.audit import audit
 from vto_pipeline.cloth.judge.gap import gaps_within
 from vto_pipeline.cloth.judge.residual import ElasticEnergies, covers_all_energies
-from vto_pipeline.cloth.model.build import at_rest, build
+from vto_pipeline.cloth.model.build import at_rest, build_cloth
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.placement.body_growth import plan_body_growth
 from vto_pipeline.cloth.placement.clear_body import clear_body_crossings
@@ -180,7 +180,7 @@ def test_gaps_are_those_of_brute_force():
 def test_energy_and_forces_of_judge_and_solver_agree():
     rest, x = crumpled()
     weave = fabric(stretch=1500, weft=900, shear=60, poisson=0.2, bending=1e-4)
-    model = build(rest, RestShape(rest.vertices), weave)
+    model = build_cloth(rest, RestShape(rest.vertices), weave)
     mine = ElasticEnergies(rest, RestShape(rest.vertices), weave)
     wanted = np.zeros_like(x)
     add_forces(x, model.constraints, wanted)
@@ -265,7 +265,7 @@ def test_a_spike_between_the_vertices_is_cleared():
     spiked = TriangleMesh(vertices, block.faces)
     mesh = sheet(4, 4, 0.15, 0.15, upright=False)
     mesh = moved(mesh, -0.075, 0.055, -0.075)
-    model = build(mesh, RestShape(mesh.vertices), fabric())
+    model = build_cloth(mesh, RestShape(mesh.vertices), fabric())
     body = MovingBody(spiked.vertices[None], spiked.faces)
     stepper = Stepper(model, [BodyCollider(body, 0.0, 0.3)], np.full(16, 1e-3), StepConfig(), damping=5.0)
     state = stepper.run(at_rest(mesh.vertices), 0.2)
@@ -283,7 +283,7 @@ def test_a_steep_bump_is_cleared_without_stretching_the_cloth_over_it():
     cone = 0.03 * np.maximum(0.0, 1.0 - np.hypot(x - 0.005, z - 0.003) / 0.02)
     ground = TriangleMesh(ground.vertices + np.column_stack([0 * x, cone, 0 * x]), ground.faces)
     mesh = moved(sheet(7, 7, 0.09, 0.09, upright=False), -0.045, 0.034, -0.045)
-    model = build(mesh, RestShape(mesh.vertices), fabric(stretch=100.0, shear=30.0, friction=0.8))
+    model = build_cloth(mesh, RestShape(mesh.vertices), fabric(stretch=100.0, shear=30.0, friction=0.8))
     body = BodyCollider(MovingBody(ground.vertices[None], ground.faces), 0.0, 0.8)
     stepper = Stepper(model, [body], np.full(49, 1e-3), StepConfig(), damping=5.0)
     state = stepper.run(at_rest(mesh.vertices), 0.5)

@@ -15,7 +15,7 @@ from numpy.testing import assert_allclose
 
 import vto_pipeline.cloth.drape as module
 from vto_pipeline.cloth.drape import drape
-from vto_pipeline.cloth.model.build import build
+from vto_pipeline.cloth.model.build import build_cloth
 from vto_pipeline.cloth.rest.equilibrium import equilibrium
 from vto_pipeline.errors import IntersectingError
 from vto_pipeline.io.fabrics import read_fabric
@@ -45,7 +45,7 @@ def hung(bending=1e-5):
     """A cloth that hangs from two corners, by the solver's own search for equilibrium."""
     mesh, weave = sheet(7, 7, 0.3, 0.3), fabric(stretch=100.0, shear=50.0, bending=bending)
     start = mesh.vertices + np.outer(0.3 - mesh.vertices[:, 1], [0.0, 0.0, 0.1])
-    model = build(mesh, RestShape(mesh.vertices), weave, pinned=[42, 48])
+    model = build_cloth(mesh, RestShape(mesh.vertices), weave, pinned=[42, 48])
     return mesh, weave, equilibrium(model, start).positions
 
 

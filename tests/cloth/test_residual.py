@@ -9,7 +9,7 @@ from cloth_scenes import fabric, moved, sheet
 from vto_pipeline.cloth import Plane, simulate
 from vto_pipeline.cloth.collision.response.active_set import ActiveSet, no_contacts
 from vto_pipeline.cloth.dynamics.residual import relative_residual
-from vto_pipeline.cloth.model.build import build
+from vto_pipeline.cloth.model.build import build_cloth
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.units import GRAVITY
@@ -18,7 +18,7 @@ from vto_pipeline.units import GRAVITY
 def loose():  # type: ignore[no-untyped-def]
     """Return the model of a flat sheet in the air, and its positions."""
     mesh = sheet(5, 5, 0.1, 0.1, upright=False)
-    return build(mesh, RestShape(mesh.vertices), fabric()), mesh.vertices
+    return build_cloth(mesh, RestShape(mesh.vertices), fabric()), mesh.vertices
 
 
 def planes(x, normal, friction: float) -> ActiveSet:  # type: ignore[no-untyped-def]

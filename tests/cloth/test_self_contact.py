@@ -171,10 +171,10 @@ def test_sheets_that_collide_keep_their_momentum():
     mesh = stack(sheet(6, 6, 0.1, 0.1, upright=False), moved(sheet(6, 6, 0.1, 0.1, upright=False), 0.013, 0.004, 0.02))
     count = len(mesh.vertices) // 2
     from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
-    from vto_pipeline.cloth.model.build import ClothState, build
+    from vto_pipeline.cloth.model.build import ClothState, build_cloth
     from vto_pipeline.model.garment import RestShape
 
-    model = build(mesh, RestShape(mesh.vertices), FABRIC, gravity=(0.0, 0.0, 0.0))
+    model = build_cloth(mesh, RestShape(mesh.vertices), FABRIC, gravity=(0.0, 0.0, 0.0))
     velocities = np.zeros((2 * count, 3))
     velocities[count:, 1] = -1.0
     stepper = Stepper(model, [], np.zeros(2 * count), StepConfig())

@@ -12,7 +12,7 @@ from vto_pipeline.cloth.constraints.points.combination import combinations
 from vto_pipeline.cloth.constraints.points.spring import springs
 from vto_pipeline.cloth.constraints.sweep import add_forces
 from vto_pipeline.cloth.implicit_step.frozen_step import frozen_step, residual_history, rms
-from vto_pipeline.cloth.model.build import ClothState, at_rest, build, model_of
+from vto_pipeline.cloth.model.build import ClothState, at_rest, build_cloth, model_of
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.solvers import SOLVERS
 from vto_pipeline.cloth.solvers.fast_projection import FastProjection
@@ -40,7 +40,7 @@ def cloth(side, pinned=(), upright=True, rayleigh=0.0, gravity=(0.0, -GRAVITY, 0
     mesh = sheet(side, side, 0.06 * (side - 1), 0.06 * (side - 1), upright)
     stiff = fabric(stretch=stretch, shear=stretch / 3.0, poisson=0.2, bending=1e-5, density=0.15)
     materials = Materials(rayleigh=rayleigh)
-    model = build(mesh, RestShape(mesh.vertices), stiff, pinned=pinned, gravity=gravity, materials=materials)
+    model = build_cloth(mesh, RestShape(mesh.vertices), stiff, pinned=pinned, gravity=gravity, materials=materials)
     return model, mesh.vertices
 
 
@@ -251,7 +251,7 @@ def test_friction_on_a_slope(name, friction):
 @pytest.mark.parametrize("name", SOLVERS)
 def test_the_same_bits_with_one_thread_and_two(name):
     mesh = sheet(52, 52, 0.5, 0.5)
-    model = build(mesh, RestShape(mesh.vertices), fabric(bending=1e-5), pinned=(0, 51))
+    model = build_cloth(mesh, RestShape(mesh.vertices), fabric(bending=1e-5), pinned=(0, 51))
     state = ClothState(mesh.vertices, np.random.default_rng(0).normal(0.0, 0.2, mesh.vertices.shape))
     ends = []
     for threads in (1, 2):

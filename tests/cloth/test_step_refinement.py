@@ -10,13 +10,13 @@ from numpy.testing import assert_allclose
 from vto_pipeline import cloth
 from vto_pipeline.cloth.dynamics.step_refinement import refine_time_step
 from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
-from vto_pipeline.cloth.model.build import at_rest, build
+from vto_pipeline.cloth.model.build import at_rest, build_cloth
 from vto_pipeline.cloth.rest.convergence import SettleLimits, relax_to_rest
 from vto_pipeline.model.garment import RestShape
 
 MESH = sheet(8, 8, 0.2, 0.2, upright=False)
 STUFF = fabric(stretch=50.0, shear=20.0, bending=1e-5)
-MODEL = build(MESH, RestShape(MESH.vertices), STUFF, pinned=(0, 7))
+MODEL = build_cloth(MESH, RestShape(MESH.vertices), STUFF, pinned=(0, 7))
 START = at_rest(MESH.vertices)
 SECONDS = 0.1
 
@@ -101,7 +101,7 @@ def test_a_motion_ends_when_it_was_asked_to(seconds, substeps):
 
 def test_newton_rests_without_smaller_steps():
     """Held along a whole side there is one way to hang."""
-    model = build(MESH, RestShape(MESH.vertices), STUFF, pinned=range(8))
+    model = build_cloth(MESH, RestShape(MESH.vertices), STUFF, pinned=range(8))
     ends = []
     for substeps, solver in ((None, None), (40, "xpbd")):
         config = StepConfig(substeps=substeps, solver=solver)

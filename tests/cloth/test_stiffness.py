@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from vto_pipeline.cloth.constraints.points.spring import springs
 from vto_pipeline.cloth.constraints.sweep import add_damping_forces, add_forces
 from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
-from vto_pipeline.cloth.model.build import build, model_of
+from vto_pipeline.cloth.model.build import build_cloth, model_of
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.numerics.cpu_threads import limited_threads
@@ -29,7 +29,7 @@ def cloth(side, materials, pinned=(), rayleigh=0.0):
     mesh = sheet(side, side, 0.05 * (side - 1), 0.05 * (side - 1))
     stuff = fabric(stretch=900.0, weft=500.0, shear=100.0, poisson=0.2, bending=1e-3)
     given = materials.model_copy(update={"rayleigh": rayleigh})
-    return mesh, build(mesh, RestShape(mesh.vertices), stuff, pinned=pinned, materials=given)
+    return mesh, build_cloth(mesh, RestShape(mesh.vertices), stuff, pinned=pinned, materials=given)
 
 
 def taut(mesh):
@@ -149,7 +149,7 @@ def test_threads_that_share_the_work_find_what_one_loop_finds():
     model, x = large()
     mesh = sheet(52, 3, 0.05 * 51, 0.1)
     stuff = fabric(stretch=900.0, weft=500.0, shear=100.0, poisson=0.2, bending=1e-3)
-    small = build(mesh, RestShape(mesh.vertices), stuff, pinned=(0, 51))
+    small = build_cloth(mesh, RestShape(mesh.vertices), stuff, pinned=(0, 51))
     first = slice(0, 3 * 52)  # no triangle or hinge of another part of the sheet reaches the first row
     whole = to_scipy(Stiffness(model).assemble(x)).tocsr()[first, first].toarray()
     part = to_scipy(Stiffness(small).assemble(x[: 3 * 52])).tocsr()[first, first].toarray()

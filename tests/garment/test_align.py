@@ -10,7 +10,7 @@ from numpy.testing import assert_array_equal
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.align import AlignConfig, align_to_mannequin
-from vto_pipeline.geometry.rigid import moved
+from vto_pipeline.geometry.rigid import transform_mesh
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -19,8 +19,8 @@ QUICK = AlignConfig(samples=4000)
 
 def misplacement(scene, found, motion):
     """Largest distance between where a point of the form should be and where it comes to [m]."""
-    on_scan = moved(scene.form, np.linalg.inv(motion))
-    return np.linalg.norm(moved(on_scan, found).vertices - scene.form.vertices, axis=1).max()
+    on_scan = transform_mesh(scene.form, np.linalg.inv(motion))
+    return np.linalg.norm(transform_mesh(on_scan, found).vertices - scene.form.vertices, axis=1).max()
 
 
 def test_a_turned_and_shifted_scan_comes_back(scene):
@@ -40,16 +40,16 @@ def test_a_turned_and_shifted_scan_comes_back(scene):
 )
 def test_a_scan_that_leans_comes_back_too(scene, turn):
     tilt = dressed_form.rigid(turn, [0.1, -0.3, 0.2])
-    upright = moved(scene.scan, scene.mannequin_from_surface)
-    found = align_to_mannequin(moved(upright, np.linalg.inv(tilt)), scene.form, QUICK, Job())
+    upright = transform_mesh(scene.scan, scene.mannequin_from_surface)
+    found = align_to_mannequin(transform_mesh(upright, np.linalg.inv(tilt)), scene.form, QUICK, Job())
     assert misplacement(scene, found, tilt) < 5e-4
 
 
 @pytest.mark.slow
 def test_a_scan_lying_on_its_side_comes_back(scene):
     tilt = dressed_form.rigid([90, 0, 0], [0.1, -0.3, 0.2])
-    upright = moved(scene.scan, scene.mannequin_from_surface)
-    found = align_to_mannequin(moved(upright, np.linalg.inv(tilt)), scene.form, QUICK, Job())
+    upright = transform_mesh(scene.scan, scene.mannequin_from_surface)
+    found = align_to_mannequin(transform_mesh(upright, np.linalg.inv(tilt)), scene.form, QUICK, Job())
     assert misplacement(scene, found, tilt) < 5e-4
 
 

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from vto_pipeline.garment.color_model import cielab, color_evidence
-from vto_pipeline.garment.graph_cut import cut
+from vto_pipeline.garment.graph_cut import minimum_cut
 
 
 def energy(label, unary, edges, pairwise):
@@ -25,15 +25,15 @@ def test_no_division_is_cheaper(seed):
     edges = np.array([(i, j) for i in range(count) for j in range(i) if rng.random() < 0.4])
     pairwise = rng.uniform(0, 2, len(edges))
     best = min(energy(np.array(label), unary, edges, pairwise) for label in product([False, True], repeat=count))
-    found = energy(cut(unary, edges, pairwise), unary, edges, pairwise)
+    found = energy(minimum_cut(unary, edges, pairwise), unary, edges, pairwise)
     assert_allclose(found, best, atol=count * 1e-4)  # whole-number capacities of 1e-4
 
 
 def test_prices_bring_lone_dissenters_round_and_free_edges_do_not():
     unary = np.array([3.0, 3.0, -1.0, 3.0, -3.0, -3.0])
     chain = np.column_stack([np.arange(5), np.arange(1, 6)])
-    assert cut(unary, chain, np.ones(5)).tolist() == [True] * 4 + [False] * 2
-    assert cut(unary, chain, np.zeros(5)).tolist() == (unary > 0).tolist()
+    assert minimum_cut(unary, chain, np.ones(5)).tolist() == [True] * 4 + [False] * 2
+    assert minimum_cut(unary, chain, np.zeros(5)).tolist() == (unary > 0).tolist()
 
 
 def test_lab_of_known_colours():

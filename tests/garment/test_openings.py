@@ -9,11 +9,11 @@ from numpy.testing import assert_allclose
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.openings import OpeningsConfig, close_scan_holes, list_openings
 from vto_pipeline.garment.rims import drop_flaps, smooth_curve, trim_ledges
-from vto_pipeline.garment.simulation_mesh import SimulationMeshConfig, good_enough, remesh_for_simulation
+from vto_pipeline.garment.simulation_mesh import SimulationMeshConfig, reason_to_skip_remeshing, remesh_for_simulation
 from vto_pipeline.garment.subtract import SubtractConfig, extract_garment, label_garment
 from vto_pipeline.geometry.remeshing.remesh import perimeter
 from vto_pipeline.geometry.remeshing.repair import is_manifold
-from vto_pipeline.geometry.rigid import moved
+from vto_pipeline.geometry.rigid import transform_mesh
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import boundary_loops, face_components, submesh
@@ -174,7 +174,7 @@ def test_a_smoothed_circle_is_that_circle():
 
 
 def test_the_dressed_form_end_to_end(scene):
-    surface = moved(scene.scan, scene.mannequin_from_surface)
+    surface = transform_mesh(scene.scan, scene.mannequin_from_surface)
     labels = label_garment(surface, scene.form, SubtractConfig(), Job())
     shell = extract_garment(surface, labels, SubtractConfig(), Job())
     job = Job()
@@ -217,7 +217,7 @@ def test_one_sharp_triangle_is_enough_to_be_remeshed():
     flat = dressed_triangles()
     vertices = flat.vertices.copy()
     vertices[27] += 0.95 * (vertices[28] - vertices[27])
-    assert good_enough(TriangleMesh(vertices, flat.faces), SimulationMeshConfig(edge_mm=10.0)) is None
+    assert reason_to_skip_remeshing(TriangleMesh(vertices, flat.faces), SimulationMeshConfig(edge_mm=10.0)) is None
 
 
 def lengths(mesh):

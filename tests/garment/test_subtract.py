@@ -11,7 +11,7 @@ from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.openings import OpeningsConfig, close_scan_holes
 from vto_pipeline.garment.subtract import SubtractConfig, extract_garment, label_garment
 from vto_pipeline.geometry.remeshing.repair import is_manifold
-from vto_pipeline.geometry.rigid import moved
+from vto_pipeline.geometry.rigid import transform_mesh
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import face_components
 from vto_pipeline.model.job import Job
@@ -20,7 +20,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 @pytest.fixture(scope="module")
 def placed(scene):
-    return moved(scene.scan, scene.mannequin_from_surface)
+    return transform_mesh(scene.scan, scene.mannequin_from_surface)
 
 
 @pytest.mark.parametrize(("colored", "least"), [(True, 0.985), (False, 0.97)])

@@ -8,7 +8,7 @@ import shapes
 from numpy.testing import assert_allclose, assert_array_equal
 
 from vto_pipeline.errors import GarmentError
-from vto_pipeline.geometry.remeshing.holes import fill_bay, fill_holes
+from vto_pipeline.geometry.remeshing.holes import fill_holes, fill_notch
 from vto_pipeline.geometry.remeshing.remesh import edge_lengths
 from vto_pipeline.geometry.remeshing.repair import is_manifold
 from vto_pipeline.geometry.remeshing.triangulate import triangulate_loop
@@ -75,7 +75,7 @@ def test_a_bay_is_filled_up_to_its_mouth():
     first = np.flatnonzero(inner & ~np.roll(inner, 1))[0]
     shore = np.roll(walk, -first)[: inner.sum() - 1]
     mouth = np.column_stack([np.linspace(0.13, 0.07, 7)[1:-1], np.full(5, 0.2), np.zeros(5)])
-    filled = fill_bay(bay, shore, mouth)
+    filled = fill_notch(bay, shore, mouth)
     (loop,) = boundary_loops(filled)
     assert len(loop) == 80
     area = (

@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.geodesic import distance_from
-from vto_pipeline.geometry.laplace import extend, laplacian
-from vto_pipeline.geometry.remeshing.cut import keep_positive
+from vto_pipeline.geometry.laplace import extend_smoothly, laplacian
+from vto_pipeline.geometry.remeshing.clip import clip_to_positive
 from vto_pipeline.geometry.remeshing.subdivide import split_long_edges
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
@@ -41,7 +41,7 @@ def test_a_cut_leaves_just_the_area_on_its_side(offset):
     sheet = shapes.grid(10, 10, 0.1)
     direction = np.array([0.6, 0.8, 0.0])
     values = sheet.vertices @ direction - 0.3 - offset
-    part = keep_positive(sheet, values)
+    part = clip_to_positive(sheet, values)
     missing = (0.3 + offset) ** 2 / (2.0 * 0.6 * 0.8)  # the triangle cut off a square's corner
     assert_allclose(area(part), 1.0 - missing, atol=0.15 * 0.1 * 0.6)  # snapping moves the line by 0.15 edges at most
     assert len(boundary_loops(part)) == 1
@@ -51,7 +51,7 @@ def test_a_cut_leaves_just_the_area_on_its_side(offset):
 def test_a_cut_through_a_ball_is_a_circle_and_mixes_colours():
     ball = shapes.sphere(4)
     rising = np.rint(127.5 * (1.0 + ball.vertices)).astype(np.uint8)
-    part = keep_positive(TriangleMesh(ball.vertices, ball.faces, rising), ball.vertices[:, 2] - 0.31)
+    part = clip_to_positive(TriangleMesh(ball.vertices, ball.faces, rising), ball.vertices[:, 2] - 0.31)
     (loop,) = boundary_loops(part)
     assert_allclose(part.vertices[loop, 2], 0.31, atol=0.02)
     assert_allclose(part.colors[:, 2], 127.5 * (1.0 + part.vertices[:, 2]), atol=1.5)
@@ -60,7 +60,7 @@ def test_a_cut_through_a_ball_is_a_circle_and_mixes_colours():
 def test_a_cut_that_leaves_nothing_is_refused():
     sheet = shapes.grid(2, 2)
     with pytest.raises(InputError, match="nothing"):
-        keep_positive(sheet, -np.ones(9))
+        clip_to_positive(sheet, -np.ones(9))
 
 
 def test_samples_are_spread_by_area():
@@ -93,7 +93,7 @@ def test_extension_of_a_linear_function_is_that_function(order):
     free = np.abs(sheet.vertices[:, :2] - 0.4).max(axis=1) < 0.15
     values = sheet.vertices @ np.array([[1.0], [2.0], [0.0]])
     blanked = np.where(free[:, None], 99.0, values)
-    assert_allclose(extend(sheet, blanked, free, order), values, atol=1e-9)
+    assert_allclose(extend_smoothly(sheet, blanked, free, order), values, atol=1e-9)
 
 
 def test_paths_along_edges_are_as_long_as_the_grid_says():

@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from vto_pipeline.errors import InputError
-from vto_pipeline.io.fabric_formats.curves import lost_share, measured_curve, power_law, secant
+from vto_pipeline.io.fabric_formats.curves import hysteresis_share, measured_curve, power_law, secant_stiffness
 from vto_pipeline.io.fabrics import read_fabric
 from vto_pipeline.model.fabric import StretchCurve
 from vto_pipeline.numerics.mechanics.monotone_curve import curve_at, monotone_curve
@@ -62,15 +62,15 @@ def test_a_power_law_has_the_energy_that_the_sheet_states(linearity: float) -> N
 
 def test_the_secant_is_of_100_gf_per_cm_or_of_the_curve_s_end() -> None:
     strong = StretchCurve((0.0, 0.02, 0.04), (0.0, 98.0665, 400.0))
-    assert_allclose(secant(strong), (98.0665 / 0.02, 98.0665), rtol=1e-14)  # rounding
+    assert_allclose(secant_stiffness(strong), (98.0665 / 0.02, 98.0665), rtol=1e-14)  # rounding
     weak = StretchCurve((0.0, 0.5), (0.0, 40.0))
-    assert_allclose(secant(weak), (80.0, 40.0), rtol=1e-14)  # rounding
+    assert_allclose(secant_stiffness(weak), (80.0, 40.0), rtol=1e-14)  # rounding
 
 
 def test_the_lost_share_is_that_of_lt_and_rt() -> None:
     """T = ε² up and ε³ down on [0, 1]: LT 2/3, RT 3/4."""
     strain = np.linspace(0, 1, 2001)
-    assert_allclose(lost_share(strain, strain**2, strain**3), 0.5 * 2 / 3 * (1 - 3 / 4), rtol=1e-6)  # trapezoids
+    assert_allclose(hysteresis_share(strain, strain**2, strain**3), 0.5 * 2 / 3 * (1 - 3 / 4), rtol=1e-6)  # trapezoids
 
 
 @pytest.mark.parametrize(

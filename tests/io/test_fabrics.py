@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from vto_pipeline.errors import ConfigError
-from vto_pipeline.io.fabric_formats.assumed import ASSUMED, told
+from vto_pipeline.io.fabric_formats.assumed import ASSUMED, assumption_notes
 from vto_pipeline.io.fabrics import preset_names, read_fabric
 from vto_pipeline.model.fabric import Fabric, StretchCurve
 
@@ -100,17 +100,17 @@ def test_curves_and_losses(tmp_path: Path) -> None:
 
 def test_the_user_is_told_what_was_not_measured_and_what_was_worked_out(tmp_path: Path) -> None:
     (tmp_path / "a.yaml").write_text("name: lawn\n" + LOSSES)
-    assumed, *derived = told(read_fabric(tmp_path / "a.yaml"))
+    assumed, *derived = assumption_notes(read_fabric(tmp_path / "a.yaml"))
     assert assumed.startswith("lawn: assumed, not measured: areal_density 100 g/m², thickness 0.222 mm, shear 20 N/m, ")
     assert "stretch" not in assumed
     assert derived == [
         "lawn: stretch_warp: secant of curve_warp from 0 to 98.1 N/m",
         "lawn: stretch_weft: secant of curve_weft from 0 to 20 N/m",
     ]
-    (named,) = told(read_fabric({"areal_density_gsm": 100}))
+    (named,) = assumption_notes(read_fabric({"areal_density_gsm": 100}))
     assert all(name in named for name in ASSUMED)
     measured = dataclasses.replace(read_fabric("cotton_poplin"), assumed=())
-    assert told(measured) == ()
+    assert assumption_notes(measured) == ()
 
 
 def in_the_trade_s_units(fabric: Fabric) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from vto_pipeline.errors import InputError
 from vto_pipeline.io import clouds, meshes
 from vto_pipeline.io.arrays import Arrays
 from vto_pipeline.io.captures import images
-from vto_pipeline.io.formats.clean_up import check_sound, drop_needless
+from vto_pipeline.io.formats.clean_up import check_sound, drop_degenerate
 from vto_pipeline.io.sandbox import run_limited
 from vto_pipeline.model.mesh import PointCloud, TriangleMesh
 
@@ -56,7 +56,7 @@ def read_one(path: Path) -> None:
     if not is_mesh or "faces" not in arrays:
         PointCloud(arrays["vertices"])
         return
-    arrays, _ = drop_needless(arrays)
+    arrays, _ = drop_degenerate(arrays)
     TriangleMesh(arrays["vertices"], arrays["faces"], arrays.get("colors"))
 
 

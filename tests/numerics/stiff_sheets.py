@@ -4,7 +4,7 @@ import numpy as np
 from scipy import sparse
 
 from vto_pipeline.numerics.linear.block_matrix import pattern
-from vto_pipeline.numerics.linear.multigrid import hierarchy, update
+from vto_pipeline.numerics.linear.multigrid import hierarchy, update_hierarchy
 
 
 def grid_edges(side, first=0):
@@ -33,7 +33,7 @@ def levels_of(edges, count, held=(), *, mass=1e-3, seed=0):
             blocks[place] -= spring
             blocks[back] -= spring
     blocks[matrix.diagonal[fixed]] = np.eye(3)
-    update(levels)
+    update_hierarchy(levels)
     return levels
 
 

@@ -24,7 +24,7 @@ def test_agrees_with_libigl(soup, count):
     vertices, faces = soup
     points = np.random.default_rng(1).uniform(-1.5, 1.5, (count, 3))
     tree = bvh.build(vertices, faces)
-    triangle, weights, _ = bvh.closest_points(tree, vertices, faces, points, np.full(count, np.inf))
+    triangle, weights, _ = bvh.closest_triangles(tree, vertices, faces, points, np.full(count, np.inf))
     squared, _, nearest = igl.point_mesh_squared_distance(points, vertices, faces.astype(np.int64))
     found = np.einsum("nk,nkj->nj", weights, vertices[faces[triangle]])
     assert_allclose(found, nearest, rtol=0, atol=1e-12)  # the nearest point is unique here, so only rounding differs
@@ -40,8 +40,8 @@ def test_refit_answers_like_a_new_tree(soup):
     moved = vertices @ np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]]) + 0.3
     bvh.refit(tree, moved, faces)
     fresh = bvh.build(moved, faces)
-    wanted = bvh.closest_points(fresh, moved, faces, points, reach)[0]
-    assert_array_equal(bvh.closest_points(tree, moved, faces, points, reach)[0], wanted)
+    wanted = bvh.closest_triangles(fresh, moved, faces, points, reach)[0]
+    assert_array_equal(bvh.closest_triangles(tree, moved, faces, points, reach)[0], wanted)
 
 
 def test_a_guess_does_not_change_the_answer(soup):
@@ -49,9 +49,9 @@ def test_a_guess_does_not_change_the_answer(soup):
     rng = np.random.default_rng(2)
     points = rng.uniform(-1.5, 1.5, (600, 3))
     tree = bvh.build(vertices, faces)
-    plain = bvh.closest_points(tree, vertices, faces, points, np.full(600, np.inf))
+    plain = bvh.closest_triangles(tree, vertices, faces, points, np.full(600, np.inf))
     guess = rng.integers(-1, len(faces), 600).astype(np.int32)
-    guided = bvh.closest_points(tree, vertices, faces, points, np.full(600, np.inf), guess)
+    guided = bvh.closest_triangles(tree, vertices, faces, points, np.full(600, np.inf), guess)
     assert_array_equal(plain[0], guided[0])
 
 
@@ -59,7 +59,7 @@ def test_nothing_beyond_reach(soup):
     vertices, faces = soup
     points = np.random.default_rng(3).uniform(-1.5, 1.5, (600, 3))
     distance = np.sqrt(igl.point_mesh_squared_distance(points, vertices, faces.astype(np.int64))[0])
-    triangle, _, _ = bvh.closest_points(bvh.build(vertices, faces), vertices, faces, points, np.full(600, 0.1))
+    triangle, _, _ = bvh.closest_triangles(bvh.build(vertices, faces), vertices, faces, points, np.full(600, 0.1))
     assert_array_equal(triangle >= 0, distance <= 0.1)
     assert 20 < (triangle >= 0).sum() < 580
 

@@ -12,8 +12,8 @@ from scipy import sparse
 from scipy.linalg import cho_factor, cho_solve
 
 from vto_pipeline.numerics.linear.block_matrix import BlockMatrix
-from vto_pipeline.numerics.linear.cholesky import factor_room, factorise
-from vto_pipeline.numerics.linear.elimination import Elimination, eliminate
+from vto_pipeline.numerics.linear.cholesky import allocate_factor, factorise
+from vto_pipeline.numerics.linear.elimination import Elimination, plan_elimination
 from vto_pipeline.numerics.linear.elimination_tree import dissection
 from vto_pipeline.numerics.linear.substitution import solve
 
@@ -22,7 +22,7 @@ NO_LINKS = np.empty((0, 4), np.int32), np.empty((0, 4)), np.empty((0, 3, 3))
 
 def planned(matrix: BlockMatrix, vertices, weights) -> Elimination:  # type: ignore[no-untyped-def]
     order = dissection(matrix.starts, matrix.columns)
-    return eliminate(matrix.starts, matrix.columns, order, vertices, weights)
+    return plan_elimination(matrix.starts, matrix.columns, order, vertices, weights)
 
 
 @pytest.mark.parametrize(("count", "reach", "linked"), [(1, 1, 0), (2, 1, 0), (5, 1, 3), (9, 2, 12), (30, 1, 40)])
@@ -31,7 +31,7 @@ def test_solution(count: int, reach: int, linked: int) -> None:
     matrix = sheet(count, rng, reach)
     vertices, weights, between = links(linked, count * count, rng)
     plan = planned(matrix, vertices, weights)
-    room = factor_room(plan)
+    room = allocate_factor(plan)
     assert factorise(plan, matrix.starts, matrix.blocks, weights, between, room)
     right, x = rng.standard_normal((count * count, 3)), np.empty((count * count, 3))
     solve(plan, room, right, x)
@@ -47,7 +47,7 @@ def test_a_room_serves_again() -> None:
         matrix = sheet(12, rng)
         vertices, weights, between = links(linked, 144, rng)
         plan = planned(matrix, vertices, weights)
-        room = factor_room(plan, room)
+        room = allocate_factor(plan, room)
         assert factorise(plan, matrix.starts, matrix.blocks, weights, between, room)
         right, x = rng.standard_normal((144, 3)), np.empty((144, 3))
         solve(plan, room, right, x)
@@ -60,7 +60,7 @@ def test_what_is_not_positive_definite_is_told() -> None:
     matrix = sheet(8, rng)
     plan = planned(matrix, *NO_LINKS[:2])
     matrix.blocks[matrix.diagonal[20]] *= -1.0
-    assert not factorise(plan, matrix.starts, matrix.blocks, NO_LINKS[1], NO_LINKS[2], factor_room(plan))
+    assert not factorise(plan, matrix.starts, matrix.blocks, NO_LINKS[1], NO_LINKS[2], allocate_factor(plan))
 
 
 def test_pieces_that_nothing_joins() -> None:
@@ -70,8 +70,8 @@ def test_pieces_that_nothing_joins() -> None:
     apart = (own < 18) == (matrix.columns < 18)
     starts = np.concatenate([[0], np.cumsum(np.bincount(own[apart], minlength=36))]).astype(np.int32)
     columns, blocks = matrix.columns[apart], matrix.blocks[apart]
-    plan = eliminate(starts, columns, dissection(starts, columns), *NO_LINKS[:2])
-    room = factor_room(plan)
+    plan = plan_elimination(starts, columns, dissection(starts, columns), *NO_LINKS[:2])
+    room = allocate_factor(plan)
     assert factorise(plan, starts, blocks, NO_LINKS[1], NO_LINKS[2], room)
     right, x = rng.standard_normal((36, 3)), np.empty((36, 3))
     solve(plan, room, right, x)
@@ -89,7 +89,7 @@ def test_same_bits_with_any_number_of_threads() -> None:
     threads = get_num_threads()
     for count in (1, threads):
         set_num_threads(count)
-        room, x = factor_room(plan), np.empty((1600, 3))
+        room, x = allocate_factor(plan), np.empty((1600, 3))
         factorise(plan, matrix.starts, matrix.blocks, weights, between, room)
         solve(plan, room, right, x)
         found.append(x)

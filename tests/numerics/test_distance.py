@@ -7,7 +7,14 @@ from exact_distance import exact_distance
 from numba import njit
 from numpy.testing import assert_allclose
 
-from vto_pipeline.numerics.distance import EDGE, FACE, VERTEX, blend, closest_on_segments, closest_on_triangle
+from vto_pipeline.numerics.distance import (
+    EDGE,
+    FACE,
+    VERTEX,
+    barycentric_point,
+    closest_on_segments,
+    closest_on_triangle,
+)
 from vto_pipeline.numerics.vector import load
 
 
@@ -18,7 +25,7 @@ def triangle_places(points):  # (N, 4, 3): p, a, b, c -> weights, nearest points
         p, a, b, c = load(points[i], 0), load(points[i], 1), load(points[i], 2), load(points[i], 3)
         found, feature[i] = closest_on_triangle(p, a, b, c)
         weights[i, 0], weights[i, 1], weights[i, 2] = found
-        nearest[i, 0], nearest[i, 1], nearest[i, 2] = blend(found, a, b, c)
+        nearest[i, 0], nearest[i, 1], nearest[i, 2] = barycentric_point(found, a, b, c)
     return weights, nearest, feature
 
 

@@ -107,14 +107,14 @@ class SlowFile(IndexDataCacheFile):
 
 
 class NumbasOwn(SlowFile):
-    """As it was before `save_in_turn`."""
+    """As it was before `serialise_cache_writes`."""
 
     save = IndexDataCacheFile.save.__wrapped__
 
 
 @pytest.mark.parametrize(("kind", "safe"), [(NumbasOwn, False), (SlowFile, True)])
 def test_two_that_compile_at_the_same_time_never_load_each_others_code(tmp_path, kind, safe):
-    """The first case shows that Numba alone does not see to it; once it does, `save_in_turn` may go."""
+    """The first case shows that Numba alone does not see to it; once it does, `serialise_cache_writes` may go."""
     files = [kind(str(tmp_path), "kernel", "stamp") for _ in range(2)]
     threads = [threading.Thread(target=file.save, args=(k, f"code {k}")) for k, file in enumerate(files)]
     for thread in threads:

@@ -8,8 +8,8 @@ from stiff_sheets import grid_edges, interpolation, level_matrix, levels_of
 from vto_pipeline.numerics.cpu_threads import limited_threads
 from vto_pipeline.numerics.linear.block_matrix import Sparse
 from vto_pipeline.numerics.linear.conjugate_gradients import pcg
-from vto_pipeline.numerics.linear.links import link, no_links, pull, pull_back
-from vto_pipeline.numerics.linear.multigrid import cycle, update
+from vto_pipeline.numerics.linear.links import apply_links, apply_links_transposed, make_links, no_links
+from vto_pipeline.numerics.linear.multigrid import update_hierarchy, v_cycle
 
 SIDE = 14
 COUNT = SIDE * SIDE
@@ -23,7 +23,7 @@ def linked(levels, many, seed=0, *, stiff=10.0, held=()):
     weights = np.column_stack([np.ones(many), -on])
     weights[::4, 1:] = [-1.0, 0.0, 0.0]
     weights[np.isin(vertices, held)] = 0.0
-    links = link(vertices, weights, levels.up, levels.rows)
+    links = make_links(vertices, weights, levels.up, levels.rows)
     normal = random.normal(size=(many, 3))
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     links.blocks[:] = stiff * normal[:, :, None] * normal[:, None, :]
@@ -44,8 +44,8 @@ def dense_links(links, vertices, weights, count):
 
 def product(links, level, x, rows):
     """Gᵀ B G x of a level; `x` has a row for each of all levels."""
-    pull(links, level, x)
-    return np.array([pull_back(links, i) for i in range(*rows)])
+    apply_links(links, level, x)
+    return np.array([apply_links_transposed(links, i) for i in range(*rows)])
 
 
 def test_products_on_every_level_are_galerkins():
@@ -68,14 +68,14 @@ def test_the_coarsest_level_is_solved_with_its_links():
     edges = np.column_stack([np.arange(count - 1), np.arange(1, count)]).astype(np.int32)
     levels = levels_of(edges, count, mass=0.1)
     vertices, weights = np.array([[0, 7, 12, 19]], np.int32), np.array([[1.0, -0.2, -0.3, -0.5]])
-    links = link(vertices, weights, levels.up, levels.rows)
+    links = make_links(vertices, weights, levels.up, levels.rows)
     links.blocks[0] = np.diag([5.0, 1.0, 0.5])
     levels = levels._replace(links=links)
-    update(levels)
+    update_hierarchy(levels)
     whole = level_matrix(levels, 0).toarray() + dense_links(links, vertices, weights, count)
     right = np.random.default_rng(1).normal(size=(count, 3))
     levels.right[:count] = right
-    cycle(levels)
+    v_cycle(levels)
     assert_allclose(levels.guess[:count].ravel(), np.linalg.solve(whole, right.ravel()), rtol=1e-10, atol=0)  # cond 1e3
 
 
@@ -83,11 +83,11 @@ def test_the_coarsest_level_is_solved_with_its_links():
 def test_a_cycle_with_links_is_symmetric_and_positive(stiff):
     """Four vertices with one diagonal each would make Jacobi's iteration diverge, and the cycle indefinite."""
     levels, _, _ = linked(levels_of(grid_edges(SIDE), COUNT), 60, stiff=stiff)
-    update(levels)
+    update_hierarchy(levels)
     columns = []
     for unit in np.eye(3 * COUNT):
         levels.right[:COUNT] = unit.reshape(COUNT, 3)
-        cycle(levels)
+        v_cycle(levels)
         columns.append(levels.guess[:COUNT].ravel().copy())
     operator = np.array(columns)
     assert_allclose(operator, operator.T, rtol=0, atol=1e-11 * np.abs(operator).max())  # rounding
@@ -97,7 +97,7 @@ def test_a_cycle_with_links_is_symmetric_and_positive(stiff):
 @pytest.mark.parametrize("multigrid", [False, True])
 def test_solution_is_that_of_dense_algebra(multigrid):
     levels, vertices, weights = linked(levels_of(grid_edges(SIDE), COUNT, (0, 3)), 40, held=(0, 3))
-    update(levels)
+    update_hierarchy(levels)
     whole = level_matrix(levels, 0).toarray() + dense_links(levels.links, vertices, weights, COUNT)
     right = np.random.default_rng(2).normal(size=(COUNT, 3))
     right[[0, 3]] = 0.0
@@ -115,10 +115,10 @@ def test_links_between_sheets_cost_few_iterations():
         levels = levels_of(np.vstack([sheet, sheet + COUNT]), count)
         vertices = np.column_stack([np.arange(COUNT), COUNT + np.arange(COUNT)] + [np.zeros(COUNT)] * 2)
         weights = np.tile([1.0, -1.0, 0.0, 0.0], (COUNT, 1))
-        links = link(vertices.astype(np.int32), weights, levels.up, levels.rows)
+        links = make_links(vertices.astype(np.int32), weights, levels.up, levels.rows)
         links.blocks[:] = 100.0 * np.eye(3)
         levels = levels._replace(links=links)
-        update(levels)
+        update_hierarchy(levels)
         right = np.random.default_rng(4).normal(size=(count, 3))
         iterations.append(pcg(levels, right, np.zeros_like(right), right, 1e-6, 3000, known)[0])
     assert iterations[0] < 80
@@ -133,12 +133,12 @@ def test_the_same_bits_with_one_thread_and_two():
             many = 3000  # enough to be shared among threads
             random = np.random.default_rng(7)
             vertices = random.integers(0, 3600, (many, 4)).astype(np.int32)
-            links = link(vertices, random.normal(size=(many, 4)), levels.up, levels.rows)
+            links = make_links(vertices, random.normal(size=(many, 4)), levels.up, levels.rows)
             links.blocks[:] = np.eye(3)
             levels = levels._replace(links=links)
-            update(levels)
+            update_hierarchy(levels)
             levels.right[:3600] = random.normal(size=(3600, 3))
-            cycle(levels)
+            v_cycle(levels)
             found.append(levels.guess.copy())
     assert_array_equal(found[0], found[1])
 
@@ -146,9 +146,9 @@ def test_the_same_bits_with_one_thread_and_two():
 def test_no_links_are_nothing():
     empty = Sparse(np.zeros(10, np.int32), np.empty(0, np.int32), np.empty(0))
     rows = np.array([0, 9])
-    one = link(np.empty((0, 4), np.int32), np.empty((0, 4)), empty, rows)
+    one = make_links(np.empty((0, 4), np.int32), np.empty((0, 4)), empty, rows)
     other = no_links(9)
     for a, b in zip(one, other, strict=True):
         assert_array_equal(a, b)
-    pull(one, 0, np.ones((9, 3)))
-    assert pull_back(one, 4) == (0.0, 0.0, 0.0)
+    apply_links(one, 0, np.ones((9, 3)))
+    assert apply_links_transposed(one, 4) == (0.0, 0.0, 0.0)

@@ -65,7 +65,7 @@ def test_strains_of_threads(angle):
     ahead = membrane.thread_strains(tuple(fu + step * du), tuple(fv + step * dv))[0]
     behind = membrane.thread_strains(tuple(fu - step * du), tuple(fv - step * dv))[0]
     slope = np.subtract(ahead, behind) / (2.0 * step)
-    assert_allclose(membrane.changes(slopes, tuple(du), tuple(dv)), slope, rtol=0, atol=1e-9)
+    assert_allclose(membrane.strain_changes(slopes, tuple(du), tuple(dv)), slope, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("threads", [((0, 0, 0), (1, 0, 0)), ((0, 1, 0), (0, 0, 0)), ((0, 0, 0), (0, 0, 0))])
@@ -83,7 +83,7 @@ def test_green_strain_is_half_of_right_cauchy_green_less_one():
     change = 0.5 * (f.T @ np.ones((3, 2)) + np.ones((2, 3)) @ f)
     ones = (1.0, 1.0, 1.0)
     expected = (change[0, 0], change[1, 1], 2.0 * change[0, 1])
-    assert_allclose(membrane.changes(slopes, ones, ones), expected, rtol=1e-14)
+    assert_allclose(membrane.strain_changes(slopes, ones, ones), expected, rtol=1e-14)
 
 
 def test_deformation_of_a_triangle_maps_rest_edges_to_edges():
@@ -94,7 +94,7 @@ def test_deformation_of_a_triangle_maps_rest_edges_to_edges():
     f = np.column_stack([fu, fv])
     for i, j in ((0, 1), (1, 2), (2, 0)):
         assert_allclose(f @ (flat[j] - flat[i]), x[j] - x[i], rtol=0, atol=1e-14)
-    force = membrane.on_corner(gradients[0, 1], gradients[1, 1], (1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
+    force = membrane.corner_force(gradients[0, 1], gradients[1, 1], (1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
     assert_allclose(force, gradients[0, 1] * np.array([1, 2, 3]) + gradients[1, 1] * np.array([4, 5, 6]), rtol=1e-14)
 
 
@@ -115,7 +115,7 @@ def test_pulls_and_changes_are_transposes():
     slopes = tuple(map(tuple, rng.normal(size=(4, 3))))
     along, du, dv = rng.normal(size=(3, 3))
     pull_u, pull_v = membrane.pulls(tuple(along), slopes)
-    work = np.dot(along, membrane.changes(slopes, tuple(du), tuple(dv)))
+    work = np.dot(along, membrane.strain_changes(slopes, tuple(du), tuple(dv)))
     assert_allclose(np.dot(pull_u, du) + np.dot(pull_v, dv), work, rtol=1e-12)
 
 
@@ -157,13 +157,13 @@ def test_a_slider_gives_way_at_its_limit(extension):
     assert_allclose(force, np.clip(extension / compliance, -limit, limit), rtol=1e-14)
     work = quad(lambda e: np.clip(e / compliance, -limit, limit), 0.0, extension, points=[-0.1, 0.1])[0]
     assert_allclose(energy, work, rtol=0, atol=1e-12)
-    assert_allclose(extension / slider.secant(extension, compliance, limit), force, rtol=1e-14)
-    left = extension - slider.slipped(extension, compliance, limit)
+    assert_allclose(extension / slider.secant_compliance(extension, compliance, limit), force, rtol=1e-14)
+    left = extension - slider.slider_slip(extension, compliance, limit)
     assert_allclose(left / compliance, force, rtol=1e-12)  # return mapping: the force is that of the limit, or less
-    assert slider.slipped(0.05, compliance, limit) == 0.0
+    assert slider.slider_slip(0.05, compliance, limit) == 0.0
 
 
 @pytest.mark.parametrize("turns", [-3, -1, 0, 2])
 @pytest.mark.parametrize("angle", [-3.1, -0.4, 0.0, 1.0, 3.1])
 def test_angles_are_wrapped(turns, angle):
-    assert_allclose(slider.wrapped(angle + 2.0 * pi * turns), angle, rtol=0, atol=1e-14)
+    assert_allclose(slider.wrap_angle(angle + 2.0 * pi * turns), angle, rtol=0, atol=1e-14)

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from stiff_sheets import grid_edges, interpolation, level_matrix, levels_of
 
 from vto_pipeline.numerics.cpu_threads import limited_threads
-from vto_pipeline.numerics.linear.multigrid import cycle, invert, invert_dense, update
+from vto_pipeline.numerics.linear.multigrid import invert, invert_dense, update_hierarchy, v_cycle
 
 
 def applied(levels, count):
@@ -14,7 +14,7 @@ def applied(levels, count):
     columns = []
     for unit in np.eye(3 * count):
         levels.right[:count] = unit.reshape(count, 3)
-        cycle(levels)
+        v_cycle(levels)
         columns.append(levels.guess[:count].ravel().copy())
     return np.array(columns).T
 
@@ -46,7 +46,7 @@ def test_interpolation_reaches_what_all_vertices_share():
 def test_levels_follow_the_matrix():
     levels = levels_of(grid_edges(20), 400)
     levels.matrix.blocks[: levels.slots[1]] *= 3.0
-    update(levels)
+    update_hierarchy(levels)
     up = interpolation(levels, 0)
     expected = (up.T @ level_matrix(levels, 0) @ up).toarray()
     assert_allclose(level_matrix(levels, 1).toarray(), expected, rtol=0, atol=1e-13 * np.abs(expected).max())
@@ -109,7 +109,7 @@ def test_cycles_have_the_same_bits_with_one_thread_and_two():
         with limited_threads(threads):
             levels = levels_of(grid_edges(60), 3600, (0, 59))
             levels.right[:3600] = np.random.default_rng(1).normal(size=(3600, 3))
-            cycle(levels)
+            v_cycle(levels)
             found.append((levels.matrix.blocks, levels.guess.copy()))
     assert_array_equal(found[0][0], found[1][0])
     assert_array_equal(found[0][1], found[1][1])

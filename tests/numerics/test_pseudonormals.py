@@ -15,7 +15,7 @@ from vto_pipeline.numerics.spatial.pseudonormals import feature_normal, pseudono
 def signs(vertices, faces, points):
     normals = pseudonormals(vertices, faces)
     tree = bvh.build(vertices, faces)
-    triangle, weights, feature = bvh.closest_points(tree, vertices, faces, points, np.full(len(points), np.inf))
+    triangle, weights, feature = bvh.closest_triangles(tree, vertices, faces, points, np.full(len(points), np.inf))
     found = np.einsum("nk,nkj->nj", weights, vertices[faces[triangle]])
     normal = np.array([feature_normal(normals, faces, t, f) for t, f in zip(triangle, feature, strict=True)])
     return np.sign(np.einsum("nj,nj->n", points - found, normal)), feature

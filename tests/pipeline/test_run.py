@@ -14,7 +14,7 @@ from toy_tables import CALLS, TOY
 
 from vto_pipeline.errors import ComputationError, ConfigError, InputError
 from vto_pipeline.pipeline.execution.final import make_finals_again
-from vto_pipeline.pipeline.execution.folder import claimed
+from vto_pipeline.pipeline.execution.folder import locked_run_folder
 
 HEAD = "schema: 1\ngiven: {left: {number: left.txt}, right: {number: right.txt}}\n"
 ALL = HEAD + "want: [squared, label, page]\n"
@@ -236,5 +236,5 @@ def test_two_runs_in_one_folder_clash(go, tmp_path):
     other.communicate()
     go(ALL)  # a dead process holds nothing
     assert CALLS == ["page"]
-    with claimed(tmp_path / "run"), pytest.raises(ConfigError, match="another run is using this folder"):
+    with locked_run_folder(tmp_path / "run"), pytest.raises(ConfigError, match="another run is using this folder"):
         go(ALL)

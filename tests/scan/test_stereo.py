@@ -17,7 +17,7 @@ from vto_pipeline.scan.photos import stereo
 from vto_pipeline.scan.photos.consistency import consensus
 from vto_pipeline.scan.photos.disparity import MatchConfig, _in_second, match_pair
 from vto_pipeline.scan.photos.neighbours import choose_pairs, visibility
-from vto_pipeline.scan.photos.rectify import View, depth_in_view, rectify, warp
+from vto_pipeline.scan.photos.rectify import StereoView, depth_in_view, rectify, warp
 from vto_pipeline.scan.photos.stereo import StereoConfig, estimate_depth_maps
 from vto_pipeline.scan.photos.subpixel import refine_disparity
 
@@ -105,7 +105,7 @@ def test_a_point_falls_on_the_same_row_of_both_windows(true_cameras):
     points = cluster()
     camera = bent_view(-0.2)
     ramp = np.tile(np.arange(160, dtype=np.uint8), (120, 1))
-    first, second = (View(ramp, camera, true_cameras.world_from_cam[k]) for k in (3, 4))
+    first, second = (StereoView(ramp, camera, true_cameras.world_from_cam[k]) for k in (3, 4))
     frame = rectify(first, second, points, 0.1)
     for view, shift in ((first, 0), (second, frame.min_disparity)):
         window = warp(view, frame, shift)
@@ -125,7 +125,7 @@ def test_a_point_falls_on_the_same_row_of_both_windows(true_cameras):
 def test_depth_puts_points_where_both_cameras_see_the_disparity(true_cameras, second):
     """From the angles at both cameras: the isometric latitude of an angle t to the axis is artanh(cos t)."""
     camera = bent_view(0.0)
-    views = [View(np.zeros((120, 160), np.uint8), camera, true_cameras.world_from_cam[k]) for k in (3, 4)]
+    views = [StereoView(np.zeros((120, 160), np.uint8), camera, true_cameras.world_from_cam[k]) for k in (3, 4)]
     frame = rectify(*views, cluster(), 0.1)
     disparity = np.full(frame.size[::-1], 0.4 * frame.scale, np.float32)
     depth = depth_in_view(views[second], frame, disparity, second=second)
@@ -152,7 +152,7 @@ def plane_view(camera, pose):
     depth = (PLANE - pose[2, 3]) / rays[..., 2]
     x, y = np.moveaxis(pose[:2, 3] + depth[..., None] * rays[..., :2], -1, 0)
     seen = cv2.remap(texture, (750 + 400 * x).astype(np.float32), (750 + 400 * y).astype(np.float32), cv2.INTER_CUBIC)
-    return View(np.clip(np.round(seen), 0, 255).astype(np.uint8), camera, pose), depth
+    return StereoView(np.clip(np.round(seen), 0, 255).astype(np.uint8), camera, pose), depth
 
 
 def plane_points(camera, view, other):
@@ -204,7 +204,7 @@ def test_no_pair_of_cameras_needs_a_large_window():
         points = points[visibility(CameraSet(("a", "b"), (camera, camera), poses), PointCloud(points)).all(0)]
         if len(points) < 12:
             continue
-        frame = rectify(View(gray, camera, poses[0]), View(gray, camera, poses[1]), points, 0.1)
+        frame = rectify(StereoView(gray, camera, poses[0]), StereoView(gray, camera, poses[1]), points, 0.1)
         axis = poses[1, :3, 3] / poses[1, 2, 3] * 420
         axis_shown += abs(axis[0]) < 200 and abs(axis[1]) < 150
         assert 16 <= frame.size[0] * frame.size[1] < 2.3 * gray.size
@@ -216,7 +216,7 @@ def test_points_on_the_axis_do_not_cost_the_others_their_resolution():
     """The axis itself is infinitely far up the map."""
     camera, ahead = Intrinsics(400, 300, 420.0, 420.0, 199.5, 149.5), np.eye(4)
     ahead[2, 3] = 0.1
-    first, second = (View(np.zeros((300, 400), np.uint8), camera, pose) for pose in (np.eye(4), ahead))
+    first, second = (StereoView(np.zeros((300, 400), np.uint8), camera, pose) for pose in (np.eye(4), ahead))
     turn = np.linspace(0, 2 * np.pi, 100)
     ring = np.stack([0.3 * np.cos(turn), 0.3 * np.sin(turn), np.ones(100)], axis=1)
     alone = rectify(first, second, ring, 0.1)
@@ -225,7 +225,7 @@ def test_points_on_the_axis_do_not_cost_the_others_their_resolution():
 
 
 def test_photos_from_one_place_cannot_be_rectified(true_cameras):
-    view = View(np.zeros((120, 160), np.uint8), bent_view(0.0), true_cameras.world_from_cam[0])
+    view = StereoView(np.zeros((120, 160), np.uint8), bent_view(0.0), true_cameras.world_from_cam[0])
     with pytest.raises(ScanError, match="one place"):
         rectify(view, view, cluster(), 0.1)
 

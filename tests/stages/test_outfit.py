@@ -15,7 +15,7 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.render import GlbPart
 from vto_pipeline.stages import CATALOGUE
-from vto_pipeline.stages.outfit import document_schema, garment_names, names_in_run, outfit_tables, spelt_out
+from vto_pipeline.stages.outfit import document_schema, expand_document, garment_names, names_in_run, outfit_tables
 
 HEAD = "schema: 1\n"
 GIVEN = """given:
@@ -85,7 +85,7 @@ def test_a_document_with_one_garment_stays_as_it_is(tmp_path: Path) -> None:
     text = HEAD + "given:\n  garment: {mesh: shirt.ply}\n  fabric: jersey\n  body: {mesh: body.ply}\n" + WANT
     document = load_yaml(written(tmp_path, text))
     assert garment_names(document) == ()
-    assert spelt_out(document, ()) is document
+    assert expand_document(document, ()) is document
 
 
 @pytest.mark.parametrize(
@@ -188,7 +188,7 @@ def test_one_fabric_serves_all_garments_of_a_command_line(monkeypatch: pytest.Mo
     from click.testing import CliRunner
 
     asked = []
-    monkeypatch.setattr("vto_pipeline.cli.work.carry_out", lambda document, *_: asked.append(document.data))
+    monkeypatch.setattr("vto_pipeline.cli.work.run_document", lambda document, *_: asked.append(document.data))
     line = ["--garment", "My-trousers.ply", "--garment", "shirt.ply", "--fabric", "denim", "--body", "b.ply"]
     assert CliRunner().invoke(drape_command, line).exit_code == 0
     assert asked[0]["given"]["garments"] == {

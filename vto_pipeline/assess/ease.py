@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vto_pipeline.geometry.hull import Hull, convex_hull, plane_axes
-from vto_pipeline.geometry.section import Section, cut
+from vto_pipeline.geometry.section import Section, plane_section
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -69,7 +69,7 @@ def ease_at(
     inner = max(body_hulls(body, origin, normal, body_faces), key=lambda hull: hull.perimeter, default=None)
     if inner is None:
         return None
-    section = cut(garment, origin, normal, garment_faces)
+    section = plane_section(garment, origin, normal, garment_faces)
     around = [(hull, part) for hull, part in _hulls(section, origin, normal) if hull.encloses(inner.center)]
     if not around:
         return None
@@ -89,7 +89,7 @@ def body_hulls(
         normal: Of the plane, shape (3,).
         faces: Only these, shape (F,).
     """
-    return [hull for hull, _ in _hulls(cut(body, origin, normal, faces), origin, normal)]
+    return [hull for hull, _ in _hulls(plane_section(body, origin, normal, faces), origin, normal)]
 
 
 def _hulls(section: Section, origin: FloatArray, normal: FloatArray) -> list[tuple[Hull, NDArray[np.intp]]]:

@@ -10,20 +10,26 @@ import numpy as np
 from pydantic import Field
 
 from vto_pipeline.avatar.measuring.avatar_measurements import measure_avatar
-from vto_pipeline.avatar.measuring.measuring_levels import find_levels, with_rows_at
-from vto_pipeline.avatar.model.fit import Fit, model
+from vto_pipeline.avatar.measuring.measuring_levels import find_levels, with_rows_at_levels
+from vto_pipeline.avatar.model.fit import Fit, posed_vertices
 from vto_pipeline.avatar.model.pose import named_pose
 from vto_pipeline.avatar.model.shape import SEX_SHARE, ShapeSpace, shape_space
 from vto_pipeline.avatar.model.stance import Stance, stance
 from vto_pipeline.avatar.scan.bind_pose import separate_thighs, to_bind_pose
 from vto_pipeline.avatar.scan.bust_points import toward_bust_points
 from vto_pipeline.avatar.scan.clothed import fit_under_clothes
-from vto_pipeline.avatar.scan.correspondence import Pairs, Target
+from vto_pipeline.avatar.scan.correspondence import Correspondences, Target
 from vto_pipeline.avatar.scan.displacement import displace
 from vto_pipeline.avatar.scan.initial_pose import InitialPose, upright_initial_poses
 from vto_pipeline.avatar.scan.observed_uncertainty import level_sigmas, surface_sigmas
-from vto_pipeline.avatar.scan.registration import covariance, initial_fit, refine
-from vto_pipeline.avatar.scan.report import CORE, check, check_build, extremity_weights, report
+from vto_pipeline.avatar.scan.registration import covariance, initial_fit, refine_registration
+from vto_pipeline.avatar.scan.report import (
+    CORE,
+    extremity_weights,
+    refuse_implausible_build,
+    refuse_non_body,
+    report_registration,
+)
 from vto_pipeline.avatar.scan.tangential_slide import slide_along_surface
 from vto_pipeline.avatar.scan.unobserved_uncertainty import unseen_sigmas
 from vto_pipeline.avatar.scan.upright import in_metres
@@ -86,9 +92,9 @@ def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | No
     scores = [_score(space, target, fit) for fit in tries]
     fit = _pose_and_shape(space, target, tries[int(np.argmin(scores))], config, job, steps=config.iterations)
     job.progress(0.6, "fitting the surface to the scan")
-    posed = separate_thighs(space, fit, model(space, fit))
+    posed = separate_thighs(space, fit, posed_vertices(space, fit))
     vertices, softest = _displaced(space, fit, target, posed, config.stiffness, config.rounds)
-    check(kept, space, vertices, config.max_mean_mm)
+    refuse_non_body(kept, space, vertices, config.max_mean_mm)
     stands = stance(space, fit)
     caveats = []
     if config.clothed:
@@ -98,7 +104,7 @@ def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | No
         # which posture is the body's own does not show
         stands = replace(stance(space, fit), joints=space.joints(fit.parameters), pose=fit.pose)
         stands = replace(stands, translation=fit.translation)
-        vertices = separate_thighs(space, fit, model(space, fit))
+        vertices = separate_thighs(space, fit, posed_vertices(space, fit))
         job.measure(estimated_under_clothing=True)
         job.warn("the body is an estimate under clothing: check with a tape before choosing a size by it")
         caveats.append("estimated under clothing")
@@ -114,10 +120,10 @@ def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | No
         )
         caveats.append("brought upright")
     job.progress(0.9, "returning the body to the bind pose")
-    posed = separate_thighs(space, fit, model(space, fit))
+    posed = separate_thighs(space, fit, posed_vertices(space, fit))
     body, bad = to_bind_pose(space, fit, stands, posed, vertices)
     if not stands.stands:
-        check_build(measure_avatar(body), stands.lean)
+        refuse_implausible_build(measure_avatar(body), stands.lean)
     if not config.clothed:
         parts = (
             unseen_sigmas(space, _uncertainty(space, target, fit, config), target, posed, body, stands.stands),
@@ -125,7 +131,7 @@ def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | No
             surface_sigmas(space, target, body),
         )
         sigmas = {name: math.hypot(*(part[name] for part in parts)) for name in parts[0]}
-    caveats += report(kept, space, body.vertices, job)
+    caveats += report_registration(kept, space, body.vertices, job)
     job.measure(tangled_faces=bad)
     if bad:
         job.warn(f"{bad} faces of the registered body still pass through others, where the scan's own limbs touch")
@@ -138,7 +144,7 @@ def _levelled(
     """Return the space with its rows at the body's own levels, and the body with its rows slid there."""
     upright = (vertices - stands.translation) @ stands.yaw
     found = find_levels(upright, space.base)
-    levelled = with_rows_at(space, fit.parameters, upright, found)
+    levelled = with_rows_at_levels(space, fit.parameters, upright, found)
     shift = (levelled.base.bind_vertices - space.base.bind_vertices) @ stands.yaw.T
     if "chest" in found:
         seen = (scan.vertices - stands.translation) @ stands.yaw
@@ -166,16 +172,16 @@ def _pose_and_shape(
     fall = (config.final_reach_mm / reach) ** (1 / steps)
     for step in range(steps):
         pairs = _pairs(space, target, fit, reach)
-        fit = refine(space, fit, pairs, noise=_NOISE_SHARE * reach * 1e-3)
+        fit = refine_registration(space, fit, pairs, noise=_NOISE_SHARE * reach * 1e-3)
         reach *= fall
         job.progress(0.1 + 0.5 * step / steps, f"pose and shape, step {step + 1} of {steps}")
     return fit
 
 
-def _pairs(space: ShapeSpace, target: Target, fit: Fit, reach_mm: float) -> Pairs:
+def _pairs(space: ShapeSpace, target: Target, fit: Fit, reach_mm: float) -> Correspondences:
     # what the scan may lack must not reach out for the rest of it
     chosen = np.flatnonzero(extremity_weights(space) < CORE)[::3]
-    return target.pairs(model(space, fit), space.base.faces, chosen, reach_mm * 1e-3)
+    return target.pairs(posed_vertices(space, fit), space.base.faces, chosen, reach_mm * 1e-3)
 
 
 def _uncertainty(space: ShapeSpace, target: Target, fit: Fit, config: ScanConfig) -> FloatArray:
@@ -184,6 +190,6 @@ def _uncertainty(space: ShapeSpace, target: Target, fit: Fit, config: ScanConfig
 
 
 def _score(space: ShapeSpace, target: Target, fit: Fit) -> float:
-    vertices = model(space, fit)
+    vertices = posed_vertices(space, fit)
     _, _, distance = closest_points(target.probes, vertices, space.base.faces)
     return float(np.minimum(distance, 0.05).mean())

@@ -13,18 +13,18 @@ import numpy as np
 from pydantic import Field
 
 from vto_pipeline.avatar.measuring.definitions import DEFINITIONS
-from vto_pipeline.avatar.measuring.measuring_levels import find_levels, with_rows_at
+from vto_pipeline.avatar.measuring.measuring_levels import find_levels, with_rows_at_levels
 from vto_pipeline.avatar.measuring.population import population
 from vto_pipeline.avatar.measuring.tape import Tape
-from vto_pipeline.avatar.model.fit import Fit, model
+from vto_pipeline.avatar.model.fit import Fit, posed_vertices
 from vto_pipeline.avatar.model.pose import pose_avatar
 from vto_pipeline.avatar.model.shape import SEX_SHARE, ShapeSpace, shape_space
 from vto_pipeline.avatar.model.stance import stance
 from vto_pipeline.avatar.scan.bind_pose import to_bind_pose
 from vto_pipeline.avatar.scan.report import extremity_weights
 from vto_pipeline.avatar.scan.tangential_slide import slide_along_surface
-from vto_pipeline.avatar.silhouettes.backdrop import person
-from vto_pipeline.avatar.silhouettes.fit import Evidence, Solution, advance
+from vto_pipeline.avatar.silhouettes.backdrop import segment_person
+from vto_pipeline.avatar.silhouettes.fit import Evidence, Solution, run_steps
 from vto_pipeline.avatar.silhouettes.initial_pose import initial_views, mean_body
 from vto_pipeline.errors import AvatarError
 from vto_pipeline.model.arrays import ByteArray
@@ -82,7 +82,7 @@ def fit_silhouettes(
         AvatarError: no body, or no whole one, stands out from the backdrop.
     """
     config, job = config or SilhouettesConfig(), job or Job()
-    front, side = person(front_image, str(silhouettes.front)), person(side_image, str(silhouettes.side))
+    front, side = segment_person(front_image, str(silhouettes.front)), segment_person(side_image, str(silhouettes.side))
     noise = config.outline_sigma_mm * 1e-3
     job.progress(0.0, "finding the pose")
     space, evidence = shape_space(SEX_SHARE[config.sex]), _evidence(config.sex, silhouettes, config)
@@ -128,11 +128,11 @@ def _fit(sex: str, begin: Solution, silhouettes: Silhouettes, config: Silhouette
     )
     trust = 1 - (1 - _ENDS_SHARE) * extremity_weights(space)
     evidence = _evidence(sex, silhouettes, config)
-    return advance(space, views, evidence, trust, config.outline_sigma_mm * 1e-3, config.iterations)
+    return run_steps(space, views, evidence, trust, config.outline_sigma_mm * 1e-3, config.iterations)
 
 
 def _report(space: ShapeSpace, solution: Solution, job: Job) -> Avatar:
-    body = _as_it_stands(space, solution.views[0].fit)
+    body = _unpose(space, solution.views[0].fit)
     tape, sigmas = Tape(body), {}
     for name, definition in DEFINITIONS.items():
         reading = tape.read(definition, body.bind_vertices)
@@ -147,7 +147,7 @@ def _report(space: ShapeSpace, solution: Solution, job: Job) -> Avatar:
     return replace(body, sigmas=sigmas)
 
 
-def _as_it_stands(space: ShapeSpace, fit: Fit) -> Avatar:
+def _unpose(space: ShapeSpace, fit: Fit) -> Avatar:
     """Return the body in the bind pose: trunk and legs keep the posture of the front view, as those of a scan do.
 
     An outline does not tell where a row of the template comes to lie; the rows move to where the body shows them.
@@ -155,10 +155,10 @@ def _as_it_stands(space: ShapeSpace, fit: Fit) -> Avatar:
     pose = fit.pose.copy()
     pose[0] = 0.0  # the camera's tilt, not the body's
     upright = replace(fit, pose=pose, translation=np.zeros(3))
-    posed, stands = model(space, upright), stance(space, upright)
+    posed, stands = posed_vertices(space, upright), stance(space, upright)
     standing = (posed - stands.translation) @ stands.yaw
-    levelled = with_rows_at(space, fit.parameters, standing, find_levels(standing, space.base))
+    levelled = with_rows_at_levels(space, fit.parameters, standing, find_levels(standing, space.base))
     shift = (levelled.base.bind_vertices - space.base.bind_vertices) @ stands.yaw.T
     moved = slide_along_surface(posed, space.base.faces, shift)
-    body, _ = to_bind_pose(levelled, upright, stance(levelled, upright), model(levelled, upright), moved)
+    body, _ = to_bind_pose(levelled, upright, stance(levelled, upright), posed_vertices(levelled, upright), moved)
     return pose_avatar(body, np.zeros_like(pose), np.zeros(3))

@@ -36,7 +36,7 @@ class Files:
         return cls(folder / f"{name}.json", folder / f"{name}.png", folder / f"{name}.partial.jsonl")
 
 
-def carry_out(
+def run_bench(
     name: str,
     bench: Bench,
     folder: Path,

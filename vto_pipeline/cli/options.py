@@ -41,11 +41,11 @@ output_option = click.option(
 force_option = click.option("--force-all", is_flag=True, help="Leave no work out, for comparison.")
 
 
-def speaking(function: Function) -> Function:
+def message_options(function: Function) -> Function:
     """Add --json and -v, which every command has."""
     return json_option(verbose_option(function))
 
 
-def running(function: Function) -> Function:
+def pipeline_options(function: Function) -> Function:
     """Add the options of every command that runs a pipeline."""
-    return output_option(set_option(force_option(speaking(function))))
+    return output_option(set_option(force_option(message_options(function))))

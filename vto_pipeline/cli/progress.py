@@ -23,7 +23,7 @@ _SILENCE = 5.0
 def show_progress(session: Session) -> Iterator[Listener]:
     """Yield the listener that suits stderr."""
     if not sys.stderr.isatty():
-        yield Lines(session)
+        yield LineProgress(session)
         return
     columns = (
         TextColumn("{task.description}", markup=False),
@@ -33,10 +33,10 @@ def show_progress(session: Session) -> Iterator[Listener]:
         TextColumn("{task.fields[text]}", style="dim", markup=False),
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        yield Bars(session, progress)
+        yield BarProgress(session, progress)
 
 
-class Lines(Listener):
+class LineProgress(Listener):
     """One line when a stage starts, one when it ends, and one every few seconds in between."""
 
     def __init__(self, session: Session) -> None:
@@ -67,7 +67,7 @@ class Lines(Listener):
         self._session.say(text)
 
 
-class Bars(Lines):
+class BarProgress(LineProgress):
     """A moving bar for the running stage, lines for those that have ended."""
 
     def __init__(self, session: Session, progress: Progress) -> None:

@@ -35,10 +35,10 @@ def planned(path: Path, overrides: Sequence[str], tables: Catalogue) -> tuple[Re
 
 def _for_its_garments(document: Document, tables: Catalogue) -> tuple[Document, Catalogue]:
     """Return document and tables with a row for each garment, if there are several."""
-    from vto_pipeline.stages.outfit import garment_names, outfit_tables, spelt_out
+    from vto_pipeline.stages.outfit import expand_document, garment_names, outfit_tables
 
     names = garment_names(document)
-    return spelt_out(document, names), outfit_tables(tables, names)
+    return expand_document(document, names), outfit_tables(tables, names)
 
 
 def run_tables(folder: Path, tables: Catalogue) -> Catalogue:
@@ -89,7 +89,7 @@ def typed_document(command: str, given: Mapping[str, Any], want: Sequence[str], 
     return Document(data, Path(command))
 
 
-def carry_out(
+def run_document(
     document: Document,
     base: Path,
     output: Path,

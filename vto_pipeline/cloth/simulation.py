@@ -17,7 +17,7 @@ from vto_pipeline.cloth.collision.shapes.moving import Moving
 from vto_pipeline.cloth.dynamics.residual import elastic_energy
 from vto_pipeline.cloth.dynamics.step_refinement import refine_time_step
 from vto_pipeline.cloth.dynamics.stepper import Pins, StepConfig, Stepper
-from vto_pipeline.cloth.model.build import at_rest, build
+from vto_pipeline.cloth.model.build import at_rest, build_cloth
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.model.settings import checked
 from vto_pipeline.cloth.placement.collapsed_start import expand_collapsed_triangles
@@ -125,7 +125,7 @@ def simulate(
     shape = RestShape(mesh.vertices if rest is None else np.asarray(rest, dtype=np.float64))
     if config.pin_compliance is not None and pin_path is not None:
         raise ConfigError("pin_compliance is set, and pins on a path do not give way", hint="leave out one of them")
-    model = build(
+    model = build_cloth(
         mesh,
         shape,
         fabric,

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.coarse_align import PlacementSearch, tilted_rotations, upright_rotations
-from vto_pipeline.garment.robust_icp import Alignment, refine
+from vto_pipeline.garment.robust_icp import MannequinAlignment, robust_icp
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import face_area_vectors, face_normals
@@ -58,17 +58,19 @@ def align_to_mannequin(surface: TriangleMesh, mannequin: TriangleMesh, config: A
     few = slice(None, None, max(config.samples // 2000, 1))
     search = PlacementSearch(points, mannequin, distance, COARSE_CELL)
 
-    def best_of(rotations: list[FloatArray]) -> Alignment:
+    def best_of(rotations: list[FloatArray]) -> MannequinAlignment:
         scored = sorted((search.best(rotation) for rotation in rotations), key=lambda found: -found[0])
         starts = [placement for _, placement in scored[: config.candidates]]
-        rough = [refine(points[few], normals[few], distance, normals_there, start, COARSE_BANDS) for start in starts]
+        rough = [
+            robust_icp(points[few], normals[few], distance, normals_there, start, COARSE_BANDS) for start in starts
+        ]
         best = min(rough, key=lambda placed: placed.cost)
         bands = np.geomspace(COARSE_BANDS[-1], config.widest_band_mm * 1e-3, FINE_BANDS)
-        placed = refine(points, normals, distance, normals_there, best.mannequin_from_surface, bands)
+        placed = robust_icp(points, normals, distance, normals_there, best.mannequin_from_surface, bands)
         for _ in range(TIGHTENINGS):
             band = float(np.clip(BAND_SIGMAS * placed.noise, LEAST_BAND, bands[-1]))
             bands = np.geomspace(bands[-1], band, FINE_BANDS)
-            placed = refine(points, normals, distance, normals_there, placed.mannequin_from_surface, bands)
+            placed = robust_icp(points, normals, distance, normals_there, placed.mannequin_from_surface, bands)
         return placed
 
     job.progress(0.1, "trying upright placements")
@@ -83,7 +85,7 @@ def align_to_mannequin(surface: TriangleMesh, mannequin: TriangleMesh, config: A
     return _accept(placed, surface, config, job)
 
 
-def _accept(placed: Alignment, surface: TriangleMesh, config: AlignConfig, job: Job) -> FloatArray:
+def _accept(placed: MannequinAlignment, surface: TriangleMesh, config: AlignConfig, job: Job) -> FloatArray:
     """Measure the placement, and refuse one that the bare parts do not determine."""
     share = float(placed.bare.mean())
     if share < config.enough_bare:
@@ -109,7 +111,7 @@ def _accept(placed: Alignment, surface: TriangleMesh, config: AlignConfig, job: 
     return placed.mannequin_from_surface
 
 
-def _uncertainty(placed: Alignment, surface: TriangleMesh, samples: int) -> float:
+def _uncertainty(placed: MannequinAlignment, surface: TriangleMesh, samples: int) -> float:
     """Return the standard deviation of the least determined motion, as a displacement half the scan's size out [m]."""
     lever = 0.5 * float(np.ptp(surface.vertices, axis=0).max())
     scale = np.array([1.0 / lever] * 3 + [1.0] * 3)

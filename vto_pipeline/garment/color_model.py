@@ -10,7 +10,7 @@ from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.numerics.srgb import decode_srgb
 
 BINS = 24
-BLUR = 1.0
+HISTOGRAM_SIGMA = 1.0
 """Standard deviation of the histogram's smoothing [bins]."""
 SURPRISE = 0.02
 """Share of each material that may have any colour: dirt, shadow, seams."""
@@ -35,7 +35,7 @@ def color_evidence(colors: ByteArray, pure: NDArray[np.bool_], mixed: NDArray[np
     def density(members: NDArray[np.bool_]) -> FloatArray:
         histogram = np.zeros((BINS, BINS, BINS))
         np.add.at(histogram, tuple(axis[members] for axis in cell), 1.0)
-        return gaussian_filter(histogram / members.sum(), BLUR, mode="nearest")[cell]
+        return gaussian_filter(histogram / members.sum(), HISTOGRAM_SIGMA, mode="nearest")[cell]
 
     one, both = density(pure), density(mixed)
     share = min(float(np.median(both[pure] / one[pure])), MOST_MIXED)

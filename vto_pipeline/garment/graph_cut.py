@@ -18,7 +18,7 @@ RESOLUTION = 10_000
 """Capacities are whole numbers: costs are rounded to this part of one."""
 
 
-def cut(unary: FloatArray, edges: IntArray, pairwise: FloatArray) -> NDArray[np.bool_]:
+def minimum_cut(unary: FloatArray, edges: IntArray, pairwise: FloatArray) -> NDArray[np.bool_]:
     """Return which vertices fall on the positive side, shape (V,).
 
     Args:
@@ -42,7 +42,7 @@ def cut(unary: FloatArray, edges: IntArray, pairwise: FloatArray) -> NDArray[np.
     if len(rest):
         place = np.full(len(balance), -1)
         place[rest] = np.arange(len(rest))
-        label[rest] = _minimum_cut(balance[rest], place[edges], cost)
+        label[rest] = _solve_minimum_cut(balance[rest], place[edges], cost)
     return label
 
 
@@ -62,7 +62,9 @@ def _absorb_decided(
     return edges[both_open], cost[both_open]
 
 
-def _minimum_cut(balance: NDArray[np.int64], edges: NDArray[np.int64], cost: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _solve_minimum_cut(
+    balance: NDArray[np.int64], edges: NDArray[np.int64], cost: NDArray[np.int64]
+) -> NDArray[np.bool_]:
     count = len(balance)
     source, sink = count, count + 1
     positive, negative = np.flatnonzero(balance > 0), np.flatnonzero(balance < 0)

@@ -1,4 +1,4 @@
-"""Bays in the rim of an opening: scan holes that happen to reach it, as at the underside of a sleeve."""
+"""Notches in the rim of an opening: scan holes that happen to reach it, as at the underside of a sleeve."""
 
 from __future__ import annotations
 
@@ -7,36 +7,36 @@ from numpy.typing import NDArray
 
 from vto_pipeline.garment.loop_evidence import encloses
 from vto_pipeline.garment.rims import smooth_curve
-from vto_pipeline.geometry.remeshing.holes import fill_bay
+from vto_pipeline.geometry.remeshing.holes import fill_notch
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import boundary_walks, half_edges
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 
 DETOUR = 1.6
-"""A rim whose way round a bay is so many times longer than across is notched; half a circle is π/2."""
+"""A rim whose way round a notch is so many times longer than across is notched; half a circle is π/2."""
 LEAST_DETOUR, LEAST_DEPTH = 0.03, 0.012
-"""Smaller bays are left to the fairing of rims [m]. Depth is into the garment: folds of a hem are no bays."""
+"""Smaller notches are left to the fairing of rims [m]. Depth is into the garment: folds of a hem are no notches."""
 ROUNDER = 1.1
-"""A rim must become rounder by this factor when its bay is closed."""
+"""A rim must become rounder by this factor when its notch is closed."""
 GRAZING = 0.15
-"""A mouth may cut a curved mannequin by this share of its width, as over a shoulder."""
+"""The closing line may cut a curved mannequin by this share of its width, as over a shoulder."""
 TANGENT = 0.02
-"""The direction of a rim beside a bay is taken over this length [m]."""
+"""The direction of a rim beside a notch is taken over this length [m]."""
 LOOKED_AT = 120
-"""Points of each rim between which bays are looked for."""
+"""Points of each rim between which notches are looked for."""
 ROUNDS = 3
-"""How often bays are looked for: one rim may have several."""
+"""How often notches are looked for: one rim may have several."""
 WAVELENGTH = 0.025
-"""Bays are looked for on the rim without its zigzag [m]."""
+"""Notches are looked for on the rim without its zigzag [m]."""
 
 
 def close_notches(
     mesh: TriangleMesh, distance: SurfaceDistance, least_perimeter: float, reach: float
 ) -> tuple[TriangleMesh, int]:
-    """Return the mesh with the bays of its rims filled, and how many there were.
+    """Return the mesh with the notches of its rims filled, and how many there were.
 
-    The line across a bay runs outside the mannequin or grazes it, and the rim that is left goes round the mannequin.
+    The line across a notch runs outside the mannequin or grazes it, and the rim that is left goes round the mannequin.
 
     Args:
         mesh: The garment.
@@ -47,12 +47,16 @@ def close_notches(
     closed = 0
     for _ in range(ROUNDS):
         rims = [walk for walk in boundary_walks(mesh) if _length(mesh, walk) > least_perimeter]
-        bays = [bay for walk in rims if (bay := _worst_bay(mesh, walk, distance, least_perimeter, reach)) is not None]
-        for around, directions in bays:
-            mesh = _bridge(mesh, around, directions)
-        if not bays:
+        notches = [
+            notch
+            for walk in rims
+            if (notch := _largest_notch(mesh, walk, distance, least_perimeter, reach)) is not None
+        ]
+        for around, directions in notches:
+            mesh = _fill_smoothly(mesh, around, directions)
+        if not notches:
             break
-        closed += len(bays)
+        closed += len(notches)
     return mesh, closed
 
 
@@ -61,32 +65,32 @@ def _length(mesh: TriangleMesh, walk: IntArray) -> float:
     return float(np.linalg.norm(mesh.vertices[end] - mesh.vertices[start], axis=1).sum())
 
 
-def _worst_bay(
+def _largest_notch(
     mesh: TriangleMesh, walk: IntArray, distance: SurfaceDistance, least_perimeter: float, reach: float
 ) -> tuple[IntArray, FloatArray] | None:
-    """Return the half-edges round the largest bay of a boundary loop, and the directions in which the rim comes to it
-    and goes on after it, shape (2, 3); None when there is no bay."""
+    """Return the half-edges round the largest notch of a boundary loop, and the directions in which the rim comes to it
+    and goes on after it, shape (2, 3); None when there is no notch."""
     points = mesh.vertices[half_edges(mesh)[walk, 0]]
     for _ in range(2):
         points = smooth_curve(points, WAVELENGTH)
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1))])
     at = np.unique(np.searchsorted(along[:-1], np.arange(LOOKED_AT) / LOOKED_AT * along[-1]).clip(max=len(walk) - 1))
-    for start, end in _likely_bays(points, along, at, distance, least_perimeter):
-        left = at[np.argsort(np.mod(at - end, len(walk)))]  # from the bay's end round to its start
+    for start, end in _candidate_notches(points, along, at, distance, least_perimeter):
+        left = at[np.argsort(np.mod(at - end, len(walk)))]  # from the notch's end round to its start
         left = left[: np.count_nonzero(np.mod(at - end, len(walk)) <= np.mod(start - end, len(walk)))]
-        mouth = points[start] + np.linspace(0.0, 1.0, 12)[1:-1, None] * (points[end] - points[start])
-        if encloses(np.vstack([points[left], mouth]), distance, reach):
-            before = points[start] - points[_further(along, start, -TANGENT)]
-            after = points[_further(along, end, TANGENT)] - points[end]
-            bay = np.roll(walk, -start)[: (end - start) % len(walk)]
-            return bay, np.stack([before, after]) / np.linalg.norm([before, after], axis=1, keepdims=True)
+        closing_line = points[start] + np.linspace(0.0, 1.0, 12)[1:-1, None] * (points[end] - points[start])
+        if encloses(np.vstack([points[left], closing_line]), distance, reach):
+            before = points[start] - points[_index_along(along, start, -TANGENT)]
+            after = points[_index_along(along, end, TANGENT)] - points[end]
+            notch = np.roll(walk, -start)[: (end - start) % len(walk)]
+            return notch, np.stack([before, after]) / np.linalg.norm([before, after], axis=1, keepdims=True)
     return None
 
 
-def _likely_bays(
+def _candidate_notches(
     points: FloatArray, along: FloatArray, at: IntArray, distance: SurfaceDistance, least_perimeter: float
 ) -> list[tuple[int, int]]:
-    """Return where bays may start and end, the best for each start, the best of all first.
+    """Return where notches may start and end, the best for each start, the best of all first.
 
     The best leaves the roundest rim: greatest 4π area / perimeter².
     """
@@ -99,8 +103,8 @@ def _likely_bays(
     left = along[-1] - arc + across
     round_left = _roundness_left(points, i, j, left)
     whole = 4.0 * np.pi * np.linalg.norm(_area_vector(points)) / along[-1] ** 2
-    bay = (arc - DETOUR * across > LEAST_DETOUR) & (depth > LEAST_DEPTH)
-    row, column = np.nonzero(bay & (left > least_perimeter) & (round_left > ROUNDER * whole))
+    notch = (arc - DETOUR * across > LEAST_DETOUR) & (depth > LEAST_DEPTH)
+    row, column = np.nonzero(notch & (left > least_perimeter) & (round_left > ROUNDER * whole))
     free = _outside(points[at[row]], points[j[row, column]], distance)
     row, column = row[free], column[free]
     worth = np.full(arc.shape, -np.inf)
@@ -112,11 +116,11 @@ def _likely_bays(
 
 
 def _roundness_left(points: FloatArray, start: IntArray, end: IntArray, length: FloatArray) -> FloatArray:
-    """Return how round the rim is that is left when the bays from start to end are closed by straight lines."""
+    """Return how round the rim is that is left when the notches from start to end are closed by straight lines."""
     swept = 0.5 * np.cumsum(np.cross(points, np.roll(points, -1, axis=0)), axis=0)
     before = np.vstack([np.zeros(3), swept])  # area vector of the path from the first point to each
-    bay = before[end] - before[start] + np.where((end < start)[..., None], swept[-1], 0.0)
-    area = swept[-1] - bay + 0.5 * np.cross(points[start], points[end])
+    notch = before[end] - before[start] + np.where((end < start)[..., None], swept[-1], 0.0)
+    area = swept[-1] - notch + 0.5 * np.cross(points[start], points[end])
     return 4.0 * np.pi * np.linalg.norm(area, axis=-1) / np.square(length)
 
 
@@ -130,27 +134,27 @@ def _area_vector(points: FloatArray) -> FloatArray:
     return 0.5 * np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0)
 
 
-def _further(along: FloatArray, place: int, by: float) -> int:
+def _index_along(along: FloatArray, place: int, by: float) -> int:
     """Return the place on a rim by so much further along [m]."""
     return int(np.searchsorted(along[:-1], np.mod(along[place] + by, along[-1])) % (len(along) - 1))
 
 
-def _bridge(mesh: TriangleMesh, bay: IntArray, directions: FloatArray) -> TriangleMesh:
-    """Fill a bay up to the cubic that goes on as the rim does on both sides of it.
+def _fill_smoothly(mesh: TriangleMesh, notch: IntArray, directions: FloatArray) -> TriangleMesh:
+    """Fill a notch up to the cubic that goes on as the rim does on both sides of it.
 
     The tangents of the Hermite cubic are as long as those that make it a circle's arc, were the turn between them one.
     """
     halves = half_edges(mesh)
-    first, last = halves[bay[0], 0], halves[bay[-1], 1]
+    first, last = halves[notch[0], 0], halves[notch[-1], 1]
     start, end = mesh.vertices[first], mesh.vertices[last]
     chord = float(np.linalg.norm(end - start))
     turn = np.arccos(np.clip(directions[0] @ directions[1], -0.5, 1.0))
     pull = directions * chord / np.cos(turn / 4.0) ** 2
-    edge = np.linalg.norm(mesh.vertices[halves[bay, 1]] - mesh.vertices[halves[bay, 0]], axis=1).mean()
+    edge = np.linalg.norm(mesh.vertices[halves[notch, 1]] - mesh.vertices[halves[notch, 0]], axis=1).mean()
     t = np.linspace(0.0, 1.0, int(np.ceil(1.1 * chord / edge)) + 1)[1:-1, None]
-    mouth = (2 * t**3 - 3 * t**2 + 1) * start + (t**3 - 2 * t**2 + t) * pull[0]
-    mouth += (3 * t**2 - 2 * t**3) * end + (t**3 - t**2) * pull[1]
-    return fill_bay(mesh, bay, mouth)
+    closing_line = (2 * t**3 - 3 * t**2 + 1) * start + (t**3 - 2 * t**2 + t) * pull[0]
+    closing_line += (3 * t**2 - 2 * t**3) * end + (t**3 - t**2) * pull[1]
+    return fill_notch(mesh, notch, closing_line)
 
 
 def _outside(start: FloatArray, end: FloatArray, distance: SurfaceDistance) -> NDArray[np.bool_]:

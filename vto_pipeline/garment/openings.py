@@ -80,7 +80,7 @@ def close_scan_holes(
     filled = fill_holes(bridged, [shape.walk for shape, real in zip(shapes, is_opening, strict=True) if not real])
     observed = np.arange(len(filled.vertices)) < len(clean.vertices)
     if distance is not None:
-        filled = _pushed_out(filled, ~observed, distance, config.clearance_mm * 1e-3)
+        filled = _project_off_mannequin(filled, ~observed, distance, config.clearance_mm * 1e-3)
     final = fair_rims(filled, config.fair_mm * 1e-3)
     if face_components(final)[0] != 1:
         raise GarmentError(f"the garment fell apart into {face_components(final)[0]} pieces")
@@ -113,7 +113,7 @@ def _thinned(shell: TriangleMesh, edge: float, job: Job) -> TriangleMesh:
     return largest_piece(repair(decimate(shell, faces, aggressiveness=3.0), RepairConfig(weld_mm=0.0), job))
 
 
-def _pushed_out(
+def _project_off_mannequin(
     mesh: TriangleMesh, which: NDArray[np.bool_], distance: SurfaceDistance, clearance: float
 ) -> TriangleMesh:
     """Return the mesh with some vertices moved out to a distance [m] from the mannequin where they are nearer."""

@@ -9,8 +9,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from vto_pipeline.geometry.geodesic import distance_from
-from vto_pipeline.geometry.laplace import extend
-from vto_pipeline.geometry.remeshing.cut import keep_positive
+from vto_pipeline.geometry.laplace import extend_smoothly
+from vto_pipeline.geometry.remeshing.clip import clip_to_positive
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import (
     boundary_loops,
@@ -72,7 +72,7 @@ def drop_flaps(shell: TriangleMesh, width: float) -> TriangleMesh:
     core_faces = _largest_mask(core)
     seeds = source[np.unique(core.faces[core_faces])]
     reach = distance_from(shell, seeds.astype(np.int32), 8.0 * radius)
-    return largest_piece(keep_positive(shell, 1.5 * radius - np.minimum(reach, 8.0 * radius)))
+    return largest_piece(clip_to_positive(shell, 1.5 * radius - np.minimum(reach, 8.0 * radius)))
 
 
 def fair_rims(shell: TriangleMesh, wavelength: float) -> TriangleMesh:
@@ -94,7 +94,7 @@ def fair_rims(shell: TriangleMesh, wavelength: float) -> TriangleMesh:
     free[rim] = False
     band, source = submesh(shell, np.any(near[shell.faces], axis=1))
     moved = shell.vertices.copy()
-    moved[source] += extend(band, (target - shell.vertices)[source], free[source], order=1)
+    moved[source] += extend_smoothly(band, (target - shell.vertices)[source], free[source], order=1)
     return TriangleMesh(moved, shell.faces, shell.colors)
 
 

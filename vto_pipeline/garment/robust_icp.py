@@ -22,7 +22,7 @@ DEEPEST = 3.0
 
 
 @dataclass(frozen=True)
-class Alignment:
+class MannequinAlignment:
     """A placement and how well it explains the scan.
 
     Args:
@@ -57,14 +57,14 @@ def scan_noise(distance: FloatArray, deepest: float) -> float:
     return float(np.median(inside)) / 0.6745 if len(inside) else np.inf
 
 
-def refine(
+def robust_icp(
     points: FloatArray,
     normals: FloatArray,
     distance: SurfaceDistance,
     mannequin_normals: FloatArray,
     start: FloatArray,
     bands: FloatArray,
-) -> Alignment:
+) -> MannequinAlignment:
     """Refine one placement.
 
     Args:
@@ -116,7 +116,7 @@ def _moved_by(step: FloatArray, middle: FloatArray) -> FloatArray:
 
 def _evaluate(
     moved: FloatArray, away: FloatArray, plane: FloatArray, facing: FloatArray, placement: FloatArray, band: float
-) -> Alignment:
+) -> MannequinAlignment:
     over = np.clip(away / band, -DEEPEST, 1.0)
     bare = (np.abs(away) < band) & (facing > FACING)
     on = moved[bare]
@@ -124,4 +124,6 @@ def _evaluate(
     rms = float(np.sqrt(np.mean(np.square(away[bare])))) if len(on) else np.inf
     noise = scan_noise(away[facing > FACING], DEEPEST * band)
     inside = float(np.mean(away < -max(band, 4.0 * noise)))
-    return Alignment(placement, float(np.mean(np.square(over))), bare, inside, rms, noise, jacobian.T @ jacobian)
+    return MannequinAlignment(
+        placement, float(np.mean(np.square(over))), bare, inside, rms, noise, jacobian.T @ jacobian
+    )

@@ -55,7 +55,7 @@ def remesh_for_simulation(garment: TriangleMesh, config: SimulationMeshConfig, j
     made = []
     for k, piece in enumerate(pieces):
         job.progress(k / len(pieces), "remeshing")
-        made.append(_even(piece, config, job))
+        made.append(_remesh_piece(piece, config, job))
     if all(one is piece for one, piece in zip(made, pieces, strict=True)) and len(pieces) == face_components(sound)[0]:
         return sound
     whole = concatenate(made)
@@ -71,7 +71,7 @@ def remesh_for_simulation(garment: TriangleMesh, config: SimulationMeshConfig, j
     return whole
 
 
-def good_enough(mesh: TriangleMesh, config: SimulationMeshConfig) -> str | None:
+def reason_to_skip_remeshing(mesh: TriangleMesh, config: SimulationMeshConfig) -> str | None:
     """Return why a mesh can be simulated as it is, or None."""
     if not is_manifold(mesh):
         return None
@@ -108,9 +108,9 @@ def _pieces(mesh: TriangleMesh, config: SimulationMeshConfig, job: Job) -> Itera
         yield submesh(mesh, piece == k)[0]
 
 
-def _even(piece: TriangleMesh, config: SimulationMeshConfig, job: Job) -> TriangleMesh:
+def _remesh_piece(piece: TriangleMesh, config: SimulationMeshConfig, job: Job) -> TriangleMesh:
     """Return a piece in even triangles."""
-    reason = good_enough(piece, config)
+    reason = reason_to_skip_remeshing(piece, config)
     if reason and not job.force_all:
         job.leave_out("remeshing", reason)
         return piece

@@ -8,10 +8,10 @@ from pydantic import Field
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.color_model import cielab, color_evidence
-from vto_pipeline.garment.graph_cut import cut
+from vto_pipeline.garment.graph_cut import minimum_cut
 from vto_pipeline.garment.robust_icp import scan_noise
 from vto_pipeline.geometry.floor import floor_height
-from vto_pipeline.geometry.remeshing.cut import keep_positive
+from vto_pipeline.geometry.remeshing.clip import clip_to_positive
 from vto_pipeline.geometry.remeshing.repair import RepairConfig, repair
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.smooth import smooth_values
@@ -86,7 +86,7 @@ def label_garment(surface: TriangleMesh, mannequin: TriangleMesh, config: Subtra
         by_color = color_evidence(surface.colors, sure_garment, sure_bare)
         evidence = evidence + np.clip(by_color, -CERTAIN, CERTAIN)
     evidence = np.where(floor, -4.0 * CERTAIN, evidence)
-    garment = cut(evidence, edges(surface), _boundary_price(surface, config))
+    garment = minimum_cut(evidence, edges(surface), _boundary_price(surface, config))
     job.measure(noise_mm=sigma * 1e3, garment_share=float(garment.mean()))
     confidence = 1.0 / (1.0 + np.exp(-np.where(garment, evidence, -evidence)))
     return SurfaceLabels(garment, confidence)
@@ -101,7 +101,7 @@ def extract_garment(surface: TriangleMesh, labels: SurfaceLabels, config: Subtra
         GarmentError: no piece is left.
     """
     side = smooth_values(surface, np.where(labels.garment, 1.0, -1.0), rounds=10)
-    shell = keep_positive(surface, side)
+    shell = clip_to_positive(surface, side)
     shell = repair(shell, RepairConfig(weld_mm=0.001), job)
     piece, area = component_areas(shell)
     if area.max() < config.smallest_piece_cm2 * 1e-4:

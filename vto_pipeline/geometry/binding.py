@@ -54,7 +54,7 @@ def bind(rider: TriangleMesh, mesh: TriangleMesh) -> Binding:
     away = np.einsum("ij,ij->i", normals, face_normals(mesh)[face]) < _FACING
     face, turned_away = _facing_faces(face, away, points, normals, mesh)
     corners = mesh.faces[face]
-    weights = _barycentric(points, mesh.vertices[corners])
+    weights = _clamped_barycentric(points, mesh.vertices[corners])
     surface, up = _on_surface(mesh.vertices, vertex_normals(mesh), corners, weights)
     height = np.einsum("ij,ij->i", points - surface, up)
     left = points - surface - height[:, None] * up
@@ -91,7 +91,7 @@ def _facing_faces(
     return face, int((~fits.any(axis=1)).sum())
 
 
-def _barycentric(points: FloatArray, corners: FloatArray) -> FloatArray:
+def _clamped_barycentric(points: FloatArray, corners: FloatArray) -> FloatArray:
     """Return the weights of the point of each triangle (R, 3, 3) nearest in its plane, kept inside, shape (R, 3)."""
     a, ab, ac = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     ap = points - a

@@ -35,7 +35,7 @@ def laplacian(mesh: TriangleMesh) -> tuple[csr_matrix, FloatArray]:
     return matrix, np.maximum(area, 1e-3 * area.mean())
 
 
-def extend(mesh: TriangleMesh, values: FloatArray, free: NDArray[np.bool_], order: int) -> FloatArray:
+def extend_smoothly(mesh: TriangleMesh, values: FloatArray, free: NDArray[np.bool_], order: int) -> FloatArray:
     """Return values with those at the free vertices replaced by the smoothest that go with the others.
 
     Args:

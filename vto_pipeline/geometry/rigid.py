@@ -8,7 +8,7 @@ from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 
 
-def moved(mesh: TriangleMesh, target_from_mesh: FloatArray) -> TriangleMesh:
+def transform_mesh(mesh: TriangleMesh, target_from_mesh: FloatArray) -> TriangleMesh:
     """The mesh in another frame.
 
     Args:

@@ -55,7 +55,9 @@ class Section:
         return float(np.linalg.norm(points[segments[:, 0]] - points[segments[:, 1]], axis=1).sum())
 
 
-def cut(mesh: TriangleMesh, origin: FloatArray, normal: FloatArray, keep: NDArray[np.bool_] | None = None) -> Section:
+def plane_section(
+    mesh: TriangleMesh, origin: FloatArray, normal: FloatArray, keep: NDArray[np.bool_] | None = None
+) -> Section:
     """Cut a mesh by a plane. A vertex on the plane counts as above it, so that no case is special.
 
     Args:

@@ -12,7 +12,7 @@ from typing import Any
 
 from vto_pipeline.errors import ConfigError, InputError
 from vto_pipeline.io.documents import Document, load_yaml, suggest
-from vto_pipeline.io.fabric_formats.assumed import Figures, complete
+from vto_pipeline.io.fabric_formats.assumed import Figures, complete_fabric
 from vto_pipeline.io.fabric_formats.document import read_document
 from vto_pipeline.io.fabric_formats.fast import read_fast
 from vto_pipeline.io.fabric_formats.kes import read_kes
@@ -54,7 +54,7 @@ def read_fabric(fabric: str | Path | Mapping[str, Any]) -> Fabric:
         InputError: no such file, or a sheet or material that does not hold what it should.
     """
     if isinstance(fabric, Mapping):
-        return complete(_read(Document(dict(fabric), Path("the document"))))
+        return complete_fabric(_read(Document(dict(fabric), Path("the document"))))
     path = Path(fabric)
     suffix = path.suffix.lower()
     if suffix == ".u3ma":
@@ -65,7 +65,7 @@ def read_fabric(fabric: str | Path | Mapping[str, Any]) -> Fabric:
             problem = f"{str(fabric)!r} is neither a preset nor a file of type {', '.join(_LOADERS)}"
             raise ConfigError(problem, where="fabric", hint=suggest(str(fabric), names))
         path, suffix = _PRESETS / f"{fabric}.yaml", ".yaml"
-    return complete(_read(_LOADERS[suffix](path)))
+    return complete_fabric(_read(_LOADERS[suffix](path)))
 
 
 def preset_names() -> tuple[str, ...]:

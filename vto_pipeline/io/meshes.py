@@ -17,7 +17,7 @@ from vto_pipeline.io.arrays import Arrays
 from vto_pipeline.io.bodies.makehuman import BASE, parse_makehuman
 from vto_pipeline.io.bodies.smpl import parse_smpl
 from vto_pipeline.io.files import check_file, replacing
-from vto_pipeline.io.formats.clean_up import check_sound, drop_needless, join_corners, turn_outward
+from vto_pipeline.io.formats.clean_up import check_sound, drop_degenerate, merge_duplicate_vertices, turn_outward
 from vto_pipeline.io.formats.obj import parse_obj
 from vto_pipeline.io.formats.off import parse_off
 from vto_pipeline.io.formats.ply import parse_ply
@@ -65,10 +65,10 @@ def read_mesh(path: Path, *, unit: str | None = None, job: Job | None = None) ->
         raise FormatError(problem, where=str(path), hint="if it is a point cloud, give it as a cloud")
     check_sound(arrays, path)
     if suffix == ".stl":
-        arrays, more = join_corners(arrays)
+        arrays, more = merge_duplicate_vertices(arrays)
         notes += more
     count = len(arrays["vertices"])
-    arrays, needless = drop_needless(arrays)
+    arrays, needless = drop_degenerate(arrays)
     arrays, turned = turn_outward(arrays)
     vertices = to_metres(arrays["vertices"], unit, path, job)
     if job is not None:

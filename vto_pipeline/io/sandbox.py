@@ -84,10 +84,12 @@ def run_limited(
             refusal = json.loads((Path(folder) / "refusal.json").read_text(encoding="utf-8"))
             kind = FormatError if refusal["format"] else InputError
             raise kind(refusal["problem"], where=refusal["where"] or where, hint=refusal["hint"])
-        raise FormatError(_obituary(code, last_words, seconds, memory_bytes), where=where, hint="is the file damaged?")
+        raise FormatError(
+            _exit_reason(code, last_words, seconds, memory_bytes), where=where, hint="is the file damaged?"
+        )
 
 
-def _obituary(code: int, last_words: list[str], seconds: float, memory_bytes: int) -> str:
+def _exit_reason(code: int, last_words: list[str], seconds: float, memory_bytes: int) -> str:
     """Return why the child ended without an answer."""
     if code == _OUT_OF_MEMORY:
         return f"reading it needs more than {memory_bytes // 1024**2} MB of memory"

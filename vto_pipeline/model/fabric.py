@@ -79,8 +79,8 @@ class Fabric:
         for name in ("areal_density", "thickness", "stretch_warp", "stretch_weft", "shear"):
             if not 0 < getattr(self, name) < 1e9:
                 raise InputError(f"fabric {self.name}: {name} is {getattr(self, name)}; expected a positive number")
-        losses = ("bending_hysteresis", "stretch_hysteresis", "shear_hysteresis", "damping", "friction")
-        for name in ("bending_warp", "bending_weft", *losses):
+        dissipation = ("bending_hysteresis", "stretch_hysteresis", "shear_hysteresis", "damping", "friction")
+        for name in ("bending_warp", "bending_weft", *dissipation):
             if not 0 <= getattr(self, name) < 1e9:
                 raise InputError(f"fabric {self.name}: {name} is {getattr(self, name)}; expected zero or more")
         if not -0.99 < self.poisson < 0.99:

@@ -12,8 +12,8 @@ cpu_threads, kernel_cache: threads of the processor; where compiled kernels are 
 from __future__ import annotations
 
 from vto_pipeline.numerics.cpu_threads import load_tbb
-from vto_pipeline.numerics.kernel_cache import save_in_turn, use_kernel_cache
+from vto_pipeline.numerics.kernel_cache import serialise_cache_writes, use_kernel_cache
 
 use_kernel_cache()
-save_in_turn()
+serialise_cache_writes()
 load_tbb()

@@ -30,12 +30,12 @@ from vto_pipeline.numerics.separation import (
     CUBIC_MARGIN,
     HEIGHT_MARGIN,
     UNDERFLOW,
-    between,
     fixed_until,
-    lowest,
+    lerp,
+    lowest_height,
     plane_cubic,
     plane_until,
-    to_rim,
+    vector_to_rim,
 )
 from vto_pipeline.numerics.vector import cross, dot, load_at, norm, scale, sub, unit
 
@@ -104,7 +104,7 @@ def _first_time(x0, u0, v0, x1, u1, v1, four, keep):
         x1, u1, v1 = scale(factor, x1), scale(factor, u1), scale(factor, v1)
         x_size, u_size, v_size, size = factor * x_size, factor * u_size, factor * v_size, factor * size
     height_margin = HEIGHT_MARGIN * size
-    rim = to_rim(x0, u0, v0, four)
+    rim = vector_to_rim(x0, u0, v0, four)
     # Most queries end here. The rim is no nearer than the figure, so that much is kept at least.
     if fixed_until(unit(rim), keep * norm(rim) + height_margin, 0.0, x0, u0, v0, x1, u1, v1, four) == np.inf:
         return np.inf
@@ -112,14 +112,14 @@ def _first_time(x0, u0, v0, x1, u1, v1, four, keep):
     cubic_margin = CUBIC_MARGIN * x_size * u_size * v_size + UNDERFLOW
     low = 0.0
     if keep > 0.0:  # the nearest point is on the rim, or inside and as near as the plane
-        beside = lowest(unit(rim), x0, u0, v0, four) + height_margin
+        beside = lowest_height(unit(rim), x0, u0, v0, four) + height_margin
         low = keep * min(norm(rim), max(beside, (abs(height[0]) + cubic_margin) / area[0]))
     t = 0.0
     for _ in range(_ROUNDS):
-        x, u, v = between(x0, x1, t), between(u0, u1, t), between(v0, v1, t)
+        x, u, v = lerp(x0, x1, t), lerp(u0, u1, t), lerp(v0, v1, t)
         until = max(
             plane_until(height, area, low, cubic_margin, t),
-            fixed_until(unit(to_rim(x, u, v, four)), low + height_margin, t, x0, u0, v0, x1, u1, v1, four),
+            fixed_until(unit(vector_to_rim(x, u, v, four)), low + height_margin, t, x0, u0, v0, x1, u1, v1, four),
         )
         if not until - t > _WORTH:
             normal = unit(cross(u, v))

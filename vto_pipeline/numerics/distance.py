@@ -109,6 +109,6 @@ def _apart_sq(u, v, w, shares):
 
 
 @njit(cache=True, error_model="numpy")
-def blend(weights, a, b, c):
+def barycentric_point(weights, a, b, c):
     """Return the point with these barycentric weights."""
     return axpy(weights[0], a, axpy(weights[1], b, scale(weights[2], c)))

@@ -39,7 +39,7 @@ def use_kernel_cache() -> None:
             shutil.rmtree(old, ignore_errors=True)
 
 
-def save_in_turn() -> None:
+def serialise_cache_writes() -> None:
     """Let one process at a time look for the name of a free file and take it. Once."""
     save = IndexDataCacheFile.save
 

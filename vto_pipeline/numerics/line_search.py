@@ -9,7 +9,7 @@ _ROUNDING = 1e-10  # relative difference of two values that may be none
 _FLATTER = 0.9  # share of a slope that counts as less
 
 
-def halvings(shortest: float) -> Iterator[float]:
+def backtracking_shares(shortest: float) -> Iterator[float]:
     """Yield 1, ½, ¼ ... as long as they are above the shortest share of a step worth taking."""
     share = 1.0
     while share > shortest:
@@ -17,7 +17,7 @@ def halvings(shortest: float) -> Iterator[float]:
         share *= 0.5
 
 
-def falls_enough(
+def satisfies_armijo(
     value: float,
     slope: float,
     share: float,

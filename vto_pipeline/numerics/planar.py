@@ -8,7 +8,7 @@ from numba import njit
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def way_to(points, i, j):
+def difference(points, i, j):
     """Return the way from point i to point j."""
     return points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
 
@@ -35,7 +35,7 @@ def least_turn(a, da, b, db):
 @njit(cache=True, error_model="numpy", forceinline=True)
 def gap_sq(points, i, j):
     """Return the square of the distance of two points."""
-    x, y = way_to(points, i, j)
+    x, y = difference(points, i, j)
     return x * x + y * y
 
 
@@ -59,14 +59,14 @@ def segment_distance(points, i, j, k, m):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _side(points, i, j, k):
-    a, b = way_to(points, i, j), way_to(points, i, k)
+    a, b = difference(points, i, j), difference(points, i, k)
     return a[0] * b[1] - a[1] * b[0]
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _to_segment_sq(points, i, j, k):
     """Return the square of the distance of a point from a segment."""
-    a, b = way_to(points, j, k), way_to(points, j, i)
+    a, b = difference(points, j, k), difference(points, j, i)
     length_sq = a[0] * a[0] + a[1] * a[1]
     share = min(max((a[0] * b[0] + a[1] * b[1]) / length_sq, 0.0), 1.0) if length_sq > 0.0 else 0.0
     x, y = b[0] - share * a[0], b[1] - share * a[1]

@@ -35,14 +35,14 @@ _CLIPS = 64  # of a cubic; each about squares the error, save where roots meet
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def between(a, b, t):
+def lerp(a, b, t):
     """Return (1 - t) a + t b, exact at both ends."""
     r = 1.0 - t
     return r * a[0] + t * b[0], r * a[1] + t * b[1], r * a[2] + t * b[2]
 
 
 @njit(cache=True, error_model="numpy")
-def to_rim(x, u, v, four):
+def vector_to_rim(x, u, v, four):
     """Return the vector from the origin to the nearest point of the figure's rim.
 
     Which edge that is decides only how long the plane across the vector holds, never whether it may be trusted.
@@ -77,7 +77,7 @@ def _to_segment(x, u):
 
 
 @njit(cache=True, error_model="numpy")
-def lowest(n, x, u, v, four):
+def lowest_height(n, x, u, v, four):
     """Return the height along n of the lowest corner."""
     first, second = dot(n, u), dot(n, v)
     if four:

@@ -30,11 +30,11 @@ class Catalogue:
 
     def __post_init__(self) -> None:
         names = [kind.name for kind in self.kinds]
-        _refuse_twins("artifact", names)
-        _refuse_twins("stage", [stage.name for stage in self.stages])
+        _refuse_duplicates("artifact", names)
+        _refuse_duplicates("stage", [stage.name for stage in self.stages])
         made = {artifact for stage in self.stages for artifact in stage.makes}
         files = [k.filename for k in self.kinds if k.name in made]
-        _refuse_twins("file name", files + [name for k in self.kinds for name, _ in k.previews])
+        _refuse_duplicates("file name", files + [name for k in self.kinds for name, _ in k.previews])
         named = {a for stage in self.stages for a in (*stage.needs, *stage.makes, *stage.optional)}
         unknown = (named | set(self.given.values())) - set(names)
         if unknown:
@@ -67,7 +67,7 @@ class Catalogue:
         return [key for key, name in self.given.items() if name == artifact]
 
 
-def _refuse_twins(what: str, names: list[str]) -> None:
+def _refuse_duplicates(what: str, names: list[str]) -> None:
     twins = sorted({name for name in names if names.count(name) > 1})
     if twins:
         raise ValueError(f"{what} named twice: {twins}")

@@ -21,7 +21,7 @@ class DressConfig(Config):
     )
 
 
-def dress(
+def deform_render_mesh(
     garment: TriangleMesh, sim_mesh: TriangleMesh, draped: TriangleMesh, config: DressConfig, job: Job
 ) -> list[GlbPart]:
     """Move the detailed garment as the simulation mesh has moved.

@@ -10,7 +10,7 @@ from vto_pipeline.geometry.topology import concatenate, vertex_normals
 from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.render.rasterise import rasterise
-from vto_pipeline.render.shading import crevices, light
+from vto_pipeline.render.shading import crevices, matt_brightness
 
 FRONT, LEFT, BACK = 0.0, 90.0, 180.0
 """Where the viewer stands [deg]: before the person, at the person's left, behind."""
@@ -62,7 +62,7 @@ def render_picture(
     u, v = corners[shown, 1, :2] - corners[shown, 0, :2], corners[shown, 2, :2] - corners[shown, 0, :2]
     far_side = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] > 0  # rows run down, so outer sides run clockwise
     normal, color = ((share @ values[whole.faces[shown]])[:, 0] for values in (normals, colors.astype(np.float64)))
-    brightness = light(normal, far_side) * crevices(depth / pixels_per_metre)[seen]
+    brightness = matt_brightness(normal, far_side) * crevices(depth / pixels_per_metre)[seen]
     picture = np.full((height, width, 3), _PAPER)
     picture[seen] = color * brightness[:, None]
     averaged = picture.reshape(size[1], _SAMPLES, size[0], _SAMPLES, 3).mean(axis=(1, 3))

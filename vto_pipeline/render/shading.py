@@ -17,7 +17,7 @@ _DEEP = 0.03  # [m] behind the surroundings, where a fold is darkest
 _DARKEST = 0.55
 
 
-def light(normal: FloatArray, far_side: NDArray[np.bool_]) -> FloatArray:
+def matt_brightness(normal: FloatArray, far_side: NDArray[np.bool_]) -> FloatArray:
     """Return the brightness of matt surfaces, 0 to 1, shape (N,).
 
     Args:

@@ -31,7 +31,7 @@ _PLAIN = (  # artifact, name, group, colour where it has none of its own
 
 
 @dataclass(frozen=True)
-class Layer:
+class PageLayer:
     """One thing that can be shown or hidden.
 
     Args:
@@ -49,7 +49,7 @@ class Layer:
     scale: Ramp | Key | None = None
 
 
-def list_layers(parts: Mapping[str, Any]) -> list[Layer]:
+def list_layers(parts: Mapping[str, Any]) -> list[PageLayer]:
     """Return the layers that can be shown; the best of each group comes first.
 
     Args:
@@ -59,17 +59,17 @@ def list_layers(parts: Mapping[str, Any]) -> list[Layer]:
     for artifact, name, group, color in _PLAIN:
         if artifact in parts:
             mesh = _surface(parts[artifact])
-            layers.append(Layer(name, mesh, group, color if mesh.colors is None else mesh.colors))
+            layers.append(PageLayer(name, mesh, group, color if mesh.colors is None else mesh.colors))
     avatar = parts.get("avatar")
     if isinstance(avatar, Avatar) and avatar.loops:
-        layers.append(Layer("Where it was measured", loop_ribbons(avatar), "marks", _TAPE))
+        layers.append(PageLayer("Where it was measured", loop_ribbons(avatar), "marks", _TAPE))
     if "draped" in parts and "fit_maps" in parts:
         maps, draped = parts["fit_maps"], parts["draped"]
-        layers.append(Layer("Stretch", draped, "garment", STRETCH.paint(100 * (maps["stretch"] - 1)), STRETCH))
-        layers.append(Layer("Clearance", draped, "garment", CLEARANCE.paint(maps["clearance_mm"]), CLEARANCE))
+        layers.append(PageLayer("Stretch", draped, "garment", STRETCH.paint(100 * (maps["stretch"] - 1)), STRETCH))
+        layers.append(PageLayer("Clearance", draped, "garment", CLEARANCE.paint(maps["clearance_mm"]), CLEARANCE))
     if "garment_surface" in parts and "labels" in parts:
         surface = parts["garment_surface"]
-        layers.append(Layer("Labels", surface, "scan", SCAN.paint(np.where(parts["labels"].garment, 0, 1)), SCAN))
+        layers.append(PageLayer("Labels", surface, "scan", SCAN.paint(np.where(parts["labels"].garment, 0, 1)), SCAN))
     return sorted(layers, key=lambda layer: _GROUPS.index(layer.group))
 
 

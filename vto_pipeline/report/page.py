@@ -8,8 +8,8 @@ from typing import Any
 
 from vto_pipeline.report.chart import log_chart
 from vto_pipeline.report.layers import list_layers
-from vto_pipeline.report.scene import build_scene, script_json
-from vto_pipeline.report.tables import left_out_rows, measurement_rows
+from vto_pipeline.report.scene import build_page_scene, script_json
+from vto_pipeline.report.tables import left_out_table, measurement_table
 from vto_pipeline.report.verdicts import collect_verdicts, fit_reports
 from vto_pipeline.report.wording import centimetres, duration, figure, label, number
 
@@ -36,17 +36,17 @@ def build_page(run_record: Mapping[str, Any], parts: Mapping[str, Any]) -> str:
         title=_title(parts),
         style=_asset("page.css"),
         viewer=_asset("viewer.js"),
-        scene=script_json(build_scene(layers)) if layers else "",
+        scene=script_json(build_page_scene(layers)) if layers else "",
         verdicts=collect_verdicts(run_record, parts),
         fits=fit_reports(parts),
-        measurements=measurement_rows(parts.get("measurements"), parts.get("body_measurements")),
+        measurements=measurement_table(parts.get("measurements"), parts.get("body_measurements")),
         openings=parts.get("openings", []),
         audit=parts.get("audit", {}),
         chart=log_chart([r.seconds for r in trace], [r.error_mm for r in trace], "run time [s]", "error [mm]"),
         trace_end=trace[-1] if trace else None,
         run=run_record,
         stages=[stage for stage in run_record.get("stages", []) if stage["status"] not in ("left_out", "planned")],
-        left_out=left_out_rows(run_record),
+        left_out=left_out_table(run_record),
     )
 
 

@@ -6,14 +6,14 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from vto_pipeline.report.layers import Layer
+from vto_pipeline.report.layers import PageLayer
 from vto_pipeline.report.packing import pack, pack_colors
 
 _TRIANGLES = 60_000  # of one mesh
 _TRIANGLES_ALL = 240_000  # of all meshes; keeps the page under 8 MB
 
 
-def build_scene(layers: Sequence[Layer]) -> dict[str, Any]:
+def build_page_scene(layers: Sequence[PageLayer]) -> dict[str, Any]:
     """Return geometries, and layers that refer to them by number.
 
     A mesh that several layers show is packed once. The first layer of each group starts visible, a scan only when there

@@ -26,7 +26,7 @@ class MeasurementRow:
     given: float | None
 
 
-def measurement_rows(measured: Measurements | None, given: Measurements | None) -> list[MeasurementRow]:
+def measurement_table(measured: Measurements | None, given: Measurements | None) -> list[MeasurementRow]:
     """Return what was measured on the avatar beside what was asked for, in the order of the measurements."""
     if measured is None:
         return []
@@ -37,7 +37,7 @@ def measurement_rows(measured: Measurements | None, given: Measurements | None) 
     ]
 
 
-def left_out_rows(run_record: Mapping[str, Any]) -> list[tuple[str, str]]:
+def left_out_table(run_record: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return what was not done and why: whole stages first, then parts of stages that ran."""
     stages = run_record.get("stages", [])
     whole = [(stage["name"], stage["reason"]) for stage in stages if stage["status"] == "left_out"]

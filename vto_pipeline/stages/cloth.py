@@ -13,7 +13,7 @@ from vto_pipeline.avatar.scan.body_transfer import transfer_motion
 from vto_pipeline.cloth.drape import drape
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.placement.regrade import GradeConfig, worn_rest
-from vto_pipeline.io.fabric_formats.assumed import told
+from vto_pipeline.io.fabric_formats.assumed import assumption_notes
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.garment import Garment
 from vto_pipeline.model.job import Job
@@ -53,7 +53,7 @@ def _grade(inputs: Inputs, settings: GradeConfig, job: Job) -> Outputs:
 
 
 def _drape(inputs: Inputs, settings: DrapeConfig, job: Job) -> Outputs:
-    for text in told(inputs["fabric"]):
+    for text in assumption_notes(inputs["fabric"]):
         job.note(text)
     garment = Garment(inputs["sim_mesh"], inputs["worn_rest"])
     draped = drape(garment, inputs["collider"], inputs["fabric"], settings, job)

@@ -14,7 +14,7 @@ from vto_pipeline.garment.simulation_mesh import SimulationMeshConfig, remesh_fo
 from vto_pipeline.garment.subtract import SubtractConfig, extract_garment, label_garment
 from vto_pipeline.garment.wearable import check_wearable
 from vto_pipeline.geometry.remeshing.repair import RepairConfig, repair
-from vto_pipeline.geometry.rigid import moved
+from vto_pipeline.geometry.rigid import transform_mesh
 from vto_pipeline.model.garment import SurfaceLabels
 from vto_pipeline.model.job import Job
 from vto_pipeline.pipeline.stage import Stage
@@ -31,7 +31,7 @@ def _align(inputs: Inputs, settings: AlignConfig, job: Job) -> Outputs:
 def _subtract(inputs: Inputs, settings: SubtractConfig, job: Job) -> Outputs:
     surface = inputs["garment_surface"]
     if "garment_placement" in inputs:
-        surface = moved(surface, inputs["garment_placement"])
+        surface = transform_mesh(surface, inputs["garment_placement"])
         labels = label_garment(surface, inputs["mannequin_surface"], settings, job)
     else:
         job.leave_out("subtraction", "no mannequin was given: the whole scan is garment")

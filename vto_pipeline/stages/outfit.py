@@ -16,7 +16,7 @@ from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.outfit.layers import drape_layers
 from vto_pipeline.errors import ConfigError, FormatError
 from vto_pipeline.io.documents import Document
-from vto_pipeline.io.fabric_formats.assumed import told
+from vto_pipeline.io.fabric_formats.assumed import assumption_notes
 from vto_pipeline.model.artifact import ArtifactKind
 from vto_pipeline.model.garment import Garment
 from vto_pipeline.model.job import Job
@@ -83,7 +83,7 @@ def names_in_run(record: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(name for name, _, row in rows if name and row == "take_mesh")
 
 
-def spelt_out(document: Document, names: Sequence[str]) -> Document:
+def expand_document(document: Document, names: Sequence[str]) -> Document:
     """Return the document with the fabric that garments share given for each, and what is wanted of each named."""
     if not names:
         return document
@@ -201,7 +201,7 @@ def _drape_row(stage: Stage, names: Sequence[str]) -> Stage:
         layers = []
         for name in names:
             fabric = inputs[_own("fabric", name)]
-            job.notes += [f"{name}: {text}" for text in told(fabric)]
+            job.notes += [f"{name}: {text}" for text in assumption_notes(fabric)]
             garment = Garment(inputs[_own("sim_mesh", name)], inputs[_own("worn_rest", name)])
             layers.append(Layer(name, garment, fabric))
         outfit = drape_layers(layers, inputs["collider"], settings, job)

@@ -43,7 +43,7 @@ def outfit_page(stage: Stage, names: Sequence[str]) -> Stage:
             parts["fit_maps"] = {key: np.concatenate([one[key] for one in maps]) for key in maps[0]}
         if found["render_mesh"]:
             parts["render_mesh"] = [
-                _told_apart(part, name, names) for name, some in found["render_mesh"].items() for part in some
+                _named_part(part, name, names) for name, some in found["render_mesh"].items() for part in some
             ]
         parts["fit_reports"] = found["fit_report"]
         if "audit" in parts:
@@ -53,7 +53,7 @@ def outfit_page(stage: Stage, names: Sequence[str]) -> Stage:
     return replace(stage, optional=(*_SHARED, *own), run=run)
 
 
-def _told_apart(part: GlbPart, name: str, names: Sequence[str]) -> GlbPart:
+def _named_part(part: GlbPart, name: str, names: Sequence[str]) -> GlbPart:
     """Return a part with its garment's name, and a colour where it has none of its own."""
     plain = part.mesh.colors is None and part.texture is None
     color = (*_COLORS[names.index(name) % len(_COLORS)], 1.0) if plain else part.base_color

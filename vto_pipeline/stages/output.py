@@ -9,14 +9,14 @@ import numpy as np
 
 from vto_pipeline.assess.fit import FitConfig, assess_fit
 from vto_pipeline.avatar.measuring.avatar_measurements import fit_levels
-from vto_pipeline.avatar.template.regions import trunk
+from vto_pipeline.avatar.template.regions import trunk_vertices
 from vto_pipeline.cloth.judge.worn import vertex_maps
 from vto_pipeline.geometry.topology import face_area_vectors
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
 from vto_pipeline.pipeline.stage import Stage
-from vto_pipeline.render.dress import DressConfig, dress
+from vto_pipeline.render.dress import DressConfig, deform_render_mesh
 from vto_pipeline.render.marks import mark_places
 from vto_pipeline.report.page import build_page
 
@@ -25,7 +25,7 @@ Outputs = Mapping[str, Any]
 
 
 def _transfer(inputs: Inputs, settings: DressConfig, job: Job) -> Outputs:
-    return {"render_mesh": dress(inputs["garment"], inputs["sim_mesh"], inputs["draped"], settings, job)}
+    return {"render_mesh": deform_render_mesh(inputs["garment"], inputs["sim_mesh"], inputs["draped"], settings, job)}
 
 
 def _assess(inputs: Inputs, settings: FitConfig, job: Job) -> Outputs:
@@ -41,7 +41,7 @@ def _assess(inputs: Inputs, settings: FitConfig, job: Job) -> Outputs:
         inputs["fabric"],
         settings,
         job,
-        trunk=None if avatar is None else trunk(avatar),
+        trunk=None if avatar is None else trunk_vertices(avatar),
         observed_share=_observed_share(inputs),
         mode=inputs["worn_rest"].worn_as,
     )

@@ -37,7 +37,7 @@ _STEEPEST = 0.6
 
 
 @dataclass(frozen=True)
-class Level:
+class MeasuringLevel:
     """How one level is found.
 
     Args:
@@ -65,13 +65,13 @@ class Level:
 
 
 LEVELS = (
-    Level("ankle", "narrowest", 0.040, 0.006, 0.004),
-    Level("calf", "widest", 0.050, 0.020, 0.004),
-    Level("knee", "narrowest", 0.050, 0.012, 0.002, above=0.11),
-    Level("hip", "rearmost", 0.050, 0.020, 0.002),
-    Level("waist", "narrowest", 0.045, 0.015, 0.004),
-    Level("chest", "foremost", 0.040, 0.010, 0.002),
-    Level("neck", "narrowest", 0.025, 0.008, 0.004, above=-0.006),
+    MeasuringLevel("ankle", "narrowest", 0.040, 0.006, 0.004),
+    MeasuringLevel("calf", "widest", 0.050, 0.020, 0.004),
+    MeasuringLevel("knee", "narrowest", 0.050, 0.012, 0.002, above=0.11),
+    MeasuringLevel("hip", "rearmost", 0.050, 0.020, 0.002),
+    MeasuringLevel("waist", "narrowest", 0.045, 0.015, 0.004),
+    MeasuringLevel("chest", "foremost", 0.040, 0.010, 0.002),
+    MeasuringLevel("neck", "narrowest", 0.025, 0.008, 0.004, above=-0.006),
 )
 """Lowest first. Where a body has no such extreme within reach, as a belly without a waist, the row stays.
 
@@ -126,13 +126,15 @@ def level_spread(upright: FloatArray, body: Avatar) -> dict[str, float]:
     return spread
 
 
-def _found(level: Level, upright: FloatArray, body: Avatar, row: str, floor: float) -> float | None:
+def _found(level: MeasuringLevel, upright: FloatArray, body: Avatar, row: str, floor: float) -> float | None:
     at, value = _profile(level, upright, body, row, floor)
     peak = _peak(at, value, level)
     return None if peak is None else floor + (1 + level.above) * (peak - floor)
 
 
-def _profile(level: Level, upright: FloatArray, body: Avatar, row: str, floor: float) -> tuple[FloatArray, FloatArray]:
+def _profile(
+    level: MeasuringLevel, upright: FloatArray, body: Avatar, row: str, floor: float
+) -> tuple[FloatArray, FloatArray]:
     """Return the heights about a row and what is largest at the level there."""
     links = _links(body, row)
     middle = floor + (float(upright[body.loops[row], 1].mean()) - floor) / (1 + level.above)
@@ -141,7 +143,9 @@ def _profile(level: Level, upright: FloatArray, body: Avatar, row: str, floor: f
     return at, np.array([_value(_cut(upright, links, y), level.extreme) for y in at])
 
 
-def with_rows_at(space: ShapeSpace, parameters: FloatArray, upright: FloatArray, found: dict[str, float]) -> ShapeSpace:
+def with_rows_at_levels(
+    space: ShapeSpace, parameters: FloatArray, upright: FloatArray, found: dict[str, float]
+) -> ShapeSpace:
     """Return the shape space with its base slid along itself, so that rows come to lie at their levels.
 
     Args:
@@ -217,7 +221,7 @@ def _value(points: FloatArray, extreme: str) -> float:
     return float(points[:, 2].max() if extreme == "foremost" else -points[:, 2].min())
 
 
-def _peak(at: FloatArray, value: FloatArray, level: Level) -> float | None:
+def _peak(at: FloatArray, value: FloatArray, level: MeasuringLevel) -> float | None:
     """Return where the highest prominent maximum of the smoothed profile lies, within reach; None if there is none."""
     smooth = gaussian_filter1d(value, level.width / _STEP_M, mode="nearest")
     inner = find_peaks(smooth, prominence=level.prominence)[0]

@@ -120,7 +120,7 @@ def population(sex: str) -> Population:
     return Population(women.names, (women.mean + men.mean) / 2, covariance)
 
 
-def complete(measurements: Measurements) -> Measurements:
+def complete_measurements(measurements: Measurements) -> Measurements:
     """Return the given measurements and the expected rest, each with its standard uncertainty [m, kg]."""
     values = {definition(name).name: value for name, value in measurements.values.items()}
     sigmas = {definition(name).name: value for name, value in measurements.sigmas.items()}

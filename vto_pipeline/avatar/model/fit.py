@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vto_pipeline.avatar.model.pose import joint_transforms, skin
+from vto_pipeline.avatar.model.pose import joint_transforms, linear_blend_skinning
 from vto_pipeline.avatar.model.shape import ShapeSpace
 from vto_pipeline.model.arrays import FloatArray
 
@@ -26,7 +26,7 @@ class Fit:
     expected: FloatArray
 
 
-def model(space: ShapeSpace, fit: Fit) -> FloatArray:
+def posed_vertices(space: ShapeSpace, fit: Fit) -> FloatArray:
     """Return the posed vertices, shape (V, 3)."""
     rotation, offset = joint_transforms(space.joints(fit.parameters), space.base.parents, fit.pose)
-    return skin(space.vertices(fit.parameters), space.base.weights, rotation, offset) + fit.translation
+    return linear_blend_skinning(space.vertices(fit.parameters), space.base.weights, rotation, offset) + fit.translation

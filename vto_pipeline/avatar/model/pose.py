@@ -38,7 +38,7 @@ def pose_avatar(avatar: Avatar, pose: FloatArray, translation: FloatArray) -> Av
 
     """
     rotation, offset = joint_transforms(avatar.joints, avatar.parents, pose)
-    turn, place = blend(avatar.weights, rotation, offset)
+    turn, place = blend_transforms(avatar.weights, rotation, offset)
     vertices = np.einsum("vij,vj->vi", turn, avatar.bind_vertices) + place + translation
     return replace(avatar, pose=pose, translation=np.asarray(translation, dtype=float), vertices=vertices)
 
@@ -62,7 +62,7 @@ def parent_rotations(rotation: FloatArray, parents: np.ndarray) -> FloatArray:
     return np.stack([np.eye(3) if parent < 0 else rotation[parent] for parent in parents])
 
 
-def turned_pose(pose: FloatArray, turn: FloatArray, above: FloatArray) -> FloatArray:
+def compose_pose(pose: FloatArray, turn: FloatArray, above: FloatArray) -> FloatArray:
     """Return a pose whose joints are turned further, shape (J, 3).
 
     Args:
@@ -77,7 +77,7 @@ def turned_pose(pose: FloatArray, turn: FloatArray, above: FloatArray) -> FloatA
     return turned
 
 
-def blend(weights: FloatArray, rotation: FloatArray, offset: FloatArray) -> tuple[FloatArray, FloatArray]:
+def blend_transforms(weights: FloatArray, rotation: FloatArray, offset: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return what happens to each vertex, x -> R x + t, shapes (V, 3, 3) and (V, 3): always a rigid motion.
 
     Dual quaternion linear blending (Kavan et al. 2007, eq. 18).
@@ -109,7 +109,9 @@ def blend(weights: FloatArray, rotation: FloatArray, offset: FloatArray) -> tupl
     return Rotation.from_quat(mixed).as_matrix(), s * d - e * v + np.cross(v, d)
 
 
-def skin(vertices: FloatArray, weights: FloatArray, rotation: FloatArray, offset: FloatArray) -> FloatArray:
+def linear_blend_skinning(
+    vertices: FloatArray, weights: FloatArray, rotation: FloatArray, offset: FloatArray
+) -> FloatArray:
     """Return the vertices moved by the linear blend of their joints (Magnenat-Thalmann et al. 1988), shape (V, 3)."""
     blended = (weights @ rotation.reshape(len(rotation), 9)).reshape(-1, 3, 3)
     return np.einsum("vij,vj->vi", blended, vertices) + weights @ offset

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from vto_pipeline.avatar.model.pose import pose_avatar
-from vto_pipeline.avatar.template.body_plan import BodyPlan, blended
+from vto_pipeline.avatar.template.body_plan import BodyPlan, interpolated_plan
 from vto_pipeline.avatar.template.implicit import arm_axis, smooth_min, smoothstep
 from vto_pipeline.avatar.template.template import ARM, JOINT_KINDS, LEG, membership, template
 from vto_pipeline.model.arrays import FloatArray
@@ -85,7 +85,7 @@ def shape_space(sex: float) -> ShapeSpace:
     base = template(sex)
     arm, leg = membership("arm"), membership("leg")
     on_arm, on_leg = (np.isin(JOINT_KINDS, kinds).astype(float) for kinds in (ARM, LEG))
-    plan = blended(sex)
+    plan = interpolated_plan(sex)
     skin = _fields(plan, base.bind_vertices, arm, leg)
     bone = _fields(plan, base.joints, on_arm, on_leg)
     names = tuple(skin)

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from vto_pipeline.avatar.model.fit import Fit
-from vto_pipeline.avatar.model.pose import blend, joint_transforms, pose_avatar
+from vto_pipeline.avatar.model.pose import blend_transforms, joint_transforms, pose_avatar
 from vto_pipeline.avatar.model.shape import ShapeSpace
 from vto_pipeline.avatar.model.stance import Stance
-from vto_pipeline.avatar.scan.displacement import untangle
+from vto_pipeline.avatar.scan.displacement import untangle_displacement
 from vto_pipeline.avatar.template.template import JOINTS, membership
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Avatar
@@ -50,7 +50,7 @@ def to_bind_pose(
     """
     faces, weights = space.base.faces, space.base.weights
     rotation, offset = joint_transforms(stands.joints, space.base.parents, stands.pose)
-    turn, place = blend(weights, rotation, offset)
+    turn, place = blend_transforms(weights, rotation, offset)
     place = place + stands.translation
 
     def at_rest(points: FloatArray) -> FloatArray:
@@ -59,9 +59,9 @@ def to_bind_pose(
 
     straight = at_rest(posed)
     for _ in range(_MENDING_ROUNDS):
-        vertices, bad = untangle(posed, vertices, faces)
+        vertices, bad = untangle_displacement(posed, vertices, faces)
         bind = at_rest(vertices)
-        mended, bad_bind = untangle(straight, bind, faces)
+        mended, bad_bind = untangle_displacement(straight, bind, faces)
         vertices = np.einsum("vab,vb->va", turn, mended) + place
         if np.array_equal(mended, bind):
             break

@@ -38,11 +38,11 @@ class Zone:
 
     Args:
         rows: Where its girth is looked at.
-        tight: How likely it is to be bare or tightly covered; our assumption.
+        tight_probability: How likely it is to be bare or tightly covered; our assumption.
     """
 
     rows: tuple[str, ...]
-    tight: float
+    tight_probability: float
 
 
 ZONES = (
@@ -98,10 +98,12 @@ def _likelihood(seen: Population, clothes: Measurements, zones: tuple[Zone, ...]
         eases = np.array([clothes.values[name] for name in names]) - seen.mean[at] - away[:, at]
         least, ease = eases.argmin(axis=1), eases.min(axis=1)
         unsure = np.hypot(_TIGHT_M, [clothes.sigmas.get(name, 0.0) for name in names])[least]
-        tight = -0.5 * (ease / unsure) ** 2 - np.log(np.sqrt(2 * np.pi) * unsure)
+        log_tight = -0.5 * (ease / unsure) ** 2 - np.log(np.sqrt(2 * np.pi) * unsure)
         room = np.maximum(ease, 1e-9)
-        loose = np.log(room / _EASE_M**2) - room / _EASE_M
+        log_loose = np.log(room / _EASE_M**2) - room / _EASE_M
         # who does not fit inside is as unlikely as a tape is wrong
-        loose = np.where(ease > 0, loose, -np.inf)
-        total += np.logaddexp(np.log(zone.tight) + tight, np.log(1 - zone.tight) + loose)
+        log_loose = np.where(ease > 0, log_loose, -np.inf)
+        total += np.logaddexp(
+            np.log(zone.tight_probability) + log_tight, np.log(1 - zone.tight_probability) + log_loose
+        )
     return total

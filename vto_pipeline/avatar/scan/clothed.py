@@ -14,11 +14,11 @@ from vto_pipeline.avatar.measuring.avatar_measurements import measure_avatar, se
 from vto_pipeline.avatar.measuring.definitions import DEFINITIONS
 from vto_pipeline.avatar.measuring.population import Population, population
 from vto_pipeline.avatar.measuring.tape import Tape
-from vto_pipeline.avatar.model.fit import Fit, model
+from vto_pipeline.avatar.model.fit import Fit, posed_vertices
 from vto_pipeline.avatar.model.shape import ShapeSpace
 from vto_pipeline.avatar.scan.body_under_clothes import likely_wearers
 from vto_pipeline.avatar.scan.correspondence import Target
-from vto_pipeline.avatar.scan.registration import refine
+from vto_pipeline.avatar.scan.registration import refine_registration
 from vto_pipeline.avatar.scan.report import CORE, extremity_weights
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Avatar, Measurements
@@ -53,8 +53,8 @@ def fit_under_clothes(
     chosen = np.flatnonzero(extremity_weights(space) < CORE)[::3]
     clothes = scan.as_clothes((_WITHIN_M / _LOOSE_M) ** 2)
     for _ in range(_STEPS):
-        pairs = clothes.pairs(model(space, found), space.base.faces, chosen, _REACH_M)
-        found = refine(space, found, pairs, _WITHIN_M, _SHAPE_STAYS)
+        pairs = clothes.pairs(posed_vertices(space, found), space.base.faces, chosen, _REACH_M)
+        found = refine_registration(space, found, pairs, _WITHIN_M, _SHAPE_STAYS)
     return replace(found, parameters=parameters), _sigmas(space, parameters, expected)
 
 

@@ -23,7 +23,7 @@ _THROUGH_M = 0.003
 
 
 @dataclass(frozen=True)
-class Pairs:
+class Correspondences:
     """Points of the model and the tangent planes of the scan they should lie on.
 
     Args:
@@ -40,10 +40,12 @@ class Pairs:
     normals: FloatArray
     weights: FloatArray
 
-    def weighted(self) -> Pairs:
+    def weighted(self) -> Correspondences:
         """Return only the pairs that have a weight."""
         kept = self.weights > _NO_WEIGHT
-        return Pairs(self.corners[kept], self.shares[kept], self.targets[kept], self.normals[kept], self.weights[kept])
+        return Correspondences(
+            self.corners[kept], self.shares[kept], self.targets[kept], self.normals[kept], self.weights[kept]
+        )
 
 
 class Target:
@@ -98,7 +100,7 @@ class Target:
         """Return the weight of points of the scan by how far outside the model they lie [m], negative inside."""
         return np.where(ahead > -_THROUGH_M, self._outside, 1.0)
 
-    def pairs(self, vertices: FloatArray, faces: IntArray, chosen: NDArray[np.int64], reach: float) -> Pairs:
+    def pairs(self, vertices: FloatArray, faces: IntArray, chosen: NDArray[np.int64], reach: float) -> Correspondences:
         """Match probes of the scan with the model, and chosen vertices of the model with the scan."""
         body = TriangleMesh(vertices, faces)
         normal = face_normals(body)
@@ -109,7 +111,7 @@ class Target:
         shares = barycentric(closest, vertices[faces[face]])
         facing = vertex_normals(body)[chosen]
         at, ahead, pull = self.closest_on_scan(vertices, faces, chosen, facing, reach)
-        return Pairs(
+        return Correspondences(
             np.concatenate([faces[face], np.repeat(chosen[:, None], 3, axis=1)]).astype(np.int64),
             np.concatenate([shares, np.tile([1.0, 0.0, 0.0], (len(chosen), 1))]),
             np.concatenate([self.probes, at]),

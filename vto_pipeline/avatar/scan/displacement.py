@@ -98,7 +98,7 @@ def _residual_correlation(target: Target, vertices: FloatArray, faces: IntArray,
     return morans_i(points, normals, ((points - closest[near]) * normals).sum(axis=1))
 
 
-def untangle(start: FloatArray, vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, int]:
+def untangle_displacement(start: FloatArray, vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, int]:
     """Smooth the displacement where faces flipped or pass through each other, then take it back there.
 
     Args:

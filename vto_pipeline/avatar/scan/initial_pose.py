@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from vto_pipeline.avatar.model.pose import named_pose
-from vto_pipeline.avatar.scan.upright import inside_out, turns_upright, without_floor
+from vto_pipeline.avatar.scan.upright import candidate_up_rotations, inside_out, without_floor
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.errors import AvatarError
 from vto_pipeline.geometry.sampling import sample_surface
@@ -58,7 +58,7 @@ def upright_initial_poses(scan: TriangleMesh, job: Job) -> tuple[TriangleMesh, l
         job: Notified of a turn.
     """
     best: tuple[float, str, bool, TriangleMesh, list[InitialPose]] | None = None
-    for name, turn in turns_upright(scan).items():
+    for name, turn in candidate_up_rotations(scan).items():
         stands = without_floor(TriangleMesh(scan.vertices @ turn.T, scan.faces))
         if over := inside_out(stands):
             stands = TriangleMesh(stands.vertices, stands.faces[:, ::-1])
@@ -107,15 +107,15 @@ def _best(probes: FloatArray, yaw: float) -> InitialPose:
     for name in ("a_pose", "arms_down", "t_pose"):
         points = named_pose(body, name).vertices
         tree = cKDTree(points[::2])
-        for scale, lift in _sizes(turned, height, stature):
-            local = (turned - [0.0, lift, 0.0]) / scale
+        for scale, floor_y in _sizes(turned, height, stature):
+            local = (turned - [0.0, floor_y, 0.0]) / scale
             side = np.median(local[:, 0])
             for depth in (-0.04, 0.0, 0.04):
                 shift = np.array([side, 0.0, np.median(local[:, 2]) + depth + 0.01])
                 distance, _ = tree.query(local - shift, distance_upper_bound=_CAP_M)
                 score = float(np.minimum(distance, _CAP_M).mean())
                 if best is None or score < best.score:
-                    place = back.T @ (scale * shift + [0.0, lift, 0.0])
+                    place = back.T @ (scale * shift + [0.0, floor_y, 0.0])
                     best = InitialPose(yaw, scale, place, name, score)
     assert best is not None
     return best
@@ -127,7 +127,7 @@ def _sizes(points: FloatArray, height: float, stature: float) -> list[tuple[floa
     whole = [(height / stature, low)]
     if height > _SURELY_WHOLE_M:
         return whole
-    parts = [(scale, lift) for scale in _PART_SCALES for lift in low - _PART_BOTTOMS * scale]
+    parts = [(scale, floor_y) for scale in _PART_SCALES for floor_y in low - _PART_BOTTOMS * scale]
     return parts + (whole if height > _CHILD_M else [])
 
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from vto_pipeline.avatar.model.fit import Fit, model
-from vto_pipeline.avatar.model.pose import joint_transforms, parent_rotations, turned_pose
+from vto_pipeline.avatar.model.fit import Fit, posed_vertices
+from vto_pipeline.avatar.model.pose import compose_pose, joint_transforms, parent_rotations
 from vto_pipeline.avatar.model.shape import ShapeSpace
-from vto_pipeline.avatar.scan.correspondence import Pairs
+from vto_pipeline.avatar.scan.correspondence import Correspondences
 from vto_pipeline.avatar.scan.initial_pose import InitialPose
 from vto_pipeline.avatar.template.template import JOINT_KINDS
 from vto_pipeline.model.arrays import FloatArray, IntArray
@@ -48,7 +48,7 @@ def initial_fit(space: ShapeSpace, start: InitialPose, pose: FloatArray) -> Fit:
     return Fit(parameters, pose, start.translation + turn @ pelvis - pelvis, parameters)
 
 
-def refine(space: ShapeSpace, fit: Fit, pairs: Pairs, noise: float, stiff: float = 1.0) -> Fit:
+def refine_registration(space: ShapeSpace, fit: Fit, pairs: Correspondences, noise: float, stiff: float = 1.0) -> Fit:
     """Take one Gauss-Newton step.
 
     Args:
@@ -66,12 +66,12 @@ def refine(space: ShapeSpace, fit: Fit, pairs: Pairs, noise: float, stiff: float
     return replace(
         fit,
         parameters=fit.parameters + move[:count],
-        pose=turned_pose(fit.pose, turn, above),
+        pose=compose_pose(fit.pose, turn, above),
         translation=fit.translation + move[-3:],
     )
 
 
-def covariance(space: ShapeSpace, fit: Fit, pairs: Pairs, noise: float) -> FloatArray:
+def covariance(space: ShapeSpace, fit: Fit, pairs: Correspondences, noise: float) -> FloatArray:
     """Return how surely the shape's parameters are known after the fit, pose and place left open too, shape (P, P)."""
     count = len(space.names)
     whole = np.linalg.inv(_system(space, fit, pairs, noise, 1.0)[0])
@@ -80,11 +80,11 @@ def covariance(space: ShapeSpace, fit: Fit, pairs: Pairs, noise: float) -> Float
 
 
 def _system(
-    space: ShapeSpace, fit: Fit, pairs: Pairs, noise: float, stiff: float
+    space: ShapeSpace, fit: Fit, pairs: Correspondences, noise: float, stiff: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the normal equations of a step, and the rotation of each joint's parent, shape (J, 3, 3)."""
     pairs = pairs.weighted()
-    vertices = model(space, fit)
+    vertices = posed_vertices(space, fit)
     points = np.einsum("nk,nkd->nd", pairs.shares, vertices[pairs.corners])
     wrong = ((points - pairs.targets) * pairs.normals).sum(axis=1)
     joints = len(space.base.joints)
@@ -108,7 +108,7 @@ def _system(
     return normal + 1e-9 * np.eye(len(normal)), right, above
 
 
-def derivatives(space: ShapeSpace, fit: Fit, pairs: Pairs) -> FloatArray:
+def derivatives(space: ShapeSpace, fit: Fit, pairs: Correspondences) -> FloatArray:
     """Derivative of each pair's distance by shape, joint turns in world axes, translation: (N, P + 3 J + 3)."""
     base = space.base
     joints = space.joints(fit.parameters)

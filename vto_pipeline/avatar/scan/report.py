@@ -33,7 +33,7 @@ _BUILD_M, _ODD = 0.02, 4.0
 """How well these are read off a bent body [m], and how many standard deviations no person is away."""
 
 
-def check(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray, max_mean_mm: float) -> None:
+def refuse_non_body(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray, max_mean_mm: float) -> None:
     """Refuse a scan that is not a body.
 
     Raises:
@@ -63,7 +63,7 @@ def check(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray, max_mean_
             )
 
 
-def check_build(read: Measurements, lean: float) -> None:
+def refuse_implausible_build(read: Measurements, lean: float) -> None:
     """Refuse a bent body that was not reconstructed: its lengths are implausible.
 
     Args:
@@ -88,7 +88,7 @@ def check_build(read: Measurements, lean: float) -> None:
             )
 
 
-def report(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray, job: Job) -> list[str]:
+def report_registration(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray, job: Job) -> list[str]:
     """Return what the scan hides; measure how far it lies from the body, at points that the fit has not seen."""
     faces = space.base.faces
     points, _, _ = sample_surface(scan, _POINTS, job.seed + 1)

@@ -67,7 +67,7 @@ def in_metres(scan: TriangleMesh, job: Job) -> TriangleMesh:
     return TriangleMesh(kept.vertices * _UNITS_M[fitting[0]], kept.faces)
 
 
-def turns_upright(scan: TriangleMesh) -> dict[str, FloatArray]:
+def candidate_up_rotations(scan: TriangleMesh) -> dict[str, FloatArray]:
     """Return axis -> the turn that makes it +Y, shape (3, 3), for all axes along which the scan is tall enough."""
     tall = np.ptp(scan.vertices, axis=0)
     return {name: turn for name, turn in _AXES.items() if tall["XYZ".index(name[1])] > HEIGHT_M[0]}

@@ -16,7 +16,7 @@ _SECOND = 0.25
 _HINT = "show one whole person in front of a plain backdrop of a different colour"
 
 
-def person(image: ByteArray, where: str) -> NDArray[np.bool_]:
+def segment_person(image: ByteArray, where: str) -> NDArray[np.bool_]:
     """Return where the person is: colours unlike the backdrop's, cut where both classes are tightest (Otsu 1979).
 
     The backdrop's colour may vary smoothly: a plane through the border's colours is taken off.

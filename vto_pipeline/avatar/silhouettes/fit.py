@@ -16,10 +16,10 @@ from scipy.spatial.transform import Rotation
 from vto_pipeline.avatar.measuring.definitions import DEFINITIONS
 from vto_pipeline.avatar.measuring.population import Population
 from vto_pipeline.avatar.measuring.tape import Tape
-from vto_pipeline.avatar.model.fit import Fit, model
-from vto_pipeline.avatar.model.pose import joint_transforms, parent_rotations, turned_pose
+from vto_pipeline.avatar.model.fit import Fit, posed_vertices
+from vto_pipeline.avatar.model.pose import compose_pose, joint_transforms, parent_rotations
 from vto_pipeline.avatar.model.shape import ShapeSpace
-from vto_pipeline.avatar.scan.correspondence import Pairs, geman_mcclure
+from vto_pipeline.avatar.scan.correspondence import Correspondences, geman_mcclure
 from vto_pipeline.avatar.scan.registration import derivatives
 from vto_pipeline.avatar.silhouettes.outline import Camera, ImageOutline, model_outline
 from vto_pipeline.avatar.template.template import JOINT_KINDS
@@ -80,7 +80,7 @@ _NORMAL_PX = 30.0
 
 
 @dataclass(frozen=True)
-class View:
+class SilhouetteView:
     """One picture and what is assumed of it.
 
     Args:
@@ -127,16 +127,16 @@ class Solution:
         misfit: Before the step: twice the negative logarithm of the likelihood with its prior, but for a constant.
     """
 
-    views: tuple[View, ...]
+    views: tuple[SilhouetteView, ...]
     parameters: FloatArray
     covariance: FloatArray
     outline_errors: tuple[float, ...]
     misfit: float
 
 
-def step(
+def gauss_newton_step(
     space: ShapeSpace,
-    views: tuple[View, ...],
+    views: tuple[SilhouetteView, ...],
     evidence: Evidence,
     trust: FloatArray,
     reach: float,
@@ -199,9 +199,9 @@ def step(
     return Solution(moved, parameters, np.linalg.inv(normal)[:count, :count].astype(np.float64), tuple(wrong), misfit)
 
 
-def advance(
+def run_steps(
     space: ShapeSpace,
-    views: tuple[View, ...],
+    views: tuple[SilhouetteView, ...],
     evidence: Evidence,
     trust: FloatArray,
     noise: float,
@@ -209,10 +209,10 @@ def advance(
     stiff: float = 1.0,
     begun: int = 0,
 ) -> Solution:
-    """Take some steps, each with a smaller reach; `begun` of them were taken before. The rest as `step` has it."""
+    """Take some steps as `gauss_newton_step` does, each with a smaller reach; `begun` were taken before."""
     for k in range(begun, begun + steps):
         reach = max(_REACH_M * _FALL**k, _LAST_REACH_M)
-        solution = step(space, views, evidence, trust, reach, noise, stiff)
+        solution = gauss_newton_step(space, views, evidence, trust, reach, noise, stiff)
         views = solution.views
     return solution
 
@@ -222,13 +222,13 @@ def _turns(move: FloatArray, count: int, block: int) -> FloatArray:
 
 
 def _rows(
-    space: ShapeSpace, view: View, trust: FloatArray, reach: float
+    space: ShapeSpace, view: SilhouetteView, trust: FloatArray, reach: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, float]:
     """Derivatives, distances [m], weights: the model's rim in the picture's distance field and the reverse; their mean.
 
     Distances count across the outline.
     """
-    vertices = model(space, view.fit)
+    vertices = posed_vertices(space, view.fit)
     rim = model_outline(vertices, space.base.faces, view.camera)
     metres = -view.fit.translation[2] / view.camera.focal
     value, ahead = view.outline.distance(rim.at)
@@ -255,12 +255,12 @@ def _rows(
     kept = weight > 1e-9
     corners, shares, middle, normals, off, weight = (x[kept] for x in (corners, shares, middle, normals, off, weight))
     directions = view.camera.pull_back(middle, normals) * metres
-    slope = derivatives(space, view.fit, Pairs(corners, shares, middle, directions, weight))
+    slope = derivatives(space, view.fit, Correspondences(corners, shares, middle, directions, weight))
     by_focal = ((view.camera.project(middle) - view.camera.middle) * normals).sum(axis=1) * metres
     return np.hstack([slope, by_focal[:, None], (normals[:, 1] * metres)[:, None]]), off, weight, float(apart)
 
 
-def _pose_prior(space: ShapeSpace, view: View, evidence: Evidence) -> tuple[FloatArray, FloatArray]:
+def _pose_prior(space: ShapeSpace, view: SilhouetteView, evidence: Evidence) -> tuple[FloatArray, FloatArray]:
     """Rows that draw the pose to the nominal one, the feet flat and the camera to where it is expected."""
     base = space.base
     joints = len(base.joints)
@@ -322,7 +322,7 @@ def _feet_rows(base: Avatar, rotation: FloatArray) -> tuple[FloatArray, FloatArr
     return np.vstack(rows), np.concatenate(off)
 
 
-def _posture_rows(space: ShapeSpace, front: View, side: View) -> tuple[FloatArray, FloatArray]:
+def _posture_rows(space: ShapeSpace, front: SilhouetteView, side: SilhouetteView) -> tuple[FloatArray, FloatArray]:
     """Rows that draw the posture of trunk and legs in one view to that in the other."""
     base = space.base
     joints = space.joints(front.fit.parameters)
@@ -337,7 +337,7 @@ def _posture_rows(space: ShapeSpace, front: View, side: View) -> tuple[FloatArra
     return np.hstack(rows), (apart.as_rotvec()[own] / _ALIKE_RAD).ravel()
 
 
-def _camera_rows(front: View, side: View) -> tuple[FloatArray, FloatArray]:
+def _camera_rows(front: SilhouetteView, side: SilhouetteView) -> tuple[FloatArray, FloatArray]:
     """Rows that draw tilt, distance, focal length and middle of one camera to the other's: only the person turned."""
     turned = [
         Rotation.from_rotvec(view.fit.pose[0].copy()) * Rotation.from_rotvec(view.nominal[0].copy()).inv()
@@ -377,11 +377,11 @@ def _tape_rows(space: ShapeSpace, parameters: FloatArray, evidence: Evidence) ->
     )
 
 
-def _moved(space: ShapeSpace, view: View, parameters: FloatArray, move: FloatArray) -> View:
+def _moved(space: ShapeSpace, view: SilhouetteView, parameters: FloatArray, move: FloatArray) -> SilhouetteView:
     base = space.base
     rotation, _ = joint_transforms(space.joints(view.fit.parameters), base.parents, view.fit.pose)
     turn = move[:-5].reshape(-1, 3)
-    pose = turned_pose(view.fit.pose, turn, parent_rotations(rotation, base.parents))
+    pose = compose_pose(view.fit.pose, turn, parent_rotations(rotation, base.parents))
     fit = replace(view.fit, parameters=parameters, pose=pose, translation=view.fit.translation + move[-5:-2])
     camera = replace(
         view.camera, focal=view.camera.focal * float(np.exp(move[-2])), drop=view.camera.drop + float(move[-1])

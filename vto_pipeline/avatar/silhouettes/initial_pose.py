@@ -14,7 +14,7 @@ from vto_pipeline.avatar.model.pose import joint_transforms, named_pose
 from vto_pipeline.avatar.model.shape import ShapeSpace
 from vto_pipeline.avatar.scan.initial_pose import InitialPose
 from vto_pipeline.avatar.scan.registration import initial_fit
-from vto_pipeline.avatar.silhouettes.fit import Evidence, Solution, View, advance
+from vto_pipeline.avatar.silhouettes.fit import Evidence, SilhouetteView, Solution, run_steps
 from vto_pipeline.avatar.silhouettes.outline import Camera, ImageOutline
 from vto_pipeline.avatar.template.implicit import arm_axis
 from vto_pipeline.model.arrays import FloatArray
@@ -64,20 +64,22 @@ def mean_body(space: ShapeSpace, stature: float, yaw: float, pose: FloatArray) -
     return initial_fit(space, InitialPose(yaw, scale, np.zeros(3), "", 0.0), pose)
 
 
-def _best_guess(space: ShapeSpace, guesses: Iterable[tuple[View, ...]], evidence: Evidence, noise: float) -> Solution:
+def _best_guess(
+    space: ShapeSpace, guesses: Iterable[tuple[SilhouetteView, ...]], evidence: Evidence, noise: float
+) -> Solution:
     """Return the result of the best guess."""
     everywhere = np.ones(len(space.base.vertices))
 
-    def some(guesses: Iterable[tuple[View, ...]], begun: int, steps: int) -> list[Solution]:
+    def some(guesses: Iterable[tuple[SilhouetteView, ...]], begun: int, steps: int) -> list[Solution]:
         # a hand held before the belly must not pass for a belly: the arms are found while the shape is stiff
-        found = [advance(space, views, evidence, everywhere, noise, steps, _STIFF, begun) for views in guesses]
+        found = [run_steps(space, views, evidence, everywhere, noise, steps, _STIFF, begun) for views in guesses]
         return sorted(found, key=lambda solution: sum(solution.outline_errors))
 
     first = some(guesses, 0, _TRIAL_STEPS)[:_FINALISTS]
     return some([solution.views for solution in first], _TRIAL_STEPS, _MORE_STEPS)[0]
 
 
-def _arms_ahead(space: ShapeSpace, facing: View, swing: float, bend: float) -> FloatArray:
+def _arms_ahead(space: ShapeSpace, facing: SilhouetteView, swing: float, bend: float) -> FloatArray:
     """Return the front view's pose, legs and arms apart as they are seen there, arms swung forward and bent [rad].
 
     What the front does not show, whether an arm is held forward or back, is not taken from there.
@@ -99,7 +101,7 @@ def _arms_ahead(space: ShapeSpace, facing: View, swing: float, bend: float) -> F
 
 def _place(
     space: ShapeSpace, outline: ImageOutline, mask: NDArray[np.bool_], yaw: float, pose: FloatArray, evidence: Evidence
-) -> View:
+) -> SilhouetteView:
     """Place the mean body, scaled to the stature, behind an outline; the lens level and as high as expected."""
     rows, columns = np.nonzero(mask)
     height, width = mask.shape
@@ -110,4 +112,4 @@ def _place(
     metres = evidence.distance / camera.focal
     middle = np.array([np.median(columns), rows.max() + 0.5]) - camera.middle
     place = np.array([middle[0] * metres, -middle[1] * metres, -evidence.distance])
-    return View(outline, fit.pose, replace(fit, translation=fit.translation + place), camera)
+    return SilhouetteView(outline, fit.pose, replace(fit, translation=fit.translation + place), camera)

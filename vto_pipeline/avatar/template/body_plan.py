@@ -197,7 +197,7 @@ _POINTS = {
 }
 
 
-def blended(sex: float) -> BodyPlan:
+def interpolated_plan(sex: float) -> BodyPlan:
     """Return the plan between both sexes: 0 female ... 1 male."""
     return BodyPlan(
         **{one.name: _blend(sex, getattr(FEMALE, one.name), getattr(MALE, one.name)) for one in fields(BodyPlan)}

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix, diags
 from scipy.sparse.linalg import spsolve
 
-from vto_pipeline.avatar.template.body_plan import FEMALE, MALE, BodyPlan, blended
+from vto_pipeline.avatar.template.body_plan import FEMALE, MALE, BodyPlan, interpolated_plan
 from vto_pipeline.avatar.template.grid import Grid, lay_out
 from vto_pipeline.avatar.template.implicit import gradient, signed_field, smoothstep
-from vto_pipeline.avatar.template.template import twins
+from vto_pipeline.avatar.template.template import mirror_indices
 from vto_pipeline.model.arrays import FloatArray
 
 _ROUNDS = 150
@@ -28,7 +28,7 @@ _UNDO = -0.53
 """The second of two steps, outwards: smoothing alone shrinks what it smooths (Taubin 1995), here the seat."""
 
 
-def build(path: Path) -> None:
+def build_template(path: Path) -> None:
     """Write the template's data file.
 
     Args:
@@ -122,12 +122,12 @@ def _split(quads: NDArray[np.int64], points: FloatArray, mirror: NDArray[np.bool
     corners = points[half]
     if np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) < 0:
         half = half[:, ::-1]
-    return np.concatenate([half, twins(mirror)[half][:, ::-1]])
+    return np.concatenate([half, mirror_indices(mirror)[half][:, ::-1]])
 
 
 def _membership(grid: Grid, points: FloatArray, limb: str) -> FloatArray:
     """How much each half-body vertex belongs to a limb, 0 to 1: harmonic on the grid between its root and its rest."""
-    plan = blended(0.5)
+    plan = interpolated_plan(0.5)
     level, shoulder = plan.levels, plan.shoulder
     x, y, _ = points.T
     numbers = np.arange(len(points))
@@ -148,4 +148,4 @@ def _membership(grid: Grid, points: FloatArray, limb: str) -> FloatArray:
 
 
 if __name__ == "__main__":
-    build(Path(__file__).with_name("template.npz"))
+    build_template(Path(__file__).with_name("template.npz"))

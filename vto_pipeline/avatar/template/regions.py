@@ -11,12 +11,12 @@ from vto_pipeline.model.body import Avatar
 _HALF = 0.5
 
 
-def trunk(avatar: Avatar) -> NDArray[np.bool_]:
+def trunk_vertices(avatar: Avatar) -> NDArray[np.bool_]:
     """Return which vertices are neither arm nor leg: trunk, neck and head, shape (V,)."""
-    return (membership("arm") < _HALF) & ~legs(avatar)
+    return (membership("arm") < _HALF) & ~leg_vertices(avatar)
 
 
-def legs(avatar: Avatar) -> NDArray[np.bool_]:
+def leg_vertices(avatar: Avatar) -> NDArray[np.bool_]:
     """Return which vertices are leg: moved by a hip or what hangs on it more than by the pelvis, shape (V,)."""
     joints = [k for k, name in enumerate(avatar.joint_names) if name.endswith(("hip", "knee", "ankle"))]
     # the crotch is half left and half right leg, and still trunk

@@ -181,7 +181,7 @@ def _step(distance: FloatArray, half_width: float) -> FloatArray:
 @cache
 def _loops() -> dict[str, IntArray]:
     data = _data()
-    twin = twins(data["mirror"])
+    twin = mirror_indices(data["mirror"])
     loops = {}
     for name in _TRUNK_ROWS:
         row = data[f"row_{name}"]
@@ -201,7 +201,7 @@ def columns() -> dict[str, IntArray]:
         "front_column": data["row_front_column"],
         "back_column": data["row_back_column"],
         "left_shoulder_column": shoulder,
-        "right_shoulder_column": twins(data["mirror"])[shoulder],
+        "right_shoulder_column": mirror_indices(data["mirror"])[shoulder],
     }
 
 
@@ -209,7 +209,7 @@ def columns() -> dict[str, IntArray]:
 def _landmarks() -> dict[str, int]:
     """Name -> vertex, chosen on the blend of both sexes."""
     data = _data()
-    twin = twins(data["mirror"])
+    twin = mirror_indices(data["mirror"])
     half = (data["female"] + data["male"]) / 2
     mirror = data["mirror"]
 
@@ -242,7 +242,7 @@ def _landmarks() -> dict[str, int]:
     return middle | both | {f"right_{name}": int(twin[vertex]) for name, vertex in left.items()}
 
 
-def twins(mirror: NDArray[np.bool_]) -> IntArray:
+def mirror_indices(mirror: NDArray[np.bool_]) -> IntArray:
     """Return each half-body vertex's mirror image in the whole body; itself on the median plane, shape (H,).
 
     Args:

@@ -12,7 +12,7 @@ from vto_pipeline.avatar.from_scan import ScanConfig, fit_scan
 from vto_pipeline.avatar.measure import measure
 from vto_pipeline.avatar.measuring.population import population
 from vto_pipeline.bench.bench import Measured, Row, Watch
-from vto_pipeline.bench.body.people import drawn, first_hits
+from vto_pipeline.bench.body.people import first_hits, random_measurements
 from vto_pipeline.bench.samples.garments.top import make_shirt
 from vto_pipeline.bench.samples.garments.trousers import make_trousers
 from vto_pipeline.bench.samples.garments.wearer import Wearer
@@ -37,26 +37,34 @@ def clothed_rows(quick: bool, watch: Watch) -> Iterator[Row]:
             f"{sex}, dressed",
             "scan of clothes",
             {"people": len(seeds)},
-            len(someone(sex, seeds[0]).vertices),
+            len(random_wearer(sex, seeds[0]).vertices),
             lambda sex=sex, seeds=seeds: _people(sex, seeds),  # type: ignore[misc]
         )
 
 
-def someone(sex: str, seed: int) -> Avatar:
+def random_wearer(sex: str, seed: int) -> Avatar:
     """Return a random person, all girths as drawn, in the A-pose."""
-    known = {k: v for k, v in drawn(sex, seed).values.items() if k.endswith("_girth") or k in ("stature", "inside_leg")}
+    known = {
+        k: v
+        for k, v in random_measurements(sex, seed).values.items()
+        if k.endswith("_girth") or k in ("stature", "inside_leg")
+    }
     return fit_measurements(Measurements(known, sex=sex))
 
 
-def dressed(body: Avatar, ease: float) -> TriangleMesh:
+def visible_clothed_surface(body: Avatar, clearance: float) -> TriangleMesh:
     """Return what cameras all round see of a body in shirt and trousers.
 
     Args:
         body: Standing on y = 0 about the origin.
-        ease: Least gap between shirt and trunk [m].
+        clearance: Least gap between shirt and trunk [m].
     """
     wearer = Wearer(body)
-    parts = [body.mesh, make_shirt(wearer, 14.0, ease=ease).mesh, make_trousers(wearer, 14.0, ease=0.012).mesh]
+    parts = [
+        body.mesh,
+        make_shirt(wearer, 14.0, clearance=clearance).mesh,
+        make_trousers(wearer, 14.0, clearance=0.012).mesh,
+    ]
     whole = concatenate(parts)
     return submesh(whole, _seen(whole))[0]
 
@@ -76,8 +84,8 @@ def _people(sex: str, seeds: tuple[int, ...]) -> Measured:
     seconds, wrong, null, held = [], [], [], []
     names = [f"{row}_girth" for row in GIRTHS]
     for seed in seeds:
-        body = someone(sex, seed)
-        scan = dressed(body, float(np.random.default_rng(seed).uniform(*_EASES_M)))
+        body = random_wearer(sex, seed)
+        scan = visible_clothed_surface(body, float(np.random.default_rng(seed).uniform(*_EASES_M)))
         fitted, taken = clocked(fit_scan, scan, ScanConfig.model_validate({"sex": sex, "clothed": True}))
         seconds.append(taken)
         read = measure(fitted)

@@ -10,7 +10,7 @@ from vto_pipeline.avatar.from_scan import ScanConfig, fit_scan
 from vto_pipeline.avatar.measure import measure
 from vto_pipeline.avatar.measuring.definitions import DEFINITIONS
 from vto_pipeline.bench.bench import Measured, Row, Value, Watch
-from vto_pipeline.bench.body.people import as_standing, cloud_of, person
+from vto_pipeline.bench.body.people import as_standing, poor_scan, random_body
 from vto_pipeline.bench.timing import Timing, clocked
 from vto_pipeline.model.body import Measurements
 from vto_pipeline.model.job import Job
@@ -37,8 +37,8 @@ def _covered(count: int, config: ScanConfig) -> Measured:
     seconds, pairs = [], []
     for k in range(count):
         sex = ("female", "male")[k % 2]
-        body = person(sex, _FIRST_SEED + k)
-        scan = reconstruct_cloud(cloud_of(body, _FIRST_SEED + k), SurfaceConfig.model_validate({}), Job())
+        body = random_body(sex, _FIRST_SEED + k)
+        scan = reconstruct_cloud(poor_scan(body, _FIRST_SEED + k), SurfaceConfig.model_validate({}), Job())
         fitted, taken = clocked(fit_scan, scan, config)
         seconds.append(taken)
         pairs.append((measure(fitted), measure(as_standing(body)).values))

@@ -12,7 +12,7 @@ from vto_pipeline.avatar.measure import measure
 from vto_pipeline.avatar.model.pose import pose_avatar
 from vto_pipeline.avatar.template.template import JOINT_KINDS, membership
 from vto_pipeline.bench.bench import Measured, Row, Value, Watch
-from vto_pipeline.bench.body.people import person
+from vto_pipeline.bench.body.people import random_body
 from vto_pipeline.bench.timing import Timing, clocked
 from vto_pipeline.errors import AvatarError
 from vto_pipeline.geometry.topology import submesh
@@ -52,7 +52,7 @@ def _from_tape(tape: Measurements) -> Measured:
 
 
 def _from_scan(scan: Callable[[Avatar], TriangleMesh]) -> Measured:
-    body = person("female", 0)
+    body = random_body("female", 0)
     job, config = Job(), ScanConfig.model_validate({"sex": "female"})
     try:
         fitted, seconds = clocked(fit_scan, scan(body), config, job)

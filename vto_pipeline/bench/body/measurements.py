@@ -10,7 +10,7 @@ from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.measure import measure
 from vto_pipeline.avatar.measuring.population import population
 from vto_pipeline.bench.bench import Measured, Row, Watch
-from vto_pipeline.bench.body.people import ASKED, drawn
+from vto_pipeline.bench.body.people import ASKED, random_measurements
 from vto_pipeline.bench.timing import Timing, clocked
 from vto_pipeline.model.body import Measurements
 
@@ -29,14 +29,14 @@ def measurement_rows(quick: bool, watch: Watch) -> Iterator[Row]:
 
 
 def _asked(sex: str, seed: int) -> Measurements:
-    return Measurements({name: drawn(sex, seed).values[name] for name in ASKED}, sex=sex)
+    return Measurements({name: random_measurements(sex, seed).values[name] for name in ASKED}, sex=sex)
 
 
 def _people(sex: str, count: int) -> Measured:
     seconds, asked, wrong, mean = [], [], [], []
     average = dict(zip(population(sex).names, population(sex).mean, strict=True))
     for seed in range(count):
-        true = drawn(sex, seed).values
+        true = random_measurements(sex, seed).values
         body, taken = clocked(fit_measurements, _asked(sex, seed))
         seconds.append(taken)
         read = measure(body).values

@@ -8,7 +8,7 @@ import numpy as np
 
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.measuring.population import population
-from vto_pipeline.avatar.model.fit import Fit, model
+from vto_pipeline.avatar.model.fit import Fit, posed_vertices
 from vto_pipeline.avatar.model.pose import pose_avatar
 from vto_pipeline.avatar.model.shape import shape_space
 from vto_pipeline.avatar.model.stance import stance
@@ -37,16 +37,16 @@ _SPREAD_RAD = {
 _HOLE_M = (0.03, 0.08)
 
 
-def drawn(sex: str, seed: int) -> Measurements:
+def random_measurements(sex: str, seed: int) -> Measurements:
     """Return all measurements of a random person of the population (ANSUR II)."""
     people = population(sex)
     values = np.random.default_rng(seed).multivariate_normal(people.mean, people.covariance)
     return Measurements(dict(zip(people.names, values.tolist(), strict=True)), sex=sex)
 
 
-def person(sex: str, seed: int) -> Avatar:
+def random_body(sex: str, seed: int) -> Avatar:
     """Return a random body of our own shape space, in a random stance, facing anywhere."""
-    known = drawn(sex, seed)
+    known = random_measurements(sex, seed)
     body = fit_measurements(Measurements({name: known.values[name] for name in ASKED}, sex=sex))
     rng = np.random.default_rng(seed)
     pose = np.array([rng.normal(0.0, _SPREAD_RAD.get(kind, 0.0), 3) for kind in JOINT_KINDS])
@@ -60,7 +60,7 @@ def as_standing(body: Avatar) -> Avatar:
     parameters = np.array([body.parameters[name] for name in space.names])
     fit = Fit(parameters, body.pose, np.zeros(3), parameters)
     # the space's own skeleton hangs a little lower than the body's, whose soles are on the floor
-    fit = replace(fit, translation=(body.vertices - model(space, fit)).mean(axis=0))
+    fit = replace(fit, translation=(body.vertices - posed_vertices(space, fit)).mean(axis=0))
     return to_bind_pose(space, fit, stance(space, fit), body.vertices, body.vertices)[0]
 
 
@@ -80,7 +80,7 @@ def first_hits(mesh: TriangleMesh, rays: FloatArray) -> FloatArray:
     return hit
 
 
-def cloud_of(
+def poor_scan(
     body: Avatar, seed: int, *, count: int = 20_000, noise: float = 0.002, outliers: float = 0.05, holes: float = 0.10
 ) -> PointCloud:
     """Return a poor scan.

@@ -11,7 +11,7 @@ from vto_pipeline.avatar.from_scan import ScanConfig, fit_scan
 from vto_pipeline.avatar.measure import measure
 from vto_pipeline.avatar.template.template import beyond_armscye
 from vto_pipeline.bench.bench import Measured, Row, Value, Watch
-from vto_pipeline.bench.body.people import cloud_of, person
+from vto_pipeline.bench.body.people import poor_scan, random_body
 from vto_pipeline.bench.body.slices import TRUNK, girth_errors
 from vto_pipeline.bench.samples.customer import make_customer
 from vto_pipeline.bench.timing import timed
@@ -59,8 +59,8 @@ def _own() -> dict[str, _Scan]:
     """Bodies that may hold their arms against the chest."""
     scenes = {}
     for sex, seed in (("female", 0), ("male", 1)):
-        body = person(sex, seed)
-        surface = reconstruct_cloud(cloud_of(body, seed), SurfaceConfig.model_validate({}), Job())
+        body = random_body(sex, seed)
+        surface = reconstruct_cloud(poor_scan(body, seed), SurfaceConfig.model_validate({}), Job())
         trunk = TriangleMesh(body.vertices, body.faces[~beyond_armscye()[body.faces].any(axis=1)])
         scenes[f"own {sex} body, 2 mm noise, 5 % outliers, 10 % holes"] = _Scan(surface, body.mesh, trunk)
     return scenes

@@ -11,12 +11,12 @@ import numpy as np
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.from_silhouettes import SilhouettesConfig, fit_silhouettes
 from vto_pipeline.avatar.measure import measure
-from vto_pipeline.avatar.measuring.population import complete
+from vto_pipeline.avatar.measuring.population import complete_measurements
 from vto_pipeline.avatar.measuring.tape import mass_reading
 from vto_pipeline.avatar.model.pose import named_pose, pose_avatar
 from vto_pipeline.avatar.template.template import JOINT_KINDS
 from vto_pipeline.bench.bench import Measured, Row, Watch
-from vto_pipeline.bench.body.people import drawn, first_hits
+from vto_pipeline.bench.body.people import first_hits, random_measurements
 from vto_pipeline.bench.samples.customer import make_customer, measure_truth
 from vto_pipeline.bench.timing import Timing, clocked
 from vto_pipeline.geometry.topology import vertex_normals
@@ -94,7 +94,7 @@ def _foreign() -> Person:
 
 def _someone(sex: str, seed: int) -> Person:
     """Return a person with everything drawn, in an A-pose of their own, 3 mm of bumps on the skin."""
-    known = {name: value for name, value in drawn(sex, seed).values.items() if name != "mass"}
+    known = {name: value for name, value in random_measurements(sex, seed).values.items() if name != "mass"}
     body, rng = fit_measurements(Measurements(known, sex=sex)), np.random.default_rng(seed)
     skin = body.bind_vertices
     away = np.linalg.norm(skin[:, None] - skin[rng.choice(len(skin), _BUMPS, replace=False)], axis=2)
@@ -141,7 +141,9 @@ def _people(people: list[Person]) -> Measured:
         front, side = (photograph(one.body, yaw, one.distance, k, one.lens) for yaw in (0.0, np.pi / 2))
         names = Silhouettes(Path("front"), Path("side"), one.true["stature"])
         seconds.append(clocked(fit_silhouettes, names, front, side, config, job)[1])
-        guess = complete(Measurements({name: one.true[name] for name in ("stature", "mass")}, sex=one.sex)).values
+        guess = complete_measurements(
+            Measurements({name: one.true[name] for name in ("stature", "mass")}, sex=one.sex)
+        ).values
         read = [float(str(job.metrics[f"{name}_m"])) - one.true[name] for name in GIRTHS]
         half = [float(str(job.metrics[f"{name}_interval_mm"])) * 1e-3 for name in GIRTHS]
         wrong.append(read)

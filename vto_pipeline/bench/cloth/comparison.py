@@ -25,7 +25,7 @@ _BYTES = 100_000_000
 
 
 @dataclass(frozen=True)
-class Level:
+class ErrorLevel:
     """What an error costs.
 
     Args:
@@ -77,7 +77,7 @@ def read_peers(path: Path) -> list[Row]:
     return found
 
 
-def compare(rows: Iterable[Row], peers: Sequence[Row]) -> list[Level]:
+def compare(rows: Iterable[Row], peers: Sequence[Row]) -> list[ErrorLevel]:
     """Return one level for each error that a peer reaches, tightest last in each scene.
 
     Rows count only if the mean height is within HEIGHT_TOLERANCE of the scene's reference.
@@ -95,19 +95,19 @@ def compare(rows: Iterable[Row], peers: Sequence[Row]) -> list[Level]:
     return levels
 
 
-def level_as_json(level: Level) -> dict[str, Any]:
+def level_as_json(level: ErrorLevel) -> dict[str, Any]:
     """Return plain values."""
     return {**asdict(level), "ratio": level.ratio}
 
 
-def _level(scene: str, error: float, peers: Iterable[Row], ours: Iterable[Row]) -> Level:
+def _level(scene: str, error: float, peers: Iterable[Row], ours: Iterable[Row]) -> ErrorLevel:
     peer = min((row for row in peers if _figure(row, ERROR) <= error), key=lambda row: row.seconds)
-    known = Level(scene, error, peer.method, dict(peer.settings), peer.seconds)
+    known = ErrorLevel(scene, error, peer.method, dict(peer.settings), peer.seconds)
     reached = [row for row in ours if _figure(row, ERROR) <= error]
     if not reached:
         return known
     best = min(reached, key=lambda row: row.seconds)
-    return Level(
+    return ErrorLevel(
         scene, error, peer.method, known.peer_settings, peer.seconds, best.method, dict(best.settings), best.seconds
     )
 

@@ -21,13 +21,13 @@ import numpy as np
 
 from vto_pipeline.bench.bench import Measured, Row, Value, Watch
 from vto_pipeline.bench.cloth.closed_forms import ROOTS, implicit_dumbbell
-from vto_pipeline.bench.cloth.scenes import SIDE, grid, isotropic
+from vto_pipeline.bench.cloth.scenes import SIDE, grid, isotropic_sheet
 from vto_pipeline.bench.timing import timed
 from vto_pipeline.cloth.collision.contacts import empty_contacts
 from vto_pipeline.cloth.constraints.points.spring import springs
 from vto_pipeline.cloth.integrators import INTEGRATORS
 from vto_pipeline.cloth.integrators.system import ForceSystem
-from vto_pipeline.cloth.model.build import ClothModel, ClothState, at_rest, build, model_of
+from vto_pipeline.cloth.model.build import ClothModel, ClothState, at_rest, build_cloth, model_of
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.mesh import TriangleMesh
@@ -163,8 +163,8 @@ class Swing:
         """The sheet."""
         faces = grid(self.count)[2]
         held = tuple(range(self.count))
-        return build(
-            TriangleMesh(self.start, faces), RestShape(self.start), isotropic(_SOFT, bending=1e-4), pinned=held
+        return build_cloth(
+            TriangleMesh(self.start, faces), RestShape(self.start), isotropic_sheet(_SOFT, bending=1e-4), pinned=held
         )
 
     @cached_property

@@ -14,13 +14,13 @@ from functools import cache
 import numpy as np
 
 from vto_pipeline.bench.measures import edge_strain
-from vto_pipeline.bench.samples.garments.shirt import make_shirt
+from vto_pipeline.bench.samples.garments.shirt import make_hanging_shirt
 from vto_pipeline.bench.samples.solids.form import make_form
 from vto_pipeline.cloth.collision.body.contacts import BodyCollider
 from vto_pipeline.cloth.collision.contacts import Collider
 from vto_pipeline.cloth.collision.shapes.colliders import Sphere
 from vto_pipeline.cloth.judge.crossings import self_crossings
-from vto_pipeline.cloth.model.build import ClothModel, ClothState, build
+from vto_pipeline.cloth.model.build import ClothModel, ClothState, build_cloth
 from vto_pipeline.cloth.simulation import default_skin
 from vto_pipeline.geometry.remeshing.remesh import RemeshConfig, remesh
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
@@ -69,7 +69,7 @@ class Scene:
     ball: tuple[float, float, float] | None = None
 
 
-def isotropic(stiffness: float, density: float = AREAL_DENSITY, bending: float = 0.0) -> Fabric:
+def isotropic_sheet(stiffness: float, density: float = AREAL_DENSITY, bending: float = 0.0) -> Fabric:
     """Return a sheet with the same stiffness [N/m] in all directions."""
     shear = stiffness / (2.0 * (1.0 + POISSON))
     return Fabric("isotropic", density, 1e-3, stiffness, stiffness, shear, POISSON, bending, bending, 0.0, FRICTION)
@@ -97,7 +97,7 @@ def hang(count: int, stiffness: float = STIFFNESS) -> Scene:
     flat = np.column_stack([across - 0.5 * SIDE, along, np.zeros(len(along))])
     start = flat + np.outer(_bump(across, along), [0.0, 0.0, 1.0])
     corners = ((count - 1) * count, count * count - 1)
-    model = build(TriangleMesh(start, faces), RestShape(flat), isotropic(stiffness), pinned=corners)
+    model = build_cloth(TriangleMesh(start, faces), RestShape(flat), isotropic_sheet(stiffness), pinned=corners)
     return Scene(f"hang {count}", model, start, flat, (), default_skin(model.edge_length))
 
 
@@ -107,7 +107,7 @@ def sphere(count: int, stiffness: float = STIFFNESS) -> Scene:
     height = RADIUS + DROP
     flat = np.column_stack([across - 0.5 * SIDE, np.full(len(along), height), 0.5 * SIDE - along])
     start = flat + np.outer(_bump(across, along), [0.0, 1.0, 0.0])
-    model = build(TriangleMesh(start, faces), RestShape(flat), isotropic(stiffness))
+    model = build_cloth(TriangleMesh(start, faces), RestShape(flat), isotropic_sheet(stiffness))
     center = (0.0, 0.0, 0.0)
     ball = Sphere(center, RADIUS, FRICTION)
     return Scene(f"sphere {count}", model, start, flat, (ball,), default_skin(model.edge_length), ball=center)
@@ -116,7 +116,7 @@ def sphere(count: int, stiffness: float = STIFFNESS) -> Scene:
 def shirt(edge_mm: float = 20.0, *, seconds: float = SHIRT_SECONDS) -> Scene:
     """Return the sample shirt on its form, as it stands, in poplin; edges of about this length [mm]."""
     mesh, form = shirt_on_form(edge_mm)
-    model = build(mesh, RestShape(mesh.vertices), POPLIN)
+    model = build_cloth(mesh, RestShape(mesh.vertices), POPLIN)
     body = BodyCollider(MovingBody(form.vertices[None], form.faces), 0.0, FRICTION)
     skin = default_skin(model.edge_length)
     return Scene(f"shirt {edge_mm:g} mm", model, mesh.vertices, mesh.vertices, (body,), skin, seconds, SHIRT_DAMPING)
@@ -161,4 +161,4 @@ def _bump(across: FloatArray, along: FloatArray) -> FloatArray:
 def shirt_on_form(edge_mm: float) -> tuple[TriangleMesh, TriangleMesh]:
     """Return the sample shirt as it is cut, edges of about this length [mm], and its dress form."""
     form = make_form()
-    return remesh(make_shirt(form), RemeshConfig(edge_mm=edge_mm), Job()), form.mesh
+    return remesh(make_hanging_shirt(form), RemeshConfig(edge_mm=edge_mm), Job()), form.mesh

@@ -39,7 +39,7 @@ Ended = tuple[ClothState, float]
 
 
 @dataclass(frozen=True)
-class Case:
+class SolverCase:
     """A scene with the range of what is spent on it.
 
     Args:
@@ -73,7 +73,7 @@ def rows(quick: bool, watch: Watch) -> Iterable[Row]:
     yield from iteration_rows(24 if quick else 64, 32 if quick else 512, 0.2 if quick else 10.0, watch)
 
 
-def run(scene: Scene, config: StepConfig) -> Ended:
+def run_scene(scene: Scene, config: StepConfig) -> Ended:
     """Return the last frame of a scene, and the residual there.
 
     Raises:
@@ -86,7 +86,7 @@ def run(scene: Scene, config: StepConfig) -> Ended:
 
 
 def timed_run(scene: Scene, config: StepConfig, *, budget: float, most: float = inf) -> tuple[Ended | None, Timing]:
-    """Return what `run` returns, and how long it takes: the method's own preparation counts, building the model not.
+    """Return what `run_scene` returns, and how long it takes: preparing the method counts, building the model does not.
 
     Args:
         scene: The scene.
@@ -106,7 +106,7 @@ def timed_run(scene: Scene, config: StepConfig, *, budget: float, most: float = 
     expected = step * stepper.substeps * scene.seconds / FRAME
     if expected > most:
         return None, Timing(expected, 0, compile_s)
-    ended, timing = timed(lambda: run(scene, config), budget=budget)
+    ended, timing = timed(lambda: run_scene(scene, config), budget=budget)
     return ended, replace(timing, compile_s=compile_s)
 
 
@@ -115,21 +115,21 @@ def _stepper(scene: Scene, config: StepConfig) -> Stepper:
     return Stepper(scene.model, scene.colliders, skin, config, damping=scene.damping)
 
 
-def _cases(quick: bool) -> Iterator[Case]:
+def _cases(quick: bool) -> Iterator[SolverCase]:
     if quick:
-        yield Case("hang 10", {"stiffness": 1e4}, lambda: hang(10), *_QUICKLY_SPENT)
-        yield Case("sphere 10", {"stiffness": 1e4}, lambda: sphere(10), *_QUICKLY_SPENT)
-        yield Case("shirt 50 mm", {}, lambda: shirt(50.0, seconds=0.4), *_QUICKLY_SPENT)
+        yield SolverCase("hang 10", {"stiffness": 1e4}, lambda: hang(10), *_QUICKLY_SPENT)
+        yield SolverCase("sphere 10", {"stiffness": 1e4}, lambda: sphere(10), *_QUICKLY_SPENT)
+        yield SolverCase("shirt 50 mm", {}, lambda: shirt(50.0, seconds=0.4), *_QUICKLY_SPENT)
         return
     for count in (32, 64, 128):
         for stiffness in (1e4, 1e5):
-            yield Case(f"hang {count}", {"stiffness": stiffness}, partial(hang, count, stiffness), *_SPENT)
+            yield SolverCase(f"hang {count}", {"stiffness": stiffness}, partial(hang, count, stiffness), *_SPENT)
     for count in (32, 64):
-        yield Case(f"sphere {count}", {"stiffness": 1e4}, partial(sphere, count), *_SPENT)
-    yield Case("shirt 20 mm", {}, shirt, *_SPENT)
+        yield SolverCase(f"sphere {count}", {"stiffness": 1e4}, partial(sphere, count), *_SPENT)
+    yield SolverCase("shirt 20 mm", {}, shirt, *_SPENT)
 
 
-def _rows_of(case: Case, watch: Watch) -> Iterator[Row]:
+def _rows_of(case: SolverCase, watch: Watch) -> Iterator[Row]:
     scene = case.make()
     reference = cache(partial(_reference, case, scene))
     count = len(scene.start)
@@ -162,7 +162,7 @@ def _whole(substeps: float) -> float:
     return substeps if substeps < 1.0 else float(round(substeps))
 
 
-def _measure(case: Case, scene: Scene, config: StepConfig, truth: Callable[[], ClothState]) -> Measured:
+def _measure(case: SolverCase, scene: Scene, config: StepConfig, truth: Callable[[], ClothState]) -> Measured:
     """Return one row's time and errors; of a run that failed, how."""
     try:
         ended, timing = timed_run(scene, config, budget=case.patience, most=case.most)
@@ -183,9 +183,9 @@ def _errors(scene: Scene, ended: Ended, truth: ClothState) -> dict[str, Value]:
     return errors
 
 
-def _reference(case: Case, scene: Scene) -> tuple[ClothState, Measured]:
+def _reference(case: SolverCase, scene: Scene) -> tuple[ClothState, Measured]:
     """Return the reference, and its row: its errors are those against steps twice as large."""
     fine, half = (StepConfig.model_validate({"substeps": case.reference // split}) for split in (1, 2))
-    coarse, _ = run(scene, half)
-    ended, timing = timed(lambda: run(scene, fine), runs=1)
+    coarse, _ = run_scene(scene, half)
+    ended, timing = timed(lambda: run_scene(scene, fine), runs=1)
     return ended[0], (timing, _errors(scene, ended, coarse))

@@ -46,7 +46,7 @@ def _crossed(rng: _Generator) -> tuple[_Mesh, None]:
         _turned(_moved(x, -0.1, 0.0, -0.1), 0, 0.5 * np.pi + rng.uniform(-0.6, 0.6)), 1, rng.uniform(0.0, np.pi)
     )
     x = _moved(x, 0.15, rng.choice([-1.0, 1.0]) * rng.uniform(0.04, 0.07), 0.15 + rng.uniform(-0.02, 0.02))
-    return _joined(_sheet(0.3, 0.3), (x, faces)), None
+    return _concatenate(_sheet(0.3, 0.3), (x, faces)), None
 
 
 def _corner(rng: _Generator) -> tuple[_Mesh, None]:
@@ -54,7 +54,7 @@ def _corner(rng: _Generator) -> tuple[_Mesh, None]:
     x, faces = _sheet(0.2, 0.2)
     x = _turned(_turned(x, 1, 0.25 * np.pi), 0, rng.uniform(0.5, 1.2))
     x = _moved(x, 0.05, -rng.uniform(0.02, 0.04), 0.15)
-    return _joined(_sheet(0.3, 0.3), (x, faces)), None
+    return _concatenate(_sheet(0.3, 0.3), (x, faces)), None
 
 
 def _woven(rng: _Generator) -> tuple[_Mesh, None]:
@@ -62,7 +62,7 @@ def _woven(rng: _Generator) -> tuple[_Mesh, None]:
     x, faces = _sheet(0.2, 0.2)
     x = _turned(_moved(x, -0.1, 0.0, -0.1), 0, rng.choice([-1.0, 1.0]) * rng.uniform(0.15, 0.4))
     x = _moved(x, 0.22 + rng.uniform(-0.02, 0.02), 0.0, 0.1 + rng.uniform(-0.03, 0.03))
-    return _joined(_sheet(0.2, 0.2), (x, faces)), None
+    return _concatenate(_sheet(0.2, 0.2), (x, faces)), None
 
 
 def _sleeve(rng: _Generator) -> tuple[_Mesh, None]:
@@ -70,7 +70,7 @@ def _sleeve(rng: _Generator) -> tuple[_Mesh, None]:
     x, faces = _tube(0.05, 0.3)
     x = _turned(x, 2, -0.5 * np.pi + rng.uniform(-0.3, 0.3))
     x = _moved(x, 0.15 - rng.uniform(0.02, 0.06), 0.2, rng.uniform(-0.03, 0.03))
-    return _joined(_tube(0.15, 0.4), (x, faces)), None
+    return _concatenate(_tube(0.15, 0.4), (x, faces)), None
 
 
 def _collar(rng: _Generator) -> tuple[_Mesh, None]:
@@ -90,7 +90,7 @@ def _layers(rng: _Generator) -> tuple[_Mesh, None]:
     outward = x * [1.0, 0.0, 1.0] / np.hypot(x[:, 0], x[:, 2])[:, None]
     for place in x[rng.integers(len(x), size=5)]:
         x = x + outward * (rng.uniform(6e-3, 12e-3) * np.exp(-((x - place) ** 2).sum(axis=1) / 0.03**2))[:, None]
-    return _joined(_tube(0.103, 0.24), (x, faces)), None
+    return _concatenate(_tube(0.103, 0.24), (x, faces)), None
 
 
 def _tip(rng: _Generator) -> tuple[_Mesh, None]:
@@ -102,7 +102,7 @@ def _tip(rng: _Generator) -> tuple[_Mesh, None]:
     face = coarse[0][coarse[1]].mean(axis=1)
     middle = face[((face[:, None] - x[inner]) ** 2).sum(axis=2).min(axis=1).argmin()]
     x[np.flatnonzero(inner)[((x[inner] - middle) ** 2).sum(axis=1).argmin()], 1] = -0.003
-    return _joined(coarse, (x, faces)), None
+    return _concatenate(coarse, (x, faces)), None
 
 
 def _shifted(rng: _Generator) -> tuple[_Mesh, TriangleMesh]:
@@ -122,7 +122,7 @@ def _unclean(rng: _Generator) -> tuple[_Mesh, TriangleMesh]:
     x = _moved(x, far * np.cos(side), 0.0, far * np.sin(side))
     one, other = _ball((0.0, 0.06, 0.0), (0.1, 0.1, 0.1)), _ball((0.0, 0.14, 0.0), (0.1, 0.1, 0.1))
     open_below = one.faces[one.vertices[one.faces].mean(axis=1)[:, 1] > -0.03]
-    vertices, joined = _joined((one.vertices, open_below), (other.vertices, other.faces))
+    vertices, joined = _concatenate((one.vertices, open_below), (other.vertices, other.faces))
     return (x, faces), TriangleMesh(vertices, joined)
 
 
@@ -190,6 +190,6 @@ def _turned(points: FloatArray, axis: int, angle: float) -> FloatArray:
     return result
 
 
-def _joined(one: _Mesh, other: _Mesh) -> _Mesh:
+def _concatenate(one: _Mesh, other: _Mesh) -> _Mesh:
     """Return two meshes as one, not welded."""
     return np.vstack([one[0], other[0]]), np.vstack([one[1], other[1] + len(one[0])]).astype(np.int32)

@@ -11,7 +11,7 @@ import numpy as np
 from vto_pipeline.bench.bench import Measured, Row, Value, Watch
 from vto_pipeline.bench.cloth.scenes import FRICTION
 from vto_pipeline.bench.collision.sheets import square
-from vto_pipeline.bench.scaling.sizes import power_law
+from vto_pipeline.bench.scaling.sizes import fit_power_law
 from vto_pipeline.bench.timing import timed
 from vto_pipeline.cloth.collision.self_collision.candidates import self_candidates
 from vto_pipeline.cloth.collision.self_collision.pieces import surface_components
@@ -70,7 +70,7 @@ def _measure(prepare: Callable[[_Step], Search], make: Callable[[int], _Step], s
 
 
 def _exponent(rows: list[Row]) -> Row:
-    found = power_law([row.vertices for row in rows], [row.seconds for row in rows])
+    found = fit_power_law([row.vertices for row in rows], [row.seconds for row in rows])
     errors: dict[str, Value] = {"exponent": found.exponent, "exponent_uncertainty": found.uncertainty}
     last = rows[-1]
     return Row(last.scene, f"{last.method}, exponent", {"sizes": len(rows)}, last.vertices, 0.0, errors)

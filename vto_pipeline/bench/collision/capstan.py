@@ -11,7 +11,7 @@ from vto_pipeline.bench.physics.closed_forms import capstan
 from vto_pipeline.bench.physics.meshes import strip
 from vto_pipeline.cloth import Capsule
 from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
-from vto_pipeline.cloth.model.build import at_rest, build
+from vto_pipeline.cloth.model.build import at_rest, build_cloth
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.model.settings import checked
 from vto_pipeline.model.fabric import Fabric
@@ -65,7 +65,7 @@ def heavy_end_sinks(settings: Mapping[str, object], friction: float, ratio: floa
     start, flat = np.column_stack([x, y, -points[:, 1]]), np.column_stack([s, 0.0 * s, -points[:, 1]])
     fabric = Fabric("strip", _DENSITY, 1e-4, _STIFFNESS, _STIFFNESS, 0.5 * _STIFFNESS, 0.0, 0.0, 0.0, 0.0, friction)
     materials = checked(Materials, {"bending": "none"})
-    model = build(TriangleMesh(start, faces), RestShape(flat), fabric, materials=materials)
+    model = build_cloth(TriangleMesh(start, faces), RestShape(flat), fabric, materials=materials)
     ends = [np.flatnonzero(s < s.min() + 1e-9), np.flatnonzero(s > s.max() - 1e-9)]
     mass = model.mass.copy()
     for end, weight in zip(ends, (_WEIGHT, ratio * _WEIGHT), strict=True):

@@ -10,15 +10,15 @@ from typing import cast
 import numpy as np
 
 from vto_pipeline.bench.bench import Measured, Row, Value, Watch
-from vto_pipeline.bench.cloth.scenes import STIFFNESS, hang, isotropic
+from vto_pipeline.bench.cloth.scenes import STIFFNESS, hang, isotropic_sheet
 from vto_pipeline.bench.collision.contact_scene import ContactScene
-from vto_pipeline.bench.collision.scenes import folded, hung_shirt, on_ball, pile
+from vto_pipeline.bench.collision.scenes import folded_towel, hung_shirt, on_ball, pile
 from vto_pipeline.bench.measures import PATIENCE, saved
 from vto_pipeline.bench.timing import clocked, timed
 from vto_pipeline.model.mesh import TriangleMesh
 
 
-def left_out_rows(quick: bool, watch: Watch) -> Iterator[Row]:
+def collision_left_out_rows(quick: bool, watch: Watch) -> Iterator[Row]:
     """A flat sheet that hangs, in short and in long steps, one on a ball, a fold, a pile, and a shirt on its form."""
     for make in _scenes(quick):
         scene = make()
@@ -31,7 +31,7 @@ def hung(count: int, name: str | None = None, **settings: Value) -> ContactScene
     held = tuple(int(i) for i in np.flatnonzero(plain.model.inverse_mass == 0.0))
     mesh = TriangleMesh(plain.start, plain.model.faces)
     return ContactScene(
-        name or plain.name, mesh, plain.rest, isotropic(STIFFNESS), [], plain.seconds, held, settings=settings
+        name or plain.name, mesh, plain.rest, isotropic_sheet(STIFFNESS), [], plain.seconds, held, settings=settings
     )
 
 
@@ -43,7 +43,7 @@ def _scenes(quick: bool) -> Iterator[Callable[[], ContactScene]]:
     yield partial(hung, 64)
     yield partial(hung, 64, "hang 64, long steps", substeps=0.25)
     yield partial(on_ball, 32)
-    yield partial(folded, 48)
+    yield partial(folded_towel, 48)
     yield partial(pile, 16)
     yield partial(hung_shirt, 20.0)
 

@@ -25,7 +25,7 @@ from vto_pipeline.bench.scaling.throughput import seconds_of
 from vto_pipeline.bench.timing import Timing
 from vto_pipeline.numerics.ccd import edge_edge_impact, vertex_face_impact
 from vto_pipeline.numerics.cpu_threads import limited_threads
-from vto_pipeline.numerics.distance import blend, closest_on_segments, closest_on_triangle
+from vto_pipeline.numerics.distance import barycentric_point, closest_on_segments, closest_on_triangle
 from vto_pipeline.numerics.vector import axpy, load_at, norm, scale, sub
 
 _PEER_BUDGET = 5.0  # s for each row; a fiftieth when quick
@@ -100,7 +100,7 @@ def apart(points, edges):  # type: ignore[no-untyped-def]
             s, t = closest_on_segments(a, b, c, d)
             between = sub(axpy(t, sub(d, c), sub(c, a)), scale(s, sub(b, a)))
         else:
-            between = sub(a, blend(closest_on_triangle(a, b, c, d)[0], b, c, d))
+            between = sub(a, barycentric_point(closest_on_triangle(a, b, c, d)[0], b, c, d))
         distance[i] = norm(between)
     return distance
 

@@ -15,7 +15,7 @@ from vto_pipeline.bench.cloth.scenes import (
     RADIUS,
     SHIRT_DAMPING,
     STIFFNESS,
-    isotropic,
+    isotropic_sheet,
     shirt_on_form,
     sphere,
 )
@@ -51,14 +51,14 @@ def on_ball(count: int, **settings: Value) -> ContactScene:
     mesh = TriangleMesh(plain.start, plain.model.faces)
     ball = Sphere((0.0, 0.0, 0.0), RADIUS, FRICTION)
     return ContactScene(
-        f"sphere {count}", mesh, plain.rest, isotropic(STIFFNESS), [ball], plain.seconds, settings=settings
+        f"sphere {count}", mesh, plain.rest, isotropic_sheet(STIFFNESS), [ball], plain.seconds, settings=settings
     )
 
 
-def folded(count: int, seconds: float = 1.5) -> ContactScene:
+def folded_towel(count: int, seconds: float = 1.5) -> ContactScene:
     """A towel of N x N / 2 vertices folded in four, let go over a plane."""
     start, flat, faces = folded_twice(count, 0.5, 0.25, 0.012)
-    fabric = isotropic(STIFFNESS, bending=BENDING)
+    fabric = isotropic_sheet(STIFFNESS, bending=BENDING)
     return ContactScene(f"folded twice {count}", TriangleMesh(start, faces), flat, fabric, [_FLOOR], seconds)
 
 
@@ -75,7 +75,7 @@ def ball_on_sheets(count: int, seconds: float = 1.5) -> ContactScene:
     drop = np.where(times > fall, top + (low - top) * late * (2.0 - late), drop)
     path = Path(times, np.column_stack([0.0 * drop, drop, 0.0 * drop]))
     ball = Moving(Sphere((0.0, 0.0, 0.0), radius, FRICTION), path)
-    fabric = isotropic(STIFFNESS, bending=BENDING)
+    fabric = isotropic_sheet(STIFFNESS, bending=BENDING)
     name = f"ball on ten sheets {count}"
     return ContactScene(name, TriangleMesh(flat, faces), flat, fabric, [_FLOOR, ball], seconds)
 
@@ -93,7 +93,7 @@ def twisted(count: int, seconds: float = 2.0) -> ContactScene:
         nearer = 1.0 - 0.35 * share
         return np.column_stack([nearer * x, y * np.cos(turn) - z * np.sin(turn), y * np.sin(turn) + z * np.cos(turn)])
 
-    fabric = isotropic(STIFFNESS, bending=BENDING)
+    fabric = isotropic_sheet(STIFFNESS, bending=BENDING)
     still: dict[str, Value] = {"damping": 2.0}
     mesh = TriangleMesh(flat, faces)
     return ContactScene(f"two full turns {count}", mesh, flat, fabric, [], seconds, tuple(ends), path, still)
@@ -104,7 +104,7 @@ def through_funnel(count: int, seconds: float = 1.5) -> ContactScene:
     start, faces = square(count, 0.4)
     start = start + np.array([0.0, 0.13, 0.0])
     middle = np.flatnonzero(np.linalg.norm(start[:, [0, 2]], axis=1) < 0.03)
-    fabric = isotropic(STIFFNESS, bending=BENDING)
+    fabric = isotropic_sheet(STIFFNESS, bending=BENDING)
 
     def path(time: float) -> FloatArray:
         return start[middle] - np.array([0.0, 0.5 * min(time / (0.9 * seconds), 1.0), 0.0])
@@ -122,7 +122,7 @@ def table_cloth(count: int, speed: float) -> ContactScene:
     def path(time: float) -> FloatArray:
         return start[edge] + np.array([speed * time, 0.0, 0.0])
 
-    fabric = isotropic(STIFFNESS, bending=BENDING)
+    fabric = isotropic_sheet(STIFFNESS, bending=BENDING)
     name, seconds = f"table cloth {count}, {speed:g} m/s", 0.5 / speed
     return ContactScene(name, TriangleMesh(start, faces), flat, fabric, [_TABLE], seconds, tuple(edge), path)
 
@@ -130,7 +130,7 @@ def table_cloth(count: int, speed: float) -> ContactScene:
 def pile(count: int, seconds: float = 2.0) -> ContactScene:
     """Five squares of N x N vertices, one on the other on a plane."""
     flat, faces = stacked(LAYERS, square(count, 0.2), 0.003)
-    fabric = isotropic(STIFFNESS, bending=BENDING)
+    fabric = isotropic_sheet(STIFFNESS, bending=BENDING)
     return ContactScene(f"pile of five {count}", TriangleMesh(flat, faces), flat, fabric, [_FLOOR], seconds)
 
 
@@ -144,7 +144,7 @@ def hung_shirt(edge_mm: float, seconds: float = 1.0) -> ContactScene:
 def _scenes(quick: bool) -> Iterator[Callable[[], ContactScene]]:
     if quick:
         yield partial(on_ball, 16)
-        yield partial(folded, 16, 0.5)
+        yield partial(folded_towel, 16, 0.5)
         yield partial(ball_on_sheets, 8, 0.4)
         yield partial(twisted, 16, 0.5)
         yield partial(through_funnel, 12, 0.5)
@@ -154,7 +154,7 @@ def _scenes(quick: bool) -> Iterator[Callable[[], ContactScene]]:
     for count in (32, 64, 128):
         yield partial(on_ball, count)
         yield partial(on_ball, count, substeps=0.6)  # 1/36 s
-    yield partial(folded, 48)
+    yield partial(folded_towel, 48)
     yield partial(ball_on_sheets, 24)
     yield partial(twisted, 48)
     yield partial(through_funnel, 40)

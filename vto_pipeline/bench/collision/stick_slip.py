@@ -11,7 +11,7 @@ from vto_pipeline.bench.physics.meshes import strip
 from vto_pipeline.cloth import Plane
 from vto_pipeline.cloth.dynamics.methods import FRAME
 from vto_pipeline.cloth.dynamics.stepper import Pins, StepConfig, Stepper
-from vto_pipeline.cloth.model.build import at_rest, build
+from vto_pipeline.cloth.model.build import at_rest, build_cloth
 from vto_pipeline.cloth.model.settings import checked
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import Fabric
@@ -55,7 +55,7 @@ def slipping_shortening(settings: Mapping[str, object], friction: float, edges: 
     fabric = Fabric(
         "strip", _DENSITY, 1e-4, _STIFFNESS, _STIFFNESS, 0.5 * _STIFFNESS, 0.0, _RIGIDITY, _RIGIDITY, 0.0, friction
     )
-    model = build(TriangleMesh(start, faces), RestShape(flat), fabric, pinned=held, gravity=(0.0, 0.0, 0.0))
+    model = build_cloth(TriangleMesh(start, faces), RestShape(flat), fabric, pinned=held, gravity=(0.0, 0.0, 0.0))
 
     def shortened(time: float) -> float:
         return exact * (0.5 + time / _SECONDS)

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from vto_pipeline.bench.docs.pages import SOURCES, render
+from vto_pipeline.bench.docs.pages import SOURCES, render_pages
 from vto_pipeline.bench.docs.prose import README_WORDS, count_words, long_sentences, typed_figures
 from vto_pipeline.errors import VtoError
 from vto_pipeline.io.files import replacing
@@ -19,7 +19,7 @@ def faults(root: Path) -> Iterator[str]:
     Raises:
         ConfigError: a template asks for a figure that no results file has.
     """
-    for name, text in render(root).items():
+    for name, text in render_pages(root).items():
         page = root / name
         if not page.is_file() or page.read_text(encoding="utf-8") != text:
             yield f"{name}: not what its source and results say; run `make docs`"
@@ -45,7 +45,7 @@ def main() -> int:
             found = list(faults(arguments.root))
             sys.stdout.writelines(f"{line}\n" for line in found)
             return int(bool(found))
-        for name, text in render(arguments.root).items():
+        for name, text in render_pages(arguments.root).items():
             with replacing(arguments.root / name) as beside:
                 beside.write_text(text, encoding="utf-8")
     except VtoError as error:

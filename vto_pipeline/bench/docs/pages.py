@@ -15,7 +15,7 @@ _FRONT = "README.md"
 _NOTE = "<!-- Written by `make docs` from {source}: change that. -->\n"
 
 
-def render(root: Path) -> dict[str, str]:
+def render_pages(root: Path) -> dict[str, str]:
     """Return every page that is made from a template.
 
     Args:

@@ -21,7 +21,7 @@ def sample_document(run: Path, found: Mapping[str, Any]) -> dict[str, Any]:
         found: From `demo.measure_demo`.
 
     Returns:
-        A document like those of `record.carry_out`. Its rows have the run's name as scene; their methods are
+        A document like those of `record.run_bench`. Its rows have the run's name as scene; their methods are
         "garment", "draped" and so on, "stage NAME" for the seconds of each stage, and "all stages".
     """
     name = run.resolve().name

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 
 from vto_pipeline.bench.bench import Row, Watch
 from vto_pipeline.bench.drape.budget import budget_rows
-from vto_pipeline.bench.drape.case import Case
-from vto_pipeline.bench.drape.left_out import left_out_rows
+from vto_pipeline.bench.drape.case import DrapeCase
+from vto_pipeline.bench.drape.left_out import drape_left_out_rows
 from vto_pipeline.bench.drape.refinement import refinement_rows
 from vto_pipeline.bench.drape.scanned import scanned_rows
 
 
 def rows(quick: bool, watch: Watch) -> Iterator[Row]:
     """Measure all of them, once the kernels are compiled."""
-    Case("skirt", "slim", "denim", edge_mm=60.0).drape({"target_error_mm": 0.5})
-    for part in (budget_rows, refinement_rows, scanned_rows, left_out_rows):
+    DrapeCase("skirt", "slim", "denim", edge_mm=60.0).drape({"target_error_mm": 0.5})
+    for part in (budget_rows, refinement_rows, scanned_rows, drape_left_out_rows):
         yield from part(quick, watch)

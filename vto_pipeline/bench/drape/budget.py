@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from functools import cache, partial
 
 from vto_pipeline.bench.bench import Measured, Row, Value, Watch
-from vto_pipeline.bench.drape.case import Case, findings
+from vto_pipeline.bench.drape.case import DrapeCase, findings
 from vto_pipeline.bench.measures import distance_mm
 from vto_pipeline.bench.timing import Timing, timed
 from vto_pipeline.model.cloth import Draped
@@ -47,7 +47,7 @@ def budget_rows(quick: bool, watch: Watch) -> Iterator[Row]:
     targets = (4.0, 1.0) if quick else TARGETS_MM
     longest: dict[str, Value] = {"settle_seconds": 1.5 if quick else 60.0}
     for names in _CASES[:1] if quick else _CASES:
-        case = Case(*names, edge_mm=40.0 if quick else _EDGE_MM)
+        case = DrapeCase(*names, edge_mm=40.0 if quick else _EDGE_MM)
         vertices, edges = len(case.made().mesh.vertices), {"edge_mm": case.edge_mm}
         exact = {"target_error_mm": min(targets) / FINER, **longest}
         yield watch.row(case.name, "reference", {**exact, **edges}, vertices, partial(_exact, case, exact))
@@ -56,7 +56,7 @@ def budget_rows(quick: bool, watch: Watch) -> Iterator[Row]:
             yield watch.row(case.name, "drape", {**chosen, **edges}, vertices, partial(_measure, case, chosen, exact))
 
 
-def _measure(case: Case, settings: Settings, exact: Settings) -> Measured:
+def _measure(case: DrapeCase, settings: Settings, exact: Settings) -> Measured:
     """Return the time to a target, the distance to the reference, and how much larger that is than was predicted."""
     truth = _reference(case, tuple(exact.items()))[0]
     found, timing = timed(partial(case.drape, settings), budget=_PATIENCE)
@@ -71,11 +71,11 @@ def _measure(case: Case, settings: Settings, exact: Settings) -> Measured:
     return timing, {**judged, "reference_mm": known["predicted_mm"], **shown}
 
 
-def _exact(case: Case, exact: Settings) -> Measured:
+def _exact(case: DrapeCase, exact: Settings) -> Measured:
     found, timing = _reference(case, tuple(exact.items()))
     return timing, findings(found)
 
 
 @cache
-def _reference(case: Case, exact: tuple[tuple[str, Value], ...]) -> tuple[Draped, Timing]:
+def _reference(case: DrapeCase, exact: tuple[tuple[str, Value], ...]) -> tuple[Draped, Timing]:
     return timed(partial(case.drape, dict(exact)), runs=1)

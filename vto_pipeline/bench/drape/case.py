@@ -21,7 +21,7 @@ STAND: Mapping[str, Value] = {"place": "as_it_stands", "settle_seconds": 20.0}
 
 
 @dataclass(frozen=True)
-class Case:
+class DrapeCase:
     """A garment on the body it is cut for.
 
     Args:

@@ -10,9 +10,9 @@ import numpy as np
 from vto_pipeline.assess.clearance import clearance
 from vto_pipeline.assess.zones import ease_at_levels
 from vto_pipeline.avatar.measuring.avatar_measurements import fit_levels
-from vto_pipeline.avatar.template.regions import trunk
+from vto_pipeline.avatar.template.regions import trunk_vertices
 from vto_pipeline.bench.bench import Measured, Row, Value, Watch
-from vto_pipeline.bench.drape.case import Case, findings
+from vto_pipeline.bench.drape.case import DrapeCase, findings
 from vto_pipeline.bench.samples.garments.wearer import Wearer
 from vto_pipeline.bench.timing import Timing, timed
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
@@ -58,21 +58,21 @@ def figures(garment: TriangleMesh, rest: TriangleMesh, wearer: Wearer) -> dict[s
     """
     body = wearer.avatar.mesh
     hem = min((garment.vertices[loop, 1].mean() for loop in boundary_loops(garment)), default=np.nan)
-    every, on_trunk = np.ones(len(garment.faces), np.bool_), np.all(trunk(wearer.avatar)[body.faces], axis=1)
+    every, on_trunk = np.ones(len(garment.faces), np.bool_), np.all(trunk_vertices(wearer.avatar)[body.faces], axis=1)
     levels = ease_at_levels(garment, rest.vertices, body, fit_levels(wearer.avatar), every, on_trunk)
     girths = {f"{zone}_girth_mm": 1e3 * ease.garment_girth for zone, ease in levels.items() if ease is not None}
     gap = float(np.median(clearance(garment, body).distance))
     return {"hem_mm": 1e3 * float(hem), **girths, "clearance_mm": 1e3 * gap}
 
 
-def _case(vertices: int) -> Case:
+def _case(vertices: int) -> DrapeCase:
     """Return the garment with about this many vertices: V equilateral triangles' corners cover V √3/2 l²."""
-    probe = Case(*_GARMENT, edge_mm=_PROBE_MM).made().mesh
+    probe = DrapeCase(*_GARMENT, edge_mm=_PROBE_MM).made().mesh
     area = float(np.linalg.norm(face_area_vectors(probe), axis=1).sum())
-    return Case(*_GARMENT, edge_mm=round(1e3 * float(np.sqrt(area / (vertices * np.sqrt(0.75)))), 2))
+    return DrapeCase(*_GARMENT, edge_mm=round(1e3 * float(np.sqrt(area / (vertices * np.sqrt(0.75)))), 2))
 
 
-def _measure(case: Case, finest: Case, settings: tuple[tuple[str, Value], ...]) -> Measured:
+def _measure(case: DrapeCase, finest: DrapeCase, settings: tuple[tuple[str, Value], ...]) -> Measured:
     best, _ = _draped(finest, settings)
     found, timing = _draped(case, settings)
     rest, best_rest = (TriangleMesh(one.made().rest.positions, one.made().mesh.faces) for one in (case, finest))
@@ -85,5 +85,5 @@ def _measure(case: Case, finest: Case, settings: tuple[tuple[str, Value], ...]) 
 
 
 @cache
-def _draped(case: Case, settings: tuple[tuple[str, Value], ...]) -> tuple[Draped, Timing]:
+def _draped(case: DrapeCase, settings: tuple[tuple[str, Value], ...]) -> tuple[Draped, Timing]:
     return timed(partial(case.drape, dict(settings)), runs=1)

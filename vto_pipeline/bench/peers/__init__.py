@@ -12,7 +12,7 @@ from functools import partial
 from vto_pipeline.bench.bench import Measured, Row, Value, Watch
 from vto_pipeline.bench.cloth.scenes import Scene, hang, measures, sphere
 from vto_pipeline.bench.cloth.solvers import timed_run
-from vto_pipeline.bench.peers.peer import Peer, measure
+from vto_pipeline.bench.peers.peer import Peer, measure_peer
 from vto_pipeline.bench.timing import Timing
 from vto_pipeline.cloth.dynamics.stepper import StepConfig
 from vto_pipeline.errors import DivergedError, MissingDependencyError
@@ -61,7 +61,7 @@ def rows(quick: bool, watch: Watch) -> Iterator[Row]:
         for peer in found:
             for settings in peer.budgets(scene):
                 yield watch.row(
-                    scene.name, peer.name, settings, len(scene.start), partial(measure, peer, scene, settings)
+                    scene.name, peer.name, settings, len(scene.start), partial(measure_peer, peer, scene, settings)
                 )
 
 

@@ -64,7 +64,7 @@ class Peer:
         return made
 
 
-def measure(peer: Peer, scene: Scene, settings: Mapping[str, Value]) -> Measured:
+def measure_peer(peer: Peer, scene: Scene, settings: Mapping[str, Value]) -> Measured:
     """Return the median time of the frames, and what the last frame shows; of cloth that blew up, its status."""
     walls: list[float] = []
     while len(walls) < _RUNS and (not walls or walls[-1] <= _PATIENCE):

@@ -12,7 +12,7 @@ from vto_pipeline.bench.bench import Row, Watch
 from vto_pipeline.bench.physics.cantilever import DENSITY, LENGTH, MESHES, ClampedStrip, clamped_strip
 from vto_pipeline.bench.physics.closed_forms import lateral_buckling, lateral_buckling_at_tip, upright_strip
 from vto_pipeline.bench.physics.meshes import MeshKind
-from vto_pipeline.bench.physics.refinement import Case, refined
+from vto_pipeline.bench.physics.refinement import RefinementCase, refined
 from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
 from vto_pipeline.cloth.rest.equilibrium import EquilibriumConfig, equilibrium
 from vto_pipeline.numerics.linear.direct import DirectSolver
@@ -39,7 +39,7 @@ def buckling_rows(quick: bool, watch: Watch) -> Iterator[Row]:
                 yield from refined(watch, scene, bending, {"mesh": kind}, "edges", counts, make)
 
 
-def _case(scene: str, exact: float, bending: str, kind: MeshKind, edges: int) -> Case:
+def _case(scene: str, exact: float, bending: str, kind: MeshKind, edges: int) -> RefinementCase:
     upright = scene == "upright strip"
     width = LENGTH * (0.2 if upright else _ACROSS / edges)
     one = clamped_strip(
@@ -50,7 +50,7 @@ def _case(scene: str, exact: float, bending: str, kind: MeshKind, edges: int) ->
         found = critical_load(one, scene, exact)
         return {"critical_share": abs(found / exact - 1.0), "critical": found}
 
-    return Case(len(one.flat), run)
+    return RefinementCase(len(one.flat), run)
 
 
 def critical_load(one: ClampedStrip, scene: str, expected: float) -> float:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from vto_pipeline.bench.bench import Row, Watch
 from vto_pipeline.bench.physics.elastica import Elastica, cantilever
 from vto_pipeline.bench.physics.meshes import MeshKind, strip
-from vto_pipeline.bench.physics.refinement import Case, refined
-from vto_pipeline.cloth.model.build import ClothModel, build
+from vto_pipeline.bench.physics.refinement import RefinementCase, refined
+from vto_pipeline.cloth.model.build import ClothModel, build_cloth
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.model.settings import checked
 from vto_pipeline.cloth.rest.equilibrium import Equilibrium, equilibrium
@@ -83,7 +83,7 @@ def clamped_strip(
     held = np.flatnonzero(x < 0.01 * edge)
     shear = 0.5 * stiffness  # no contraction across: an isotropic sheet with Poisson's ratio zero
     fabric = Fabric("strip", DENSITY, 1e-4, stiffness, stiffness, shear, 0.0, rigidity, rigidity, 0.0, 0.3)
-    model = build(
+    model = build_cloth(
         TriangleMesh(flat, faces),
         RestShape(flat),
         fabric,
@@ -115,7 +115,7 @@ def refinements(quick: bool) -> tuple[int, ...]:
 
 def _case(
     bending: str, kind: MeshKind, exact: Elastica, gravity: float, tip: float, rigidity: float, edges: int
-) -> Case:
+) -> RefinementCase:
     one = clamped_strip(bending, kind, edges, rigidity, gravity=gravity)
 
     def run() -> dict[str, float]:
@@ -123,7 +123,7 @@ def _case(
         load[one.tip, 1] = -tip * rigidity / LENGTH**2 * WIDTH * _tip_shares(one)
         return strip_errors(one, equilibrium(one.model, one.flat, load=load), exact)
 
-    return Case(len(one.flat), run)
+    return RefinementCase(len(one.flat), run)
 
 
 def _tip_shares(one: ClampedStrip) -> FloatArray:

@@ -18,7 +18,7 @@ from vto_pipeline.bench.physics.cantilever import MESHES
 from vto_pipeline.bench.physics.meshes import MeshKind, disc
 from vto_pipeline.bench.timing import Timing, clocked
 from vto_pipeline.cloth.collision.contacts import empty_contacts
-from vto_pipeline.cloth.model.build import ClothModel, at_rest, build
+from vto_pipeline.cloth.model.build import ClothModel, at_rest, build_cloth
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.model.settings import checked
 from vto_pipeline.cloth.rest.equilibrium import EquilibriumConfig, equilibrium
@@ -119,7 +119,7 @@ def specimen(
     flat = np.column_stack([points[:, 0], np.zeros(len(points)), -points[:, 1]])
     away = np.linalg.norm(points, axis=1)
     held = np.flatnonzero(away < support * (1.0 + 1e-9))
-    model = build(
+    model = build_cloth(
         TriangleMesh(flat, faces),
         RestShape(flat),
         fabric,

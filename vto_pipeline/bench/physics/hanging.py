@@ -12,11 +12,11 @@ from vto_pipeline.bench.bench import Row, Watch
 from vto_pipeline.bench.physics.cantilever import MESHES
 from vto_pipeline.bench.physics.closed_forms import catenary, hanging_strip, pendulum_period
 from vto_pipeline.bench.physics.meshes import MeshKind, strip
-from vto_pipeline.bench.physics.refinement import Case, refined
+from vto_pipeline.bench.physics.refinement import RefinementCase, refined
 from vto_pipeline.cloth.collision.contacts import empty_contacts
 from vto_pipeline.cloth.constraints.points.spring import springs
 from vto_pipeline.cloth.integrators import INTEGRATORS
-from vto_pipeline.cloth.model.build import ClothModel, ClothState, build, model_of
+from vto_pipeline.cloth.model.build import ClothModel, ClothState, build_cloth, model_of
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.model.settings import checked
 from vto_pipeline.cloth.rest.equilibrium import EquilibriumConfig, equilibrium
@@ -53,7 +53,7 @@ def _chain(points: FloatArray, stiffness: float, pinned: list[int], rest: float)
     return model_of((springs(pairs, points, 1.0 / (stiffness * count), rest=rest),), mass, pinned=pinned)
 
 
-def _hanging_chain(count: int) -> Case:
+def _hanging_chain(count: int) -> RefinementCase:
     points = np.zeros((count + 1, 3))
     points[:, 1] = -np.linspace(0.0, _LENGTH, count + 1)
     model = _chain(points, 20.0, [0], _LENGTH / count)
@@ -62,15 +62,15 @@ def _hanging_chain(count: int) -> Case:
         found = equilibrium(model, points, EquilibriumConfig(tolerance=1e-11)).positions
         return {"length_share": abs((-found[-1, 1] - _LENGTH) / hanging_strip(_WEIGHT, 20.0, _LENGTH) - 1.0)}
 
-    return Case(count + 1, run)
+    return RefinementCase(count + 1, run)
 
 
-def _hanging_strip(kind: MeshKind, count: int) -> Case:
+def _hanging_strip(kind: MeshKind, count: int) -> RefinementCase:
     points, faces = strip(kind, 0.0, _LENGTH, 0.2, _LENGTH / count)
     flat = np.column_stack([points[:, 1], -points[:, 0], np.zeros(len(points))])
     fabric = Fabric("strip", 0.2, 1e-4, 100.0, 100.0, 50.0, 0.0, 0.0, 0.0, 0.0, 0.3)
     top = np.flatnonzero(flat[:, 1] > -1e-9)
-    model = build(
+    model = build_cloth(
         TriangleMesh(flat, faces),
         RestShape(flat),
         fabric,
@@ -83,10 +83,10 @@ def _hanging_strip(kind: MeshKind, count: int) -> Case:
         longer = (flat - equilibrium(model, flat).positions)[bottom, 1].mean()
         return {"length_share": float(abs(longer / hanging_strip(0.2 * GRAVITY, 100.0, _LENGTH) - 1.0))}
 
-    return Case(len(flat), run)
+    return RefinementCase(len(flat), run)
 
 
-def _catenary(count: int) -> Case:
+def _catenary(count: int) -> RefinementCase:
     """A chain half as long again as its span, nearly rigid, that starts as a triangle."""
     span = _LENGTH / _SLACK
     x = np.linspace(0.0, span, count + 1)
@@ -99,11 +99,11 @@ def _catenary(count: int) -> Case:
         found = equilibrium(model, points, EquilibriumConfig(iterations=2000)).positions
         return {"sag_share": float(abs(-found[:, 1].min() / span / sag - 1.0))}
 
-    return Case(count + 1, run)
+    return RefinementCase(count + 1, run)
 
 
-def _pendulum(name: str, steps: int) -> Case:
-    return Case(2, lambda: {"period_share": pendulum_error(name, steps)})
+def _pendulum(name: str, steps: int) -> RefinementCase:
+    return RefinementCase(2, lambda: {"period_share": pendulum_error(name, steps)})
 
 
 def pendulum_error(name: str, steps: int) -> float:

@@ -23,11 +23,11 @@ from vto_pipeline.bench.physics.cantilever import (
 )
 from vto_pipeline.bench.physics.closed_forms import cantilever_modes, hanging_sheet_modes
 from vto_pipeline.bench.physics.meshes import strip
-from vto_pipeline.bench.physics.refinement import Case, refined
+from vto_pipeline.bench.physics.refinement import RefinementCase, refined
 from vto_pipeline.cloth.collision.contacts import empty_contacts
 from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
 from vto_pipeline.cloth.integrators import INTEGRATORS
-from vto_pipeline.cloth.model.build import ClothModel, ClothState, build
+from vto_pipeline.cloth.model.build import ClothModel, ClothState, build_cloth
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.model.settings import checked
 from vto_pipeline.cloth.rest.equilibrium import EquilibriumConfig, equilibrium
@@ -57,10 +57,12 @@ def mode_rows(quick: bool, watch: Watch) -> Iterator[Row]:
     yield from refined(watch, "cantilever in motion", "shape_operator", {"mesh": "irregular"}, "edges", counts, _moving)
 
 
-def _clamped(bending: str, kind: MeshKind, edges: int) -> Case:
+def _clamped(bending: str, kind: MeshKind, edges: int) -> RefinementCase:
     one = clamped_strip(bending, kind, edges, _RIGIDITY, gravity=0.0)
     scale = LENGTH**2 * np.sqrt(DENSITY / _RIGIDITY)
-    return Case(len(one.flat), lambda: _mode_errors(scale * bending_frequencies(one.model, one.flat), cantilever_modes))
+    return RefinementCase(
+        len(one.flat), lambda: _mode_errors(scale * bending_frequencies(one.model, one.flat), cantilever_modes)
+    )
 
 
 def _mode_errors(found: FloatArray, exact: Callable[[int], FloatArray]) -> dict[str, float]:
@@ -68,13 +70,13 @@ def _mode_errors(found: FloatArray, exact: Callable[[int], FloatArray]) -> dict[
     return {f"mode_{i + 1}_share": float(share) for i, share in enumerate(shares)}
 
 
-def _hung(kind: MeshKind, edges: int) -> Case:
+def _hung(kind: MeshKind, edges: int) -> RefinementCase:
     """A sheet that hangs from its top edge and does not bend, y = 0 at the top."""
     points, faces = strip(kind, 0.0, _SHEET, 0.2 * _SHEET, _SHEET / edges)
     flat = np.column_stack([points[:, 1], -points[:, 0], np.zeros(len(points))])
     held = np.flatnonzero(flat[:, 1] > -1e-9)
     fabric = Fabric("sheet", DENSITY, 1e-4, 1e5, 1e5, 5e4, 0.0, 0.0, 0.0, 0.0, 0.3)
-    model = build(
+    model = build_cloth(
         TriangleMesh(flat, faces),
         RestShape(flat),
         fabric,
@@ -82,7 +84,9 @@ def _hung(kind: MeshKind, edges: int) -> Case:
         materials=checked(Materials, {"bending": "none"}),
     )
     scale = np.sqrt(_SHEET / GRAVITY)
-    return Case(len(flat), lambda: _mode_errors(scale * hanging_frequencies(model, flat), hanging_sheet_modes))
+    return RefinementCase(
+        len(flat), lambda: _mode_errors(scale * hanging_frequencies(model, flat), hanging_sheet_modes)
+    )
 
 
 def bending_frequencies(model: ClothModel, flat: FloatArray) -> FloatArray:
@@ -121,11 +125,11 @@ def _free_system(model: ClothModel, x: FloatArray) -> tuple[NDArray[np.int64], c
     return free, csc_array(0.5 * (matrix + matrix.T)), np.repeat(model.mass[free], 3)
 
 
-def _moving(edges: int) -> Case:
+def _moving(edges: int) -> RefinementCase:
     """The strip's first mode once more, by watching it swing."""
     one = clamped_strip("shape_operator", "irregular", edges, _RIGIDITY, gravity=0.0)
     exact = float(cantilever_modes(1)[0] * np.sqrt(_RIGIDITY / DENSITY) / LENGTH**2)
-    return Case(len(one.flat), lambda: {"mode_1_share": abs(swing_frequency(one, 60) / exact - 1.0)})
+    return RefinementCase(len(one.flat), lambda: {"mode_1_share": abs(swing_frequency(one, 60) / exact - 1.0)})
 
 
 def swing_frequency(one: ClampedStrip, steps: int) -> float:

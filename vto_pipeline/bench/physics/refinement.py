@@ -14,7 +14,7 @@ _EXACT = 1e-9  # an error below this is rounding and has no order
 
 
 @dataclass(frozen=True)
-class Case:
+class RefinementCase:
     """One refinement.
 
     Args:
@@ -33,7 +33,7 @@ def refined(
     settings: Mapping[str, Value],
     name: str,
     counts: Sequence[int],
-    make: Callable[[int], Case],
+    make: Callable[[int], RefinementCase],
 ) -> Iterator[Row]:
     """Yield a row for each count, which `settings` gets under this name."""
     before: tuple[int, float] | None = None
@@ -46,7 +46,7 @@ def refined(
         yield row
 
 
-def _measured(case: Case, count: int, before: tuple[int, float] | None) -> Measured:
+def _measured(case: RefinementCase, count: int, before: tuple[int, float] | None) -> Measured:
     found, seconds = clocked(case.run)
     errors: dict[str, Value] = dict(found)
     error = next(iter(errors.values()))

@@ -16,7 +16,7 @@ from vto_pipeline.bench.samples.captures.render import SUIT, Surface, build_scen
 from vto_pipeline.bench.samples.captures.studio import dressed_form
 from vto_pipeline.bench.samples.captures.viewpoints import looking_at
 from vto_pipeline.bench.samples.customer import make_customer, measure_truth
-from vto_pipeline.bench.samples.garments.shirt import make_shirt
+from vto_pipeline.bench.samples.garments.shirt import make_hanging_shirt
 from vto_pipeline.bench.samples.solids.form import Form, make_form
 from vto_pipeline.io.bodies.measurements import write_measurements
 from vto_pipeline.io.captures.cameras import write_cameras, write_trajectory
@@ -55,10 +55,10 @@ def make_samples(out: Path, parts: Collection[str] = PARTS, say: Callable[[str],
     say("form and shirt")
     form = make_form()
     form = Form(form.shape, rounded(form.mesh))
-    shirt = rounded(make_shirt(form))
+    shirt = rounded(make_hanging_shirt(form))
     write_ply(out / "shirt_on_form" / "form.ply", form.mesh)
     write_ply(out / "truth" / "shirt.ply", shirt)
-    write_ply(out / "shirt_on_form" / "shirt.ply", rounded(make_shirt(form, MESH_CELL)))
+    write_ply(out / "shirt_on_form" / "shirt.ply", rounded(make_hanging_shirt(form, MESH_CELL)))
     scene = dressed_form(form, shirt)
     if "photos" in parts:
         say("photos of the form")
@@ -76,7 +76,7 @@ def make_samples(out: Path, parts: Collection[str] = PARTS, say: Callable[[str],
         holes = [(shirt.vertices[i], diameter) for i, (_, diameter) in zip(nearest, HOLES, strict=True)]
         stations = around_stations(6, 1.5, (0.45, 0.40, 0.45), (-12.0, 15.0, 50.0))
         cloud = scan_stations(scene, stations, holes, count=60_000, seed=200)
-        write_ply(out / "shirt_on_form" / "cloud.ply", moved(cloud, cloud_from_form()))
+        write_ply(out / "shirt_on_form" / "cloud.ply", transform_cloud(cloud, cloud_from_form()))
         record = {"cloud_from_form": cloud_from_form(), "holes": [{"center": c, "diameter": d} for c, d in holes]}
         write_json(out / "truth" / "cloud.json", record)
     if "customer" in parts:
@@ -125,7 +125,7 @@ def cloud_from_form() -> FloatArray:
     return matrix
 
 
-def moved(cloud: PointCloud, matrix: FloatArray) -> PointCloud:
+def transform_cloud(cloud: PointCloud, matrix: FloatArray) -> PointCloud:
     """The cloud in another frame, rounded to a hundredth of a millimetre."""
     return PointCloud(np.round(cloud.points @ matrix[:3, :3].T + matrix[:3, 3], 5))
 

@@ -19,8 +19,8 @@ from vto_pipeline.bench.timing import Timing, threads_now, timed
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.numerics.cpu_threads import limited_threads
 from vto_pipeline.numerics.linear.block_matrix import BlockMatrix, to_scipy
-from vto_pipeline.numerics.linear.cholesky import factor_room, factorise
-from vto_pipeline.numerics.linear.elimination import eliminate
+from vto_pipeline.numerics.linear.cholesky import allocate_factor, factorise
+from vto_pipeline.numerics.linear.elimination import plan_elimination
 from vto_pipeline.numerics.linear.elimination_tree import dissection
 from vto_pipeline.numerics.linear.substitution import solve
 
@@ -74,8 +74,8 @@ def _own(matrix: BlockMatrix) -> Direct:
     """Return the solver of `cloth.implicit_step.linear_system`."""
     weights, between = np.empty((0, 4)), np.empty((0, 3, 3))
     order = dissection(matrix.starts, matrix.columns)
-    plan = eliminate(matrix.starts, matrix.columns, order, np.empty((0, 4), np.int32), weights)
-    room = factor_room(plan)
+    plan = plan_elimination(matrix.starts, matrix.columns, order, np.empty((0, 4), np.int32), weights)
+    room = allocate_factor(plan)
 
     def solved(right: FloatArray) -> FloatArray:
         x = np.empty_like(right)

@@ -46,7 +46,7 @@ def rows(quick: bool, watch: Watch) -> Iterable[Row]:
         yield from direct_rows(count, watch)
 
 
-def power_law(vertices: Sequence[float], seconds: Sequence[float]) -> PowerLaw:
+def fit_power_law(vertices: Sequence[float], seconds: Sequence[float]) -> PowerLaw:
     """Return the exponent by least squares on logarithms, and the standard error that the scatter gives it."""
     across, up = np.log(vertices), np.log(seconds)
     across = across - across.mean()
@@ -70,7 +70,7 @@ def _sizes(counts: Sequence[int], patience: float, watch: Watch) -> Iterator[Row
         reached.append(row)
         substeps = int(str(row.errors["substeps"]))
     if len(reached) > 1:
-        found = power_law([row.vertices for row in reached], [row.seconds for row in reached])
+        found = fit_power_law([row.vertices for row in reached], [row.seconds for row in reached])
         errors: dict[str, Value] = {"exponent": found.exponent, "exponent_uncertainty": found.uncertainty}
         yield Row(_SCENE, "exponent", {"sizes": len(reached)}, reached[-1].vertices, 0.0, errors)
 

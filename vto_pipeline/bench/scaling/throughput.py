@@ -16,12 +16,12 @@ import numpy as np
 from numba import njit
 
 from vto_pipeline.bench.bench import Measured, Row, Value, Watch
-from vto_pipeline.bench.cloth.scenes import STIFFNESS, grid, isotropic
+from vto_pipeline.bench.cloth.scenes import STIFFNESS, grid, isotropic_sheet
 from vto_pipeline.bench.scaling.roofline import bandwidth, peak
 from vto_pipeline.bench.timing import Timing, timed
 from vto_pipeline.cloth.constraints.sweep import add_forces, kind_of, multipliers, project
 from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
-from vto_pipeline.cloth.model.build import ClothModel, build
+from vto_pipeline.cloth.model.build import ClothModel, build_cloth
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.mesh import TriangleMesh
@@ -143,8 +143,8 @@ def _cloth(count: int) -> tuple[ClothModel, FloatArray]:
     """Return a sheet, and positions at which it is a little strained and bent."""
     across, along, faces = grid(count)
     flat = np.column_stack([across, along, np.zeros(len(along))])
-    fabric = isotropic(STIFFNESS, bending=_BENDING)
-    model = build(TriangleMesh(flat, faces), RestShape(flat), fabric, pinned=(0,))
+    fabric = isotropic_sheet(STIFFNESS, bending=_BENDING)
+    model = build_cloth(TriangleMesh(flat, faces), RestShape(flat), fabric, pinned=(0,))
     wave = 0.02 * np.sin(9.0 * across) * np.cos(7.0 * along)
     return model, np.column_stack([1.001 * across, along, wave])
 

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.linalg
 
 from vto_pipeline.bench.bench import Value
-from vto_pipeline.bench.stability.frequency import highest_frequency
+from vto_pipeline.bench.stability.frequency import highest_mode
 from vto_pipeline.cloth.model.build import ClothModel
 from vto_pipeline.model.arrays import FloatArray, IntArray
 
@@ -18,7 +18,7 @@ _COUNTED = 1e-3  # of the median: the strain of an edge shorter than this says n
 
 
 @dataclass(frozen=True)
-class Case:
+class StabilityCase:
     """A cloth in trouble.
 
     Args:
@@ -86,7 +86,7 @@ class Case:
     @cached_property
     def step_times_frequency(self) -> float:
         """h ω_max of the cloth at rest; infinite when it is rigid."""
-        return np.inf if self.rigid else self.h * highest_frequency(self.model, self.rest)[0]
+        return np.inf if self.rigid else self.h * highest_mode(self.model, self.rest)[0]
 
     def max_strain(self, positions: FloatArray) -> float:
         """Return the largest |l / l₀ - 1| of its edges."""

@@ -11,7 +11,7 @@ from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.numerics.linear.block_matrix import to_scipy
 
 
-def highest_frequency(model: ClothModel, positions: FloatArray) -> tuple[float, FloatArray]:
+def highest_mode(model: ClothModel, positions: FloatArray) -> tuple[float, FloatArray]:
     """Return ω_max [rad/s] and its mode, of unit length, shape (V, 3): K φ = ω² M φ at these positions [m].
 
     Dense, for hundreds of vertices: all that this bench asks for, and exact to rounding however stiff.

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.optimize import brentq
 
 from vto_pipeline.bench.cloth.closed_forms import growth_and_frequency
-from vto_pipeline.bench.stability.case import Case
-from vto_pipeline.bench.stability.frequency import highest_frequency
+from vto_pipeline.bench.stability.case import StabilityCase
+from vto_pipeline.bench.stability.frequency import highest_mode
 from vto_pipeline.bench.stability.trial import Maker
 from vto_pipeline.cloth.collision.contacts import empty_contacts
 from vto_pipeline.cloth.dynamics.residual import elastic_energy
@@ -52,7 +52,7 @@ def predicted_break(method: str) -> float:
     return float(brentq(lambda z: growth_and_frequency(method, z)[0] - _BROKEN, low, 2.0 * low + 1.0, xtol=1e-12))
 
 
-def measured_growth(case: Case, make: Maker, z: float) -> float:
+def measured_growth(case: StabilityCase, make: Maker, z: float) -> float:
     """Return by what factor a step of hω = z multiplies the amplitude of the highest mode, from its energy.
 
     Args:
@@ -64,7 +64,7 @@ def measured_growth(case: Case, make: Maker, z: float) -> float:
         The mean factor over `STEPS` steps, or until the amplitude has grown a thousandfold; infinite where it leaves
         every bound in one step.
     """
-    frequency, mode = highest_frequency(case.model, case.rest)
+    frequency, mode = highest_mode(case.model, case.rest)
     method = make(case.model, sweeps=case.sweeps, damping=0.0, max_speed=np.inf)
     state = ClothState(case.rest + _AMPLITUDE * case.model.edge_length * mode / np.abs(mode).max(), np.zeros_like(mode))
     first = _energy(case, state)
@@ -80,7 +80,7 @@ def measured_growth(case: Case, make: Maker, z: float) -> float:
     return factor ** (1.0 / STEPS)
 
 
-def breaks_at(case: Case, make: Maker) -> tuple[float, float]:
+def breaks_at(case: StabilityCase, make: Maker) -> tuple[float, float]:
     """Return the largest hω found to hold, and the smallest found to break; infinite where none up to 100 does."""
 
     def breaks(z: float) -> bool:
@@ -97,7 +97,7 @@ def breaks_at(case: Case, make: Maker) -> tuple[float, float]:
     return holds, broken
 
 
-def _energy(case: Case, state: ClothState) -> float:
+def _energy(case: StabilityCase, state: ClothState) -> float:
     with np.errstate(all="ignore"):
         return 0.5 * float(case.model.mass @ (state.velocities**2).sum(axis=1)) + elastic_energy(
             case.model, state.positions

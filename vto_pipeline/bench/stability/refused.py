@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from vto_pipeline.bench.bench import Measured
-from vto_pipeline.bench.cloth.scenes import grid, isotropic
+from vto_pipeline.bench.cloth.scenes import grid, isotropic_sheet
 from vto_pipeline.bench.timing import Timing
 from vto_pipeline.cloth.simulation import simulate
 from vto_pipeline.errors import ConfigError, InputError
@@ -46,7 +46,7 @@ def _run(
     mesh = TriangleMesh(good if positions is None else positions, triangles if faces is None else faces)
     simulate(
         mesh,
-        isotropic(stiffness, density),
+        isotropic_sheet(stiffness, density),
         rest=rest,
         pinned=pinned,
         seconds=seconds,

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from vto_pipeline.bench.cloth.scenes import grid, isotropic
-from vto_pipeline.bench.stability.case import Case
-from vto_pipeline.cloth.model.build import build
+from vto_pipeline.bench.cloth.scenes import grid, isotropic_sheet
+from vto_pipeline.bench.stability.case import StabilityCase
+from vto_pipeline.cloth.model.build import build_cloth
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.placement.collapsed_start import expand_collapsed_triangles
 from vto_pipeline.geometry.topology import edges, face_area_vectors
@@ -28,7 +28,7 @@ _FRAME = 1.0 / 60.0
 _STEPS = (10, 30, 60, 240, 2000)  # a second
 
 
-def sheet_cases() -> Iterator[Case]:
+def sheet_cases() -> Iterator[StabilityCase]:
     """Make all cases of sheets, one after the other."""
     for steps in _STEPS:
         yield replace(_swing(f"h 1/{steps}", *_flat(), h=1.0 / steps), step_tried=True)
@@ -47,7 +47,7 @@ def sheet_cases() -> Iterator[Case]:
     yield _flattened_ball()
 
 
-def quiet_sheet() -> Case:
+def quiet_sheet() -> StabilityCase:
     """A free sheet at rest without gravity, to swing in its plane at its highest frequency."""
     return replace(_swing("highest mode", *_flat(), gravity=0.0, pinned=(), falls=False), damping=0.0)
 
@@ -61,15 +61,15 @@ def _swing(
     gravity: float = GRAVITY,
     pinned: tuple[int, ...] | None = None,
     falls: bool = True,
-) -> Case:
+) -> StabilityCase:
     """A level sheet held at its first row, or by what is given, and let go for a second."""
     held = np.flatnonzero(rest[:, 2] == rest[:, 2].min()) if pinned is None else np.array(pinned)
     mesh = TriangleMesh(rest, faces)
-    fabric = isotropic(_STIFFNESS, _DENSITY, bending=1e-5)
-    model = build(mesh, RestShape(rest), fabric, pinned=held, gravity=(0.0, -gravity, 0.0))
+    fabric = isotropic_sheet(_STIFFNESS, _DENSITY, bending=1e-5)
+    model = build_cloth(mesh, RestShape(rest), fabric, pinned=held, gravity=(0.0, -gravity, 0.0))
     hanging = _DENSITY * gravity * float(np.ptp(rest[:, 2])) / _STIFFNESS
     substeps = max(1, round(_FRAME / h))
-    return Case(
+    return StabilityCase(
         name,
         model,
         rest,
@@ -84,7 +84,7 @@ def _swing(
     )
 
 
-def _rigid() -> Case:
+def _rigid() -> StabilityCase:
     """The same sheet, without compliance in its plane and without resistance to bending."""
     case = _swing("rigid sheet", *_flat())
     membrane = case.model.constraints[-1]
@@ -92,18 +92,20 @@ def _rigid() -> Case:
     return replace(case, model=replace(case.model, constraints=(rigid,)), rigid=True, strain=0.01)
 
 
-def _recovery(name: str, rest: FloatArray, faces: IntArray, start: FloatArray, *, curved: bool = False) -> Case:
+def _recovery(
+    name: str, rest: FloatArray, faces: IntArray, start: FloatArray, *, curved: bool = False
+) -> StabilityCase:
     """A sheet that must come back to its rest shape, from its start with ties broken, as a simulation does.
 
     Flat sheets bend by the quadratic model, which knows one shape without forces. Hinges can hold crumples of
     themselves where neighbours have folded over in opposite ways, and then not recovering is right.
     """
     mesh = TriangleMesh(rest, faces)
-    fabric = isotropic(_STIFFNESS, _DENSITY, bending=_BENDING)
+    fabric = isotropic_sheet(_STIFFNESS, _DENSITY, bending=_BENDING)
     materials = Materials.model_validate({"bending": "hinge" if curved else "isometric"})
-    return Case(
+    return StabilityCase(
         name,
-        build(mesh, RestShape(rest, curved), fabric, gravity=(0.0, 0.0, 0.0), materials=materials),
+        build_cloth(mesh, RestShape(rest, curved), fabric, gravity=(0.0, 0.0, 0.0), materials=materials),
         expand_collapsed_triangles(start, rest, mesh.faces),
         rest,
         edges(mesh),
@@ -116,7 +118,7 @@ def _recovery(name: str, rest: FloatArray, faces: IntArray, start: FloatArray, *
     )
 
 
-def _flattened_ball() -> Case:
+def _flattened_ball() -> StabilityCase:
     """A closed surface with its curvature as its rest angles, pressed into the plane y = 0."""
     from trimesh.creation import icosphere
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vto_pipeline.bench.stability.case import Case
+from vto_pipeline.bench.stability.case import StabilityCase
 from vto_pipeline.cloth.constraints.points.spring import springs
 from vto_pipeline.cloth.model.build import model_of
 from vto_pipeline.model.arrays import FloatArray
@@ -23,7 +23,7 @@ _STIFF, _SOFT = 1e8, 1e4  # [N/m]
 _SKIP = 100.0  # [N/m], of the springs from each vertex to the next but one
 
 
-def strand_cases() -> Iterator[Case]:
+def strand_cases() -> Iterator[StabilityCase]:
     """Make all cases of strands, one after the other."""
     yield _strand("stiffness 1e4/1e8", np.full(5, 0.1), 1.0 / np.array([_SOFT, _STIFF, _SOFT, _STIFF]))
     yield _strand("stiffness 1e12", np.ones(20), 1e-12)
@@ -31,7 +31,7 @@ def strand_cases() -> Iterator[Case]:
     yield _strand("mass ratio 1:1000", np.append(np.ones(19), 1000.0), 1.0 / _STIFF, skip=True)
 
 
-def _strand(name: str, mass: FloatArray, compliance: ArrayLike, *, skip: bool = False) -> Case:
+def _strand(name: str, mass: FloatArray, compliance: ArrayLike, *, skip: bool = False) -> StabilityCase:
     """A strand swinging from its first vertex; masses [kg], compliance of its springs [m/N]."""
     count = len(mass)
     tilt = np.deg2rad(_TILT_DEG)
@@ -43,7 +43,7 @@ def _strand(name: str, mass: FloatArray, compliance: ArrayLike, *, skip: bool = 
     data = springs(ends, rest, np.concatenate([softness, spare]))
     model = model_of((data,), mass, pinned=[0], gravity=(0.0, -_GRAVITY, 0.0), edge_length=_SPACING)
     hanging = float((softness * _GRAVITY * np.cumsum(mass[:0:-1])[::-1]).max()) / _SPACING
-    return Case(
+    return StabilityCase(
         name,
         model,
         rest,

@@ -11,12 +11,12 @@ import numpy as np
 
 from vto_pipeline.bench.bench import Measured, Row, Watch
 from vto_pipeline.bench.cloth.closed_forms import growth_and_frequency
-from vto_pipeline.bench.stability.case import Case
+from vto_pipeline.bench.stability.case import StabilityCase
 from vto_pipeline.bench.stability.limits import HIGHEST, LIMIT, STEPS, breaks_at, measured_growth, predicted_break
 from vto_pipeline.bench.stability.refused import REFUSED, REFUSED_VERTICES, refuse
 from vto_pipeline.bench.stability.sheets import quiet_sheet, sheet_cases
 from vto_pipeline.bench.stability.strands import strand_cases
-from vto_pipeline.bench.stability.trial import Maker, attempt, undisturbed
+from vto_pipeline.bench.stability.trial import Maker, run_trial, undisturbed
 from vto_pipeline.bench.stability.worn import worn_rows
 from vto_pipeline.bench.timing import timed
 from vto_pipeline.cloth.dynamics.methods import FRAME, METHODS, choose_method
@@ -57,7 +57,7 @@ def rows(quick: bool, watch: Watch) -> Iterator[Row]:
         yield from _refusals(name, name, watch)
 
 
-def _default_cell(case: Case, patience: float, watch: Watch) -> Row:
+def _default_cell(case: StabilityCase, patience: float, watch: Watch) -> Row:
     """What is chosen by the scene; of its own step only where the step is not what is tried."""
     choice = choose_method(case.model, case.start, None, None, None)
     if not case.step_tried:
@@ -66,9 +66,9 @@ def _default_cell(case: Case, patience: float, watch: Watch) -> Row:
     return _cell(DEFAULT, replace(case, sweeps=choice.sweeps), METHODS[choice.method], patience, watch, choice.method)
 
 
-def _cell(name: str, case: Case, make: Maker, patience: float, watch: Watch, chosen: str = "") -> Row:
+def _cell(name: str, case: StabilityCase, make: Maker, patience: float, watch: Watch, chosen: str = "") -> Row:
     settings = {**case.settings, "patience_s": patience, **({"chosen": chosen} if chosen else {})}
-    return watch.row(case.name, name, settings, len(case.start), lambda: attempt(case, make, patience))
+    return watch.row(case.name, name, settings, len(case.start), lambda: run_trial(case, make, patience))
 
 
 def _refusals(name: str, solver: str | None, watch: Watch) -> Iterator[Row]:
@@ -82,7 +82,7 @@ def _limit(name: str, watch: Watch) -> Row:
     return watch.row("stability limit", name, settings, len(case.start), lambda: measured_limit(name, case))
 
 
-def measured_limit(name: str, case: Case) -> Measured:
+def measured_limit(name: str, case: StabilityCase) -> Measured:
     """Return where a method breaks on the highest mode of a case, beside what theory says.
 
     Returns:

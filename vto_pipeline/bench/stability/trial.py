@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 import numpy as np
 
 from vto_pipeline.bench.bench import Measured, Value
-from vto_pipeline.bench.stability.case import Case
+from vto_pipeline.bench.stability.case import StabilityCase
 from vto_pipeline.bench.timing import Timing
 from vto_pipeline.cloth.collision.contacts import empty_contacts
 from vto_pipeline.cloth.dynamics.methods import Method
@@ -50,7 +50,7 @@ _LINGER = 30  # frames it must stay there before the run is cut short
 Maker = Callable[..., Method]
 
 
-def attempt(case: Case, make: Maker, limit: float) -> Measured:
+def run_trial(case: StabilityCase, make: Maker, limit: float) -> Measured:
     """Run a method on a case.
 
     Args:
@@ -84,7 +84,7 @@ def attempt(case: Case, make: Maker, limit: float) -> Measured:
 class _Run:
     """A run as far as it came."""
 
-    def __init__(self, case: Case) -> None:
+    def __init__(self, case: StabilityCase) -> None:
         self.why = ""
         self._case = case
         self._state = at_rest(case.start)
@@ -171,7 +171,7 @@ def undisturbed() -> Iterator[None]:
         yield
 
 
-def _warmed(case: Case, make: Maker) -> float:
+def _warmed(case: StabilityCase, make: Maker) -> float:
     """Return how long the first step of an instance takes, which compiles what the run needs [s]."""
     began = time.perf_counter()
     with suppress(ComputationError, ArithmeticError, RuntimeError, ValueError):  # the run itself will show it
@@ -179,11 +179,11 @@ def _warmed(case: Case, make: Maker) -> float:
     return time.perf_counter() - began
 
 
-def _made(case: Case, make: Maker) -> Method:
+def _made(case: StabilityCase, make: Maker) -> Method:
     return make(case.model, sweeps=case.sweeps, damping=case.damping, max_speed=np.inf)
 
 
-def _energies(case: Case, state: ClothState) -> tuple[float, float]:
+def _energies(case: StabilityCase, state: ClothState) -> tuple[float, float]:
     """Return the elastic energy, and the kinetic and potential energy, the last from the start's height [J]."""
     kinetic = 0.5 * float(case.model.mass @ (state.velocities**2).sum(axis=1))
     fallen: FloatArray = (state.positions - case.start) @ case.model.gravity

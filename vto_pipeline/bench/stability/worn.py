@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 
 from vto_pipeline.bench.bench import Measured, Row, Value, Watch
-from vto_pipeline.bench.drape.case import Case, findings
+from vto_pipeline.bench.drape.case import DrapeCase, findings
 from vto_pipeline.bench.timing import Timing, timed
 from vto_pipeline.errors import ComputationError
 from vto_pipeline.io.fabrics import read_fabric
@@ -26,7 +26,7 @@ _BASE = "cotton_poplin"
 
 def worn_rows(quick: bool, method: str, watch: Watch) -> Iterator[Row]:
     """A shirt of each fabric on a body of average size, with all contacts, by the method that a drape chooses."""
-    case = Case("shirt", "average", _BASE, edge_mm=40.0 if quick else 25.0)
+    case = DrapeCase("shirt", "average", _BASE, edge_mm=40.0 if quick else 25.0)
     base = read_fabric(_BASE)
     vertices = len(case.made().mesh.vertices)
     for what, values in EXTREMES.items():
@@ -57,7 +57,7 @@ def extreme(base: Fabric, what: str, value: float) -> Fabric:
     )
 
 
-def _measure(case: Case, fabric: Fabric, settings: Mapping[str, Value]) -> Measured:
+def _measure(case: DrapeCase, fabric: Fabric, settings: Mapping[str, Value]) -> Measured:
     try:
         found, timing = timed(partial(case.drape, settings, fabric), runs=1)
     except ComputationError as failure:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from vto_pipeline.cli.options import PATH, speaking
+from vto_pipeline.cli.options import PATH, message_options
 from vto_pipeline.cli.session import Session, pass_session
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 @click.option(
     "--against", type=PATH, metavar="FILE.jsonl", help="Results of other programs on the same scenes (solvers only)."
 )
-@speaking
+@message_options
 @pass_session
 def bench_command(
     session: Session, names: tuple[str, ...], folder: Path, quick: bool, force: bool, against: Path | None
@@ -46,7 +46,7 @@ def bench_command(
     """
     from vto_pipeline.bench import BENCHES
     from vto_pipeline.bench.cloth.comparison import read_peers
-    from vto_pipeline.bench.record import Files, carry_out
+    from vto_pipeline.bench.record import Files, run_bench
     from vto_pipeline.errors import ConfigError
 
     unknown = [name for name in names if name not in BENCHES]
@@ -59,7 +59,7 @@ def bench_command(
     for name in dict.fromkeys(names):
         session.say(f"bench {name}: {BENCHES[name].about}")
         documents.append(
-            carry_out(name, BENCHES[name], folder, quick=quick, force=force, peers=peers.get(name, ()), say=session.say)
+            run_bench(name, BENCHES[name], folder, quick=quick, force=force, peers=peers.get(name, ()), say=session.say)
         )
     files = [Files.of(document["bench"], folder) for document in documents]
     data = [{**document, "picture": str(one.picture)} for document, one in zip(documents, files, strict=True)]

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import click
 
-from vto_pipeline.cli.options import speaking
+from vto_pipeline.cli.options import message_options
 from vto_pipeline.cli.session import Session, pass_session
 from vto_pipeline.cli.setup_system import LIBRARIES, OLDEST, install_command, missing_libraries
 from vto_pipeline.errors import MissingDependencyError
@@ -76,7 +76,7 @@ class Finding:
 
 
 @click.command("doctor")
-@speaking
+@message_options
 @pass_session
 def doctor_command(session: Session) -> int:
     """Check that everything is installed and loads, and show how to fix what does not."""

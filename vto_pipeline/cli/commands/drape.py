@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from vto_pipeline.cli.options import PATH, running
+from vto_pipeline.cli.options import PATH, pipeline_options
 from vto_pipeline.cli.session import Session, pass_session
 
 _WANT = ("draped", "audit", "trace", "render_mesh", "fit_report", "page")
@@ -42,7 +42,7 @@ _WANT = ("draped", "audit", "trace", "render_mesh", "fit_report", "page")
     help="Preset or fabric file: one for all garments, or one per garment.",
 )
 @click.option("--regraded", is_flag=True, help="Show how it looks in the customer's size, not whether it fits.")
-@running
+@pipeline_options
 @pass_session
 def drape_command(
     session: Session,
@@ -63,7 +63,7 @@ def drape_command(
     vto drape --garment shirt.ply --source-body form.ply --body customer.ply --regraded -o runs/shirt
     vto drape --garment trousers.ply --fabric denim --garment shirt.ply --fabric cotton_poplin --body customer.ply
     """
-    from vto_pipeline.cli.work import carry_out, catalogue, typed_document
+    from vto_pipeline.cli.work import catalogue, run_document, typed_document
     from vto_pipeline.io.files import resolved
 
     if (body is None) == (measurements is None):
@@ -76,7 +76,7 @@ def drape_command(
     }
     document = typed_document("the command line", given, _WANT, {"grade": {"mode": "regraded"}} if regraded else {})
     name = Path("runs") / f"drape_{'_'.join(resolved(garment).stem for garment in garments)}"
-    carry_out(document, Path.cwd(), output or name, overrides, force_all, session, catalogue())
+    run_document(document, Path.cwd(), output or name, overrides, force_all, session, catalogue())
 
 
 def _garments(garments: tuple[Path, ...], fabrics: tuple[str, ...]) -> dict[str, Any]:

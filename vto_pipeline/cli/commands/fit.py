@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from vto_pipeline.cli.options import PATH, running
+from vto_pipeline.cli.options import PATH, pipeline_options
 from vto_pipeline.cli.session import Session, pass_session
 
 
@@ -18,7 +18,7 @@ from vto_pipeline.cli.session import Session, pass_session
 @click.option("--side", type=PATH, metavar="PNG", help="Photo or silhouette from the side.")
 @click.option("--stature", type=float, metavar="METRES", help="Body height; required with --front and --side.")
 @click.option("--sex", type=click.Choice(["female", "male", "neutral"]), help="Sex, where the input does not say.")
-@running
+@pipeline_options
 @pass_session
 def fit_command(
     session: Session,
@@ -39,7 +39,7 @@ def fit_command(
     vto fit --scan customer.ply --sex female
     vto fit --front front.png --side side.png --stature 1.72
     """
-    from vto_pipeline.cli.work import captured_kind, carry_out, catalogue, typed_document
+    from vto_pipeline.cli.work import captured_kind, catalogue, run_document, typed_document
     from vto_pipeline.io.files import resolved
 
     photos = (front, side, stature)
@@ -59,4 +59,4 @@ def fit_command(
         raise click.UsageError("--sex does not apply to this input; write `sex:` in the measurements file")
     document = typed_document("the command line", given, ["avatar", "measurements", "landmarks", "page"], settings)
     name = Path("runs") / f"fit_{resolved(ways[0]).stem}"
-    carry_out(document, Path.cwd(), output or name, overrides, force_all, session, tables)
+    run_document(document, Path.cwd(), output or name, overrides, force_all, session, tables)

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import click
 
-from vto_pipeline.cli.options import PATH, set_option, speaking
+from vto_pipeline.cli.options import PATH, message_options, set_option
 from vto_pipeline.cli.session import Session, pass_session
 
 
 @click.command("plan")
 @click.argument("document", metavar="FILE.yaml", type=PATH)
 @set_option
-@speaking
+@message_options
 @pass_session
 def plan_command(session: Session, document: Path, overrides: tuple[str, ...]) -> None:
     """Show which stages a document would run and which it leaves out, with the reason. Nothing is run.

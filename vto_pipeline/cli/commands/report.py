@@ -6,13 +6,13 @@ from pathlib import Path
 
 import click
 
-from vto_pipeline.cli.options import PATH, speaking
+from vto_pipeline.cli.options import PATH, message_options
 from vto_pipeline.cli.session import Session, pass_session
 
 
 @click.command("report")
 @click.argument("folder", metavar="RUN", type=PATH)
-@speaking
+@message_options
 @pass_session
 def report_command(session: Session, folder: Path) -> None:
     """Rebuild the page of a run from RUN/out. This works for a failed run too."""

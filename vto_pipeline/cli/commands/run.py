@@ -6,13 +6,13 @@ from pathlib import Path
 
 import click
 
-from vto_pipeline.cli.options import PATH, running
+from vto_pipeline.cli.options import PATH, pipeline_options
 from vto_pipeline.cli.session import Session, pass_session
 
 
 @click.command("run")
 @click.argument("document", metavar="FILE.yaml", type=PATH)
-@running
+@pipeline_options
 @pass_session
 def run_command(
     session: Session, document: Path, output: Path | None, overrides: tuple[str, ...], force_all: bool
@@ -26,10 +26,10 @@ def run_command(
     vto run configs/demo.yaml
     vto run configs/demo.yaml -o runs/fine --set drape.target_error_mm=0.2
     """
-    from vto_pipeline.cli.work import carry_out, catalogue
+    from vto_pipeline.cli.work import catalogue, run_document
     from vto_pipeline.io.documents import load_yaml
 
-    carry_out(
+    run_document(
         load_yaml(document),
         document.resolve().parent,
         output or Path("runs") / document.stem,

@@ -7,7 +7,7 @@ from shutil import copyfile
 
 import click
 
-from vto_pipeline.cli.options import PATH, running
+from vto_pipeline.cli.options import PATH, pipeline_options
 from vto_pipeline.cli.session import Session, pass_session
 
 
@@ -15,7 +15,7 @@ from vto_pipeline.cli.session import Session, pass_session
 @click.argument("source", metavar="INPUT", type=PATH)
 @click.option("--role", type=click.Choice(["garment", "body", "mannequin"]), required=True, help="What was captured.")
 @click.option("--mannequin", type=PATH, metavar="FILE", help="Surface of the mannequin the garment was scanned on.")
-@running
+@pipeline_options
 @pass_session
 def scan_command(
     session: Session,
@@ -34,7 +34,7 @@ def scan_command(
     vto scan photos/ --role garment --mannequin form.ply -o runs/shirt
     vto scan customer.ply --role body
     """
-    from vto_pipeline.cli.work import captured_kind, carry_out, catalogue, typed_document
+    from vto_pipeline.cli.work import captured_kind, catalogue, run_document, typed_document
     from vto_pipeline.io.files import replacing, resolved
 
     if mannequin is not None and role != "garment":
@@ -46,7 +46,7 @@ def scan_command(
     given = {f"{role}.{kind}": source, "mannequin.surface": mannequin}
     document = typed_document("the command line", given, want, {})
     run = output or Path("runs") / f"scan_{resolved(source).stem}"
-    carry_out(document, Path.cwd(), run, overrides, force_all, session, catalogue())
+    run_document(document, Path.cwd(), run, overrides, force_all, session, catalogue())
     scanned = run / "out" / f"{role}_surface.ply"
     if role != "garment" and scanned.is_file():
         with replacing(run / "out" / "surface.ply") as beside:  # what a scan makes has one name, whatever was scanned

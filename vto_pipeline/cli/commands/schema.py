@@ -6,12 +6,12 @@ import json
 
 import click
 
-from vto_pipeline.cli.options import speaking
+from vto_pipeline.cli.options import message_options
 from vto_pipeline.cli.session import Session, pass_session
 
 
 @click.command("schema")
-@speaking
+@message_options
 @pass_session
 def schema_command(session: Session) -> None:
     """Print the JSON schema of a pipeline document, with every setting, its default, range and unit.

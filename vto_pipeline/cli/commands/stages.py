@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import click
 
-from vto_pipeline.cli.options import speaking
+from vto_pipeline.cli.options import message_options
 from vto_pipeline.cli.session import Session, pass_session
 
 
 @click.command("stages")
-@speaking
+@message_options
 @pass_session
 def stages_command(session: Session) -> None:
     """List all stages: what each does, needs and makes. With -v, their settings too."""

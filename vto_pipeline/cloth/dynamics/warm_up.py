@@ -9,7 +9,7 @@ import numpy as np
 from vto_pipeline.cloth.collision.body.contacts import BodyCollider
 from vto_pipeline.cloth.dynamics.methods import FRAME
 from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
-from vto_pipeline.cloth.model.build import at_rest, build
+from vto_pipeline.cloth.model.build import at_rest, build_cloth
 from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.fabric import Fabric
@@ -26,7 +26,7 @@ def warm_up() -> float:
     began = time.perf_counter()
     cloth = _layers()
     fabric = Fabric("any", 0.1, _THICK, 1.0, 1.0, 1.0, 0.0, 1e-6, 1e-6, 0.0, 0.3, damping=1e-3)
-    model = build(cloth, RestShape(cloth.vertices), fabric)
+    model = build_cloth(cloth, RestShape(cloth.vertices), fabric)
     below = TriangleMesh(np.array([[0, -0.1, 0], [0, -0.1, 1], [1, -0.1, 0]]), np.array([[0, 1, 2]], np.int32))
     body = MovingBody(np.stack([below.vertices, below.vertices + 0.01]), below.faces)
     collider = BodyCollider(body, FRAME, 0.3)

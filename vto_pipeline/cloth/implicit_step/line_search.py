@@ -8,7 +8,7 @@ from vto_pipeline.cloth.constraints.sweep import add_damping_forces, add_forces
 from vto_pipeline.cloth.implicit_step.iterated import ImplicitStep
 from vto_pipeline.cloth.model.build import ClothModel
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.numerics.line_search import falls_enough, halvings
+from vto_pipeline.numerics.line_search import backtracking_shares, satisfies_armijo
 
 _SHORTEST = 1e-9
 _DEARER = 2.0  # than what it pushes: the price of crossing a plane, an exact penalty (Han 1977)
@@ -44,7 +44,7 @@ class Merit:
     def share(self, x: FloatArray, move: FloatArray, pushes: FloatArray) -> float:
         """Return the first of 1, ½, ¼ ... for which x + share · move lies low enough, or 0.
 
-        See `falls_enough`. With damping the gradient is not quite that of Φ, and a slope that falls is enough
+        See `satisfies_armijo`. With damping the gradient is not quite that of Φ, and a slope that falls is enough
         (Matthies & Strang 1979).
 
         Args:
@@ -57,12 +57,12 @@ class Merit:
         value += self._crossed(x, prices)
         own_slope = float(np.vdot(gradient, move))
         slope = own_slope + self._crossed(x + move, prices) - self._crossed(x, prices)
-        for share in halvings(_SHORTEST):
+        for share in backtracking_shares(_SHORTEST):
             there = x + share * move
             new_value, new_gradient = self.at(there)
             new_value += self._crossed(there, prices)
             new_slope = float(np.vdot(new_gradient, move))
-            if falls_enough(value, slope, share, new_value, new_slope, own_slope=own_slope, by_slope=self._damped):
+            if satisfies_armijo(value, slope, share, new_value, new_slope, own_slope=own_slope, by_slope=self._damped):
                 return share
         return 0.0
 

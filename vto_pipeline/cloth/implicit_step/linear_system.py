@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.numerics.linear.block_matrix import BlockMatrix
-from vto_pipeline.numerics.linear.cholesky import Factor, factor_room, factorise
+from vto_pipeline.numerics.linear.cholesky import Factor, allocate_factor, factorise
 from vto_pipeline.numerics.linear.conjugate_gradients import pcg
-from vto_pipeline.numerics.linear.elimination import Elimination, eliminate
+from vto_pipeline.numerics.linear.elimination import Elimination, plan_elimination
 from vto_pipeline.numerics.linear.elimination_tree import dissection, with_links
-from vto_pipeline.numerics.linear.links import link
-from vto_pipeline.numerics.linear.multigrid import Hierarchy, hierarchy, update
+from vto_pipeline.numerics.linear.links import make_links
+from vto_pipeline.numerics.linear.multigrid import Hierarchy, hierarchy, update_hierarchy
 from vto_pipeline.numerics.linear.substitution import solve
 
 _ROUGH = 30  # cycles, at most
@@ -67,7 +67,7 @@ class LinearSystem:
         self._linked = vertices, weights
         self.levels = self._bare
         if len(vertices) > 0:
-            self.levels = self._bare._replace(links=link(vertices, weights, self._bare.up, self._bare.rows[:2]))
+            self.levels = self._bare._replace(links=make_links(vertices, weights, self._bare.up, self._bare.rows[:2]))
         return self.levels.links.blocks
 
     @property
@@ -90,9 +90,9 @@ class LinearSystem:
             return
         blocks = self.levels.links.blocks
         if len(blocks) > 0:  # on all levels now
-            self.levels = self._bare._replace(links=link(*self._linked, self._bare.up, self._bare.rows))
+            self.levels = self._bare._replace(links=make_links(*self._linked, self._bare.up, self._bare.rows))
             self.levels.links.blocks[:] = blocks
-        update(self.levels)
+        update_hierarchy(self.levels)
         pcg(self.levels, right, x, reference, tolerance, _MANY if exactly else _ROUGH, True)
 
     def eliminated(self, right: FloatArray, x: FloatArray) -> bool:
@@ -104,7 +104,7 @@ class LinearSystem:
         plan = self._up_to_date()
         if plan.flops > _MOST:
             return False
-        self._room = factor_room(plan, self._room)
+        self._room = allocate_factor(plan, self._room)
         if not factorise(plan, self._starts, self.blocks, self._linked[1], self.levels.links.blocks, self._room):
             return False
         solve(plan, self._room, right, x)
@@ -120,11 +120,11 @@ class LinearSystem:
                 return self._plan
         if self._order is None:
             self._order = dissection(self._starts, self._columns)
-        plan = eliminate(self._starts, self._columns, self._order, vertices, weights)
+        plan = plan_elimination(self._starts, self._columns, self._order, vertices, weights)
         self._foreseen = min(self._foreseen, plan.flops) if self._plan is None else self._foreseen
         if plan.flops > _DEARER * self._foreseen:
             order = dissection(*with_links(self._starts, self._columns, vertices, weights))
-            other = eliminate(self._starts, self._columns, order, vertices, weights)
+            other = plan_elimination(self._starts, self._columns, order, vertices, weights)
             if other.flops < plan.flops:
                 self._order, plan = order, other
             self._foreseen = plan.flops

@@ -42,38 +42,38 @@ def free_components(model: ClothModel, matrix: BlockMatrix) -> ClothComponents |
 
 
 @njit(cache=True, error_model="numpy")
-def keep_momentum(pieces, contacts, mass, move, wanted):
+def keep_momentum(components, contacts, mass, move, wanted):
     """Shift pieces that nothing holds so that their mean moves are the wanted ones; those that push each other as one.
 
     Args:
-        pieces: Of the cloth.
+        components: Of the cloth.
         contacts: An active set; a place that is touched holds, another piece does not.
         mass: [kg], shape (V,).
         move: Changed in place [m], shape (V, 3).
         wanted: [m], shape (V, 3).
     """
-    root = np.arange(len(pieces.held))
-    held = pieces.held.copy()
+    root = np.arange(len(components.held))
+    held = components.held.copy()
     for c in range(len(contacts.key)):
         if not contacts.pushing[c]:
             continue
-        one, total = _root(root, pieces.of[contacts.vertices[c, 0]]), 0.0
+        one, total = _root(root, components.of[contacts.vertices[c, 0]]), 0.0
         for s in range(contacts.vertices.shape[1]):
             if contacts.weights[c, s] != 0.0:
-                other = _root(root, pieces.of[contacts.vertices[c, s]])
+                other = _root(root, components.of[contacts.vertices[c, s]])
                 total += contacts.weights[c, s]
                 held[one] = held[one] or held[other]
                 root[other] = one
         held[one] = held[one] or abs(total) > 0.5  # weights sum to one before a place, to zero between two
     missing = np.zeros((len(held), 4))
     for i in range(len(move)):
-        p = _root(root, pieces.of[i])
+        p = _root(root, components.of[i])
         if not held[p]:
             missing[p, 3] += mass[i]
             for k in range(3):
                 missing[p, k] += mass[i] * (wanted[i, k] - move[i, k])
     for i in range(len(move)):
-        p = _root(root, pieces.of[i])
+        p = _root(root, components.of[i])
         if not held[p] and missing[p, 3] > 0.0:
             for k in range(3):
                 move[i, k] += missing[p, k] / missing[p, 3]

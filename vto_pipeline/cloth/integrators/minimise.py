@@ -6,7 +6,7 @@ import numpy as np
 
 from vto_pipeline.cloth.integrators.potential import IncrementalPotential
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.numerics.line_search import falls_enough, halvings
+from vto_pipeline.numerics.line_search import backtracking_shares, satisfies_armijo
 from vto_pipeline.numerics.linear.block_matrix import multiply
 
 _NEWTON_ITERATIONS = 50
@@ -54,10 +54,10 @@ def newton(potential: IncrementalPotential, y: FloatArray, tolerance: float) -> 
             return y + direction
         before = size
         slope = float(np.vdot(gradient, direction))
-        for share in halvings(_SHORTEST):
+        for share in backtracking_shares(_SHORTEST):
             trial = y + share * direction
             trial_value, trial_gradient = potential.at(trial)
-            if falls_enough(value, slope, share, trial_value, float(np.vdot(trial_gradient, direction))):
+            if satisfies_armijo(value, slope, share, trial_value, float(np.vdot(trial_gradient, direction))):
                 break
         else:
             return y
@@ -108,7 +108,7 @@ def _search(
         trial_slope = float(np.vdot(gradient, direction))
         if not refined and abs(trial_slope) > _SLACK * abs(slope) and trial_slope > slope:
             share *= slope / (slope - trial_slope)
-        elif falls_enough(value, slope, share, trial_value, trial_slope):
+        elif satisfies_armijo(value, slope, share, trial_value, trial_slope):
             return share, trial, trial_value, gradient
         else:
             share *= 0.5

@@ -14,7 +14,7 @@ from vto_pipeline.cloth.model.build import ClothModel
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.numerics.linear.block_matrix import BlockMatrix, multiply
 from vto_pipeline.numerics.linear.conjugate_gradients import pcg
-from vto_pipeline.numerics.linear.multigrid import Hierarchy, hierarchy, update
+from vto_pipeline.numerics.linear.multigrid import Hierarchy, hierarchy, update_hierarchy
 
 
 class ForceSystem:
@@ -101,7 +101,7 @@ class ForceSystem:
             tolerance: Share of the residual that may be left; see `numerics.linear.conjugate_gradients`.
         """
         stiffness, levels = self._assembly
-        update(levels)
+        update_hierarchy(levels)
         found, reached = np.zeros_like(right), np.empty_like(right)
         pcg(levels, right, found, right, tolerance, 10 * len(right) + 100, len(levels.rows) > 2)
         multiply(stiffness.matrix, found, reached)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from vto_pipeline.cloth.judge.crossings import crossings_between, self_crossings
 from vto_pipeline.cloth.judge.gap import gaps_within
 from vto_pipeline.cloth.judge.residual import ElasticEnergies, judged_residual
-from vto_pipeline.cloth.judge.strain import gradients, principal_strains, rest_triangles, thread_strains
+from vto_pipeline.cloth.judge.strain import gradients, principal_strains, rest_triangles, warp_weft_strains
 from vto_pipeline.geometry.signed_distance import SurfaceDistance, SurfacePoints
 from vto_pipeline.geometry.topology import edges
 from vto_pipeline.model.arrays import FloatArray
@@ -81,7 +81,7 @@ def audit(
         "settled": settled,
         **_against_body(mesh, body, nearest),
         "self_intersections": len(crossing),
-        "self_intersection_places": places(mesh, crossing[:, 0]),
+        "self_intersection_places": spread_places(mesh, crossing[:, 0]),
         "min_self_gap_mm": 1e3 * gap if gap < _NEAR else None,
         "rms_stretch": float(np.sqrt(np.mean(stretch**2))),
         "max_stretch": float(stretch.max()),
@@ -118,7 +118,7 @@ def _against_body(mesh: TriangleMesh, body: TriangleMesh | None, nearest: Surfac
     crossing = crossings_between(mesh, body)
     return {
         "body_intersections": len(crossing),
-        "body_intersection_places": places(mesh, crossing[:, 0]),
+        "body_intersection_places": spread_places(mesh, crossing[:, 0]),
         "penetration_mm": float(1e3 * max(0.0, -clearance.min())),
         "penetrating_vertices": int((clearance < 0.0).sum()),
         "min_clearance_mm": float(1e3 * clearance.min()),
@@ -130,14 +130,14 @@ def _strains(mesh: TriangleMesh, rest: RestShape) -> dict[str, object]:
     gradient = gradients(mesh.vertices, mesh.faces, laid)
     share = laid.area / laid.area.sum()
     found: dict[str, object] = {}
-    for name, strain in zip(("warp_strain", "weft_strain", "shear_rad"), thread_strains(gradient).T, strict=True):
+    for name, strain in zip(("warp_strain", "weft_strain", "shear_rad"), warp_weft_strains(gradient).T, strict=True):
         found[f"rms_{name}"] = float(np.sqrt(np.sum(share * strain**2)))
         found[f"max_{name}"] = float(np.abs(strain).max())
     principal = principal_strains(gradient)
     return {**found, "largest_strain": float(principal.max()), "least_strain": float(principal.min())}
 
 
-def places(mesh: TriangleMesh, faces: NDArray[np.int32]) -> list[list[float]]:
+def spread_places(mesh: TriangleMesh, faces: NDArray[np.int32]) -> list[list[float]]:
     """Return the middle of some of these faces, spread over them [m]."""
     chosen = np.unique(faces)
     chosen = chosen[np.linspace(0, len(chosen) - 1, min(_PLACES, len(chosen))).astype(int)]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vto_pipeline.cloth.judge.bearing import residual_after_all_surfaces, residual_after_one_surface
 from vto_pipeline.cloth.judge.flanks import flanks
-from vto_pipeline.cloth.judge.strain import RestTriangles, gradients, rest_triangles, thread_strains
+from vto_pipeline.cloth.judge.strain import RestTriangles, gradients, rest_triangles, warp_weft_strains
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.geometry.signed_distance import SurfacePoints
 from vto_pipeline.geometry.topology import hinges
@@ -79,7 +79,7 @@ class ElasticEnergies:
     def _membrane(self, corners: FloatArray) -> FloatArray:
         local = np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3)
         laid = RestTriangles(np.ones(len(corners), np.bool_), self._rest.area, self._rest.inverse)
-        strain = thread_strains(gradients(corners.reshape(-1, 3), local, laid))
+        strain = warp_weft_strains(gradients(corners.reshape(-1, 3), local, laid))
         return 0.5 * self._weight * np.einsum("ta,ab,tb->t", strain, self._stiffness, strain)
 
     def _folds(self, corners: FloatArray) -> FloatArray:

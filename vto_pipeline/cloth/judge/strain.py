@@ -49,7 +49,7 @@ def gradients(positions: FloatArray, faces: IntArray, rest: RestTriangles) -> Fl
     return np.asarray(np.stack([one, two], axis=2) @ rest.inverse)
 
 
-def thread_strains(gradient: FloatArray) -> FloatArray:
+def warp_weft_strains(gradient: FloatArray) -> FloatArray:
     """Return stretch of warp and weft, and the angle by which they are sheared [rad], shape (T, 3)."""
     warp, weft = np.linalg.norm(gradient, axis=1).T
     cosine = np.sum(gradient[:, :, 0] * gradient[:, :, 1], axis=1) / np.maximum(warp * weft, np.finfo(float).tiny)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vto_pipeline.cloth.judge.residual import ElasticEnergies
-from vto_pipeline.cloth.judge.strain import gradients, rest_triangles, thread_strains
+from vto_pipeline.cloth.judge.strain import gradients, rest_triangles, warp_weft_strains
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import Fabric
@@ -35,7 +35,7 @@ def vertex_maps(mesh: TriangleMesh, rest: RestShape, body: TriangleMesh, fabric:
     count = len(mesh.vertices)
     laid = rest_triangles(rest.positions, mesh.faces)
     corners = mesh.faces[laid.solid]
-    strains = thread_strains(gradients(mesh.vertices, mesh.faces, laid))
+    strains = warp_weft_strains(gradients(mesh.vertices, mesh.faces, laid))
     area = np.bincount(corners.ravel(), np.repeat(laid.area, 3), count)
     maps: dict[str, FloatArray] = {}
     for name, strain in zip(("strain_warp", "strain_weft", "shear_rad"), strains.T, strict=True):

@@ -71,7 +71,7 @@ def at_rest(positions: FloatArray) -> ClothState:
     return ClothState(positions.copy(), np.zeros_like(positions))
 
 
-def build(
+def build_cloth(
     mesh: TriangleMesh,
     rest: RestShape,
     fabric: Fabric,

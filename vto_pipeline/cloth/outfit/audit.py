@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.dynamics.residual import elastic_energy
-from vto_pipeline.cloth.judge.audit import JUST, audit, places
+from vto_pipeline.cloth.judge.audit import JUST, audit, spread_places
 from vto_pipeline.cloth.judge.crossings import crossings_between
 from vto_pipeline.cloth.judge.gap import gaps_within
 from vto_pipeline.cloth.judge.order import outside_outer_garment
@@ -91,7 +91,7 @@ def audit_outfit(
         **_together([found[layer.name] for layer in layers]),
         "residual": residual,
         "layer_intersections": count,
-        "layer_intersection_places": [place for mesh, faces in crossing for place in places(mesh, faces)],
+        "layer_intersection_places": [place for mesh, faces in crossing for place in spread_places(mesh, faces)],
         "min_layer_gap_mm": 1e3 * gap if gap < _NEAR else None,
         **_order(layers, body, job),
         "layers": found,

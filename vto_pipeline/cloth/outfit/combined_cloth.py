@@ -10,7 +10,7 @@ import numpy as np
 
 from vto_pipeline.cloth.collision.contacts import Contacts, ContactSpan
 from vto_pipeline.cloth.dynamics.body_motion import VariableSpeedBody
-from vto_pipeline.cloth.model.build import ClothModel, build
+from vto_pipeline.cloth.model.build import ClothModel, build_cloth
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import MovingBody
@@ -44,7 +44,7 @@ def combine_garments(layers: Sequence[Layer], materials: Materials) -> CombinedC
     """Return these garments as one cloth.
 
     Raises:
-        InputError, ConfigError: as `build`.
+        InputError, ConfigError: as `build_cloth`.
     """
     first = np.cumsum([0, *(len(layer.garment.mesh.vertices) for layer in layers)])
     own = tuple(slice(int(begin), int(end)) for begin, end in pairwise(first))
@@ -55,7 +55,7 @@ def combine_garments(layers: Sequence[Layer], materials: Materials) -> CombinedC
     for layer, span in zip(layers, own, strict=True):
         mesh = TriangleMesh(positions, layer.garment.mesh.faces + np.int32(span.start))
         shape = RestShape(rest, layer.garment.rest.rest_angles)
-        models.append(build(mesh, shape, layer.fabric, materials=materials, job=Job()))
+        models.append(build_cloth(mesh, shape, layer.fabric, materials=materials, job=Job()))
     faces = np.vstack([model.faces for model in models])
 
     def parts(name: str) -> FloatArray:

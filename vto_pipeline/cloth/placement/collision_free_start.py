@@ -21,8 +21,8 @@ class Start(NamedTuple):
 
     Args:
         positions: [m], shape (V, 3).
-        pairs: Of faces that met before, each other or the body.
-        left: Of faces that still do.
+        crossings: Pairs of faces that met before, each other or the body.
+        crossings_left: Pairs of faces that still do.
         crossed: Vertices of those, which are not kept from the rest of the cloth until they are free, shape (V,).
     """
 

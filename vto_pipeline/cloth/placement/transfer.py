@@ -32,7 +32,7 @@ def transfer_deformation(cloth: TriangleMesh, source: TriangleMesh, target: Tria
     """
     surface = SurfaceDistance(source).signed(cloth.vertices)
     corners = source.faces[surface.face]
-    shares = _barycentric(surface.point, source.vertices[corners])
+    shares = _barycentric_or_centroid(surface.point, source.vertices[corners])
     near = 1.0 / (1.0 + (surface.distance / _TIGHT) ** 2)
     matrix, area = laplacian(cloth)
     gradient = np.einsum("nk,nkij->nij", shares, _vertex_gradients(source, target)[corners])
@@ -98,7 +98,7 @@ def _rotations(gradient: FloatArray) -> FloatArray:
     return np.asarray(left @ right)
 
 
-def _barycentric(points: FloatArray, corners: FloatArray) -> FloatArray:
+def _barycentric_or_centroid(points: FloatArray, corners: FloatArray) -> FloatArray:
     """Return barycentric coordinates of points of triangles, shape (N, 3)."""
     import igl
 

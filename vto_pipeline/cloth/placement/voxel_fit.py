@@ -25,8 +25,8 @@ class VoxelPlacement(NamedTuple):
     Args:
         turn: The rotation about the origin, shape (3, 3).
         shift: To the best place after that [m], shape (3,).
-        worth: There: cubes of body inside less what of the cloth is inside the body, as a share of the garment's cubes.
-        here: The same without shift.
+        score: There: cubes of body inside less what of the cloth is inside the body, as a share of the garment's cubes.
+        score_in_place: The same without shift.
     """
 
     turn: FloatArray

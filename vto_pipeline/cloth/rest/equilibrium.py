@@ -21,7 +21,7 @@ from vto_pipeline.cloth.model.build import ClothModel
 from vto_pipeline.errors import DivergedError
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.settings import Config
-from vto_pipeline.numerics.line_search import halvings
+from vto_pipeline.numerics.line_search import backtracking_shares
 from vto_pipeline.numerics.linear.direct import DirectSolver
 from vto_pipeline.units import GRAVITY
 
@@ -141,7 +141,7 @@ class _Search:
     ) -> tuple[float, float, FloatArray]:
         """Return the first of 1, ½, ¼, ... that lowers the energy or, where rounding hides that, the forces."""
         slope = float(np.vdot(forces, step))
-        for length in halvings(_SHORTEST):
+        for length in backtracking_shares(_SHORTEST):
             after, pulls = self._at(x + length * step)
             lower = after <= energy - _DESCENT * length * slope
             hidden = length * slope < _ROUNDING * self._scale * float(np.abs(x).max())

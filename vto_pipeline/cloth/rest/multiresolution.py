@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.dynamics.stepper import Stepper
-from vto_pipeline.cloth.model.build import ClothModel, at_rest, build
+from vto_pipeline.cloth.model.build import ClothModel, at_rest, build_cloth
 from vto_pipeline.cloth.rest.coarsening import CoarseGarment, coarsen
 from vto_pipeline.cloth.rest.convergence import SettlingResult
 from vto_pipeline.cloth.rest.phases import REST, ROUGH, Phases
@@ -64,10 +64,10 @@ def come_to_rest(
         deadline: `time.perf_counter` at which to stop settling.
 
     Raises:
-        InputError, ConfigError: as `build` and `Stepper.prepare`.
+        InputError, ConfigError: as `build_cloth` and `Stepper.prepare`.
         DivergedError: positions are no longer finite.
     """
-    model = build(garment.mesh, garment.rest, fabric, materials=config, job=job)
+    model = build_cloth(garment.mesh, garment.rest, fabric, materials=config, job=job)
     return _CoarseToFine(garment, model, fabric, config, job).run(body, deadline)
 
 
@@ -121,7 +121,7 @@ class _CoarseToFine:
         model, config, job = self._model, self._config, self._job
         if level > 0:
             config, job = self._rough, self._part(level)
-            model = build(garment.mesh, garment.rest, self._fabric, materials=config)
+            model = build_cloth(garment.mesh, garment.rest, self._fabric, materials=config)
         phases = Phases(model, garment.rest, self._fabric, config, job)
         first = TriangleMesh(body.keyframes[0], body.faces)
         state = phases.resolve_crossings(at_rest(garment.mesh.vertices))

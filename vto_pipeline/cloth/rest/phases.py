@@ -47,7 +47,7 @@ class Phases:
         job: For progress, findings and what was left out.
 
     Attributes:
-        left: Pairs of triangles that still met after it was last freed.
+        crossings_left: Pairs of triangles that still met after it was last freed.
     """
 
     def __init__(self, model: ClothModel, rest: RestShape, fabric: Fabric, config: DrapeConfig, job: Job) -> None:

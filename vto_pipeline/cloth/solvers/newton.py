@@ -37,9 +37,9 @@ from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
 from vto_pipeline.cloth.model.build import ClothModel, ClothState
 from vto_pipeline.cloth.model.internal_friction import copy_sliders, restore_sliders, slip, with_own_sliders
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.numerics.line_search import halvings
+from vto_pipeline.numerics.line_search import backtracking_shares
 from vto_pipeline.numerics.linear.block_matrix import BlockMatrix, row_times
-from vto_pipeline.numerics.linear.links import pull, pull_back
+from vto_pipeline.numerics.linear.links import apply_links, apply_links_transposed
 from vto_pipeline.numerics.linear.multigrid import Hierarchy
 
 _LEFT = 6.0  # 1/s: share of the forces at the begin of a step left by a linear solve, times h, so errors fall with h
@@ -104,7 +104,7 @@ class Newton:
         self._system = LinearSystem(self._stiffness.matrix, self._held)
         self._stiffness.write_to(self._system.blocks)
         self.active: ActiveSet = no_contacts(0)
-        self._pieces = free_components(model, self._stiffness.matrix)
+        self._components = free_components(model, self._stiffness.matrix)
         self._allowed = 0.0  # what a step may cost in energy by being solved in part [J]
         self._whole = np.zeros((len(model.mass), 3))  # what the residuals of a step are measured against [N]
 
@@ -295,8 +295,8 @@ class Newton:
 
         Pieces that push each other count as one.
         """
-        if self._pieces is not None:
-            keep_momentum(self._pieces, self.active, self._model.mass, move, wanted)
+        if self._components is not None:
+            keep_momentum(self._components, self.active, self._model.mass, move, wanted)
 
     def _shortened(
         self,
@@ -320,7 +320,7 @@ class Newton:
         now = energy + self._inertia(y, target, h) + pushes[0]
         bend = 2.0 * (pushes[0] - 2.0 * pushes[1] + pushes[2])
         slope = pushes[2] - pushes[0] - bend
-        for share in halvings(_SHORTEST):
+        for share in backtracking_shares(_SHORTEST):
             there = y + share * move
             energy = add_forces(there, self._model.constraints, np.zeros_like(there))
             pushed = pushes[0] + share * (slope + share * bend)
@@ -343,10 +343,10 @@ def _lower_of_two(levels: Hierarchy, right: FloatArray, one: FloatArray, other: 
 def _quadratic(levels, right, d):
     """Return ½ dᵀ A d - dᵀ right."""
     total = 0.0
-    pull(levels.links, 0, d)
+    apply_links(levels.links, 0, d)
     for i in range(len(d)):
         a, b, c = row_times(levels.matrix, i, d)
-        e, f, g = pull_back(levels.links, i)
+        e, f, g = apply_links_transposed(levels.links, i)
         a, b, c = a + e, b + f, c + g
         total += d[i, 0] * (0.5 * a - right[i, 0])
         total += d[i, 1] * (0.5 * b - right[i, 1])

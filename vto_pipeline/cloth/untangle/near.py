@@ -10,7 +10,7 @@ from vto_pipeline.cloth.collision.self_collision.candidates import self_candidat
 from vto_pipeline.cloth.collision.self_collision.surface_features import Features
 from vto_pipeline.cloth.untangle.rows import SeparationRows, separation_rows
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.numerics.distance import blend, closest_on_segments, closest_on_triangle
+from vto_pipeline.numerics.distance import barycentric_point, closest_on_segments, closest_on_triangle
 from vto_pipeline.numerics.spatial.bvh import Bvh, refit_swept
 from vto_pipeline.numerics.vector import add, load, norm, scale, store, sub, unit
 
@@ -51,7 +51,7 @@ def _to_faces(positions, ids):  # type: ignore[no-untyped-def]
         p = load(positions, ids[k, 0])
         a, b, c = load(positions, ids[k, 1]), load(positions, ids[k, 2]), load(positions, ids[k, 3])
         weights, _ = closest_on_triangle(p, a, b, c)
-        away = sub(p, blend(weights, a, b, c))
+        away = sub(p, barycentric_point(weights, a, b, c))
         distance[k] = norm(away)
         store(normal, k, unit(away))
         coefficients[k, 0] = 1.0

@@ -2,7 +2,7 @@
 
 remesh, isotropic: triangles of one size
 decimate, subdivide: fewer, more
-cut: along the line where a value changes sign
+clip: along the line where a value changes sign
 holes, triangulate: holes filled so that the filling continues the surface
 repair: from a triangle soup to an oriented manifold
 """

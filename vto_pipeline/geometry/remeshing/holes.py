@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vto_pipeline.errors import GarmentError
-from vto_pipeline.geometry.laplace import extend
+from vto_pipeline.geometry.laplace import extend_smoothly
 from vto_pipeline.geometry.remeshing.isotropic import isotropic
 from vto_pipeline.geometry.remeshing.repair import is_manifold
 from vto_pipeline.geometry.remeshing.subdivide import split_long_edges
@@ -55,24 +55,24 @@ def fill_holes(mesh: TriangleMesh, walks: list[IntArray]) -> TriangleMesh:
     return _fair(_sew_in(mesh, rims), mesh)
 
 
-def fill_bay(mesh: TriangleMesh, shore: IntArray, mouth: FloatArray) -> TriangleMesh:
-    """Return the mesh with a bay of its boundary filled up to a line across its mouth.
+def fill_notch(mesh: TriangleMesh, notch: IntArray, closing_line: FloatArray) -> TriangleMesh:
+    """Return the mesh with a notch of its boundary filled up to a line across it.
 
     Args:
         mesh: A manifold mesh; the line takes the colours of its ends.
-        shore: Consecutive half-edges of one of its `boundary_walks`.
-        mouth: Inner points of the line, from the start of the shore to its end [m], shape (M, 3).
+        notch: Consecutive half-edges of one of its `boundary_walks`.
+        closing_line: Its inner points, from the start of the notch to its end [m], shape (M, 3).
 
     Raises:
         GarmentError: no filling leaves the mesh manifold.
     """
     halves, normals = half_edges(mesh), face_normals(mesh)
-    end_of = np.where(np.arange(len(mouth)) < len(mouth) / 2, halves[shore[0], 0], halves[shore[-1], 1])
+    end_of = np.where(np.arange(len(closing_line)) < len(closing_line) / 2, halves[notch[0], 0], halves[notch[-1], 1])
     colors = None if mesh.colors is None else np.vstack([mesh.colors, mesh.colors[end_of]])
-    widened = TriangleMesh(np.vstack([mesh.vertices, mouth]), mesh.faces, colors)
-    new = len(mesh.vertices) + np.arange(len(mouth))
-    loop = np.concatenate([[halves[shore[-1], 1]], halves[shore[::-1], 0], new]).astype(np.int32)
-    rim = Rim(loop, np.vstack([normals[shore[::-1] // 3], np.zeros((len(mouth) + 1, 3))]))
+    widened = TriangleMesh(np.vstack([mesh.vertices, closing_line]), mesh.faces, colors)
+    new = len(mesh.vertices) + np.arange(len(closing_line))
+    loop = np.concatenate([[halves[notch[-1], 1]], halves[notch[::-1], 0], new]).astype(np.int32)
+    rim = Rim(loop, np.vstack([normals[notch[::-1] // 3], np.zeros((len(closing_line) + 1, 3))]))
     return _fair(_sew_in(widened, [rim]), widened)
 
 
@@ -131,6 +131,6 @@ def _fair(joined: TriangleMesh, mesh: TriangleMesh) -> TriangleMesh:
     around, source = submesh(joined, np.all(near[joined.faces], axis=1))
     known = mesh.vertices if mesh.colors is None else np.hstack([mesh.vertices, mesh.colors])
     values = np.vstack([known, np.zeros((int(is_new.sum()), known.shape[1]))])
-    values[source] = extend(around, values[source], is_new[source], order=2)
+    values[source] = extend_smoothly(around, values[source], is_new[source], order=2)
     colors = None if mesh.colors is None else np.clip(np.rint(values[:, 3:]), 0, 255).astype(np.uint8)
     return TriangleMesh(values[:, :3], joined.faces, colors)

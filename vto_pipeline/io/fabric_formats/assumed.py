@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from vto_pipeline.io.fabric_formats.curves import WEAR_TENSION, secant
+from vto_pipeline.io.fabric_formats.curves import WEAR_TENSION, secant_stiffness
 from vto_pipeline.model.fabric import Fabric, StretchCurve
 from vto_pipeline.units import GRAVITY
 
@@ -92,14 +92,14 @@ ASSUMED: dict[str, Assumption] = {
 """Field of `Fabric` -> how it is assumed, in the order in which they are filled in."""
 
 
-def complete(found: Figures) -> Fabric:
+def complete_fabric(found: Figures) -> Fabric:
     """Return the fabric: curves give the stiffness of linear models, and `ASSUMED` gives what is still missing."""
     known = {name: value for name, value in found.values.items() if value is not None}
     derived = list(found.derived)
     for name, curve in found.curves.items():
         stretch = name.replace("curve", "stretch")
         if stretch not in known:
-            known[stretch], tension = secant(curve)
+            known[stretch], tension = secant_stiffness(curve)
             derived.append(f"{stretch}: secant of {name} from 0 to {tension:.3g} N/m")
     filled = tuple(name for name in ASSUMED if name not in known)
     for name in filled:
@@ -133,7 +133,7 @@ _SHOWN: dict[str, tuple[float, str]] = {
 """Field of `Fabric` -> factor from SI and unit in which people read it."""
 
 
-def told(fabric: Fabric) -> tuple[str, ...]:
+def assumption_notes(fabric: Fabric) -> tuple[str, ...]:
     """Return notes for the user: which values of a fabric were assumed, and how others were derived."""
     figures = [
         f"{name} {getattr(fabric, name) * factor:.3g} {unit}".rstrip()

@@ -67,14 +67,14 @@ def power_law(extension: float, tension: float, linearity: float) -> StretchCurv
     return StretchCurve(tuple((extension * share).tolist()), tuple((tension * curve).tolist()))
 
 
-def secant(curve: StretchCurve) -> tuple[float, float]:
+def secant_stiffness(curve: StretchCurve) -> tuple[float, float]:
     """Return the secant stiffness [N/m] from rest, and the tension up to which it is meant [N/m]: 100 gf/cm or the
     curve's end."""
     tension = min(_LINEAR_TO, curve.tension[-1])
     return tension / float(np.interp(tension, curve.tension, curve.strain)), tension
 
 
-def lost_share(strain: FloatArray, loading: FloatArray, unloading: FloatArray) -> float:
+def hysteresis_share(strain: FloatArray, loading: FloatArray, unloading: FloatArray) -> float:
     """Return the width of a tensile loop, averaged over the strain, per greatest tension: ½ LT (1 - RT) in KES's terms.
 
     Loops of woven and knitted cloth widen about in proportion to the load.

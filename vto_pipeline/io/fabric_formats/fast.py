@@ -9,7 +9,7 @@ from vto_pipeline.errors import InputError
 from vto_pipeline.io.documents import Document
 from vto_pipeline.io.fabric_formats.assumed import Figures
 from vto_pipeline.io.fabric_formats.curves import GRAM_FORCE
-from vto_pipeline.io.fabric_formats.sheets import Parameter, Sheet, read_sheet, require
+from vto_pipeline.io.fabric_formats.sheets import FabricSheet, Parameter, read_sheet, require
 from vto_pipeline.model.fabric import StretchCurve
 from vto_pipeline.units import GRAVITY
 
@@ -65,7 +65,7 @@ def read_fast(document: Document) -> Figures:
     return Figures(sheet.name, sheet.source, values, curves, derived=tuple(derived))
 
 
-def _curve(sheet: Sheet, direction: int, document: Document) -> StretchCurve | None:
+def _curve(sheet: FabricSheet, direction: int, document: Document) -> StretchCurve | None:
     """The extensions at the three loads as a curve; None where nothing stretched.
 
     From the heaviest load down, so that of equal extensions, which the dial rounds to, the heaviest load counts.

@@ -11,7 +11,7 @@ from vto_pipeline.errors import InputError
 from vto_pipeline.io.documents import Document
 from vto_pipeline.io.fabric_formats.assumed import Figures
 from vto_pipeline.io.fabric_formats.curves import GRAM_FORCE, WEAR_TENSION, power_law
-from vto_pipeline.io.fabric_formats.sheets import Parameter, Sheet, read_sheet, require
+from vto_pipeline.io.fabric_formats.sheets import FabricSheet, Parameter, read_sheet, require
 from vto_pipeline.model.fabric import StretchCurve
 
 _PER_WIDTH = {"gf/cm": GRAM_FORCE / 0.01, "cN/cm": 1.0, "N/m": 1.0}
@@ -92,7 +92,7 @@ def read_kes(document: Document) -> Figures:
     return Figures(sheet.name, sheet.source, values, curves, derived=tuple(derived))
 
 
-def _linearity(sheet: Sheet, direction: int, tension: float, document: Document) -> float | None:
+def _linearity(sheet: FabricSheet, direction: int, tension: float, document: Document) -> float | None:
     """Return LT, or derive it from WT and EMT; None if these are missing too."""
     stated, energy = sheet.along("LT", direction), sheet.along("WT", direction)
     if energy is None:

@@ -51,7 +51,7 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class Sheet:
+class FabricSheet:
     """A sheet read.
 
     Args:
@@ -72,7 +72,7 @@ class Sheet:
         return self.values[key][direction] if key in self.values else None
 
 
-def read_sheet(document: Document, parameters: Mapping[str, Parameter]) -> Sheet:
+def read_sheet(document: Document, parameters: Mapping[str, Parameter]) -> FabricSheet:
     """Read a sheet's lines and convert them to SI.
 
     Raises:
@@ -92,10 +92,10 @@ def read_sheet(document: Document, parameters: Mapping[str, Parameter]) -> Sheet
         if key in values:
             raise InputError(f"{key}: given twice", where=where)
         values[key] = _to_si(key, unit, value, parameters[key], where)
-    return Sheet(head["name"] or "fabric", head["source"], values)
+    return FabricSheet(head["name"] or "fabric", head["source"], values)
 
 
-def require(sheet: Sheet, key: str, parameters: Mapping[str, Parameter], path: Path) -> None:
+def require(sheet: FabricSheet, key: str, parameters: Mapping[str, Parameter], path: Path) -> None:
     """Raise InputError if the sheet lacks an essential parameter."""
     if key not in sheet.values:
         unit = next(iter(parameters[key].units))

@@ -21,7 +21,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from vto_pipeline.errors import FormatError, InputError
 from vto_pipeline.io.documents import Document, check_schema
 from vto_pipeline.io.fabric_formats.assumed import Figures
-from vto_pipeline.io.fabric_formats.curves import GRAM_FORCE, WEAR_TENSION, lost_share, measured_curve
+from vto_pipeline.io.fabric_formats.curves import GRAM_FORCE, WEAR_TENSION, hysteresis_share, measured_curve
 from vto_pipeline.io.files import check_file
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import StretchCurve
@@ -159,7 +159,7 @@ def _analysed(document: Document, name: str, physics: Physics | None) -> Figures
             continue
         curves[field] = curve
         strain = np.array(curve.strain)
-        lost.append(lost_share(strain, np.array(curve.tension), np.interp(strain, back[0][::-1], back[1][::-1])))
+        lost.append(hysteresis_share(strain, np.array(curve.tension), np.interp(strain, back[0][::-1], back[1][::-1])))
     values["stretch_hysteresis"] = WEAR_TENSION * sum(lost) / len(lost)
     derived = (
         f"shear: a bias strip's tension / (4 strain) at {WEAR_TENSION:.3g} N/m",

@@ -33,7 +33,7 @@ def check_sound(arrays: Arrays, path: Path) -> None:
             raise FormatError(problem, where=str(path), hint="is the file truncated, or were vertices removed from it?")
 
 
-def join_corners(arrays: Arrays) -> tuple[Arrays, list[str]]:
+def merge_duplicate_vertices(arrays: Arrays) -> tuple[Arrays, list[str]]:
     """Merge vertices at exactly the same place: STL repeats each vertex for each of its faces.
 
     Returns:
@@ -63,7 +63,7 @@ def turn_outward(arrays: Arrays) -> tuple[Arrays, list[str]]:
     return {**arrays, "faces": faces[:, ::-1]}, ["the surface was inside out: its faces are turned over"]
 
 
-def drop_needless(arrays: Arrays) -> tuple[Arrays, list[str]]:
+def drop_degenerate(arrays: Arrays) -> tuple[Arrays, list[str]]:
     """Drop faces that use a vertex twice, and then vertices that no face uses.
 
     Returns:

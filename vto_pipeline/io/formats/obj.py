@@ -12,7 +12,7 @@ import numpy as np
 
 from vto_pipeline.errors import FormatError
 from vto_pipeline.io.arrays import Arrays
-from vto_pipeline.io.formats.polygons import CUT_OFF, triangulate
+from vto_pipeline.io.formats.polygons import CUT_OFF, triangulate_polygons
 from vto_pipeline.io.text_numbers import parse_numbers, parse_rows, read_lines
 
 _NAMES = """
@@ -56,7 +56,7 @@ def parse_obj(name: str) -> Arrays:
     if values.shape[1] >= 6:
         arrays["colors"] = np.clip(np.nan_to_num(values[:, 3:6]) * 255, 0, 255).round().astype(np.uint8)
     seen = np.cumsum(is_vertex)[is_face]
-    triangles, notes = triangulate(_polygons(*rest(is_face), seen, path), path)
+    triangles, notes = triangulate_polygons(_polygons(*rest(is_face), seen, path), path)
     if unknown.any():
         some = ", ".join(repr(str(key)[:20]) for key in np.unique(keys[unknown])[:8])
         notes.append(f"skipped {unknown.sum()} lines whose keywords OBJ does not define: {some}")

@@ -8,7 +8,7 @@ import numpy as np
 
 from vto_pipeline.errors import FormatError
 from vto_pipeline.io.arrays import Arrays
-from vto_pipeline.io.formats.polygons import CUT_OFF, triangulate
+from vto_pipeline.io.formats.polygons import CUT_OFF, triangulate_polygons
 from vto_pipeline.io.text_numbers import parse_numbers, parse_rows, read_lines
 
 
@@ -46,7 +46,7 @@ def parse_off(name: str) -> Arrays:
     points = parse_rows(lines[1 : 1 + vertices], at[1 : 1 + vertices], path)
     if points.shape[1] < 3:
         raise FormatError(f"vertices have {points.shape[1]} coordinates", where=str(path))
-    triangles, notes = triangulate(_polygons(lines[1 + vertices :], at[1 + vertices :], path), path)
+    triangles, notes = triangulate_polygons(_polygons(lines[1 + vertices :], at[1 + vertices :], path), path)
     return {"vertices": points[:, :3], "faces": triangles, "notes": np.array(notes, dtype=np.str_)}
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vto_pipeline.errors import FormatError
 from vto_pipeline.io.arrays import Arrays
 from vto_pipeline.io.formats.ply_header import Element, Header, Property, read_header
-from vto_pipeline.io.formats.polygons import CUT_OFF, triangulate
+from vto_pipeline.io.formats.polygons import CUT_OFF, triangulate_polygons
 from vto_pipeline.io.text_numbers import parse_numbers
 
 _INDEX_NAMES = ("vertex_indices", "vertex_index")
@@ -126,7 +126,7 @@ def _arrays(header: Header, tables: dict[str, list[NDArray[Any]]], path: Path) -
             if field is None:
                 raise FormatError("faces have no vertex_indices", where=str(path))
             groups.append(run[field])
-        arrays["faces"], notes = triangulate(groups, path)
+        arrays["faces"], notes = triangulate_polygons(groups, path)
     return {**arrays, "notes": np.array(notes, dtype=np.str_)}
 
 

@@ -14,7 +14,7 @@ from vto_pipeline.errors import FormatError
 CUT_OFF = "the file is truncated or its header is wrong: export it again"
 
 
-def fan(polygons: NDArray[Any]) -> NDArray[np.int64]:
+def fan_triangulation(polygons: NDArray[Any]) -> NDArray[np.int64]:
     """Split polygons of N corners into fans round their first corner.
 
     Args:
@@ -31,7 +31,7 @@ def fan(polygons: NDArray[Any]) -> NDArray[np.int64]:
     return np.stack([first, polygons[:, 1:-1], polygons[:, 2:]], axis=2).reshape(-1, 3)
 
 
-def triangulate(groups: Sequence[NDArray[Any]], path: Path) -> tuple[NDArray[np.int64], list[str]]:
+def triangulate_polygons(groups: Sequence[NDArray[Any]], path: Path) -> tuple[NDArray[np.int64], list[str]]:
     """Split groups of equal-sided polygons.
 
     Args:
@@ -55,4 +55,4 @@ def triangulate(groups: Sequence[NDArray[Any]], path: Path) -> tuple[NDArray[np.
         notes.append(f"split {split} polygons with more than 3 corners into triangles")
     if dropped:
         notes.append(f"dropped {dropped} faces with fewer than 3 corners")
-    return np.concatenate([np.empty((0, 3), dtype=np.int64), *(fan(group) for group in groups)]), notes
+    return np.concatenate([np.empty((0, 3), dtype=np.int64), *(fan_triangulation(group) for group in groups)]), notes

@@ -31,7 +31,7 @@ def _given_only(path: Path, value: Any) -> None:
     raise TypeError(f"{path.name} is an input and is never written")
 
 
-def _told(read: Callable[..., Any]) -> Callable[[Path, Job], Any]:
+def _job_by_position(read: Callable[..., Any]) -> Callable[[Path, Job], Any]:
     """Return a reader that takes its job as second argument, from one that takes it by name."""
     return lambda path, job: read(path, job=job)
 
@@ -80,7 +80,7 @@ def _role_kinds(role: str, prefix: str) -> tuple[ArtifactKind, ...]:
             f"{role}_{name}",
             f"{role}: {about}",
             meshes.read_mesh,
-            receive=_told(meshes.read_mesh),
+            receive=_job_by_position(meshes.read_mesh),
             inline=_with_unit(meshes.read_mesh),
             in_folder=lambda folder: (folder / BASE).is_file(),
         )
@@ -90,21 +90,21 @@ def _role_kinds(role: str, prefix: str) -> tuple[ArtifactKind, ...]:
             f"{role}_photos",
             f"{role}: photos from many sides",
             read_photos,
-            receive=_told(read_photos),
+            receive=_job_by_position(read_photos),
             in_folder=_holds_pictures,
         ),
         _leaf(
             f"{role}_depth",
             f"{role}: frames of a depth camera",
             read_depth_frames,
-            receive=_told(read_depth_frames),
+            receive=_job_by_position(read_depth_frames),
             in_folder=lambda folder: (folder / "depth").is_dir(),
         ),
         _leaf(
             f"{role}_cloud",
             f"{role}: point cloud of a scanner",
             clouds.read_cloud,
-            receive=_told(clouds.read_cloud),
+            receive=_job_by_position(clouds.read_cloud),
             inline=_with_unit(clouds.read_cloud),
         ),
         mesh_kind("mesh", "finished mesh"),
@@ -127,7 +127,7 @@ def _role_kinds(role: str, prefix: str) -> tuple[ArtifactKind, ...]:
             "scanned surface",
             meshes.read_own_mesh,
             meshes.write_ply,
-            receive=_told(meshes.read_mesh),
+            receive=_job_by_position(meshes.read_mesh),
             inline=_with_unit(meshes.read_mesh),
             in_folder=lambda folder: (folder / BASE).is_file(),
         ),

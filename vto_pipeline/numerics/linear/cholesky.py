@@ -41,7 +41,7 @@ class Factor(NamedTuple):
     good: NDArray[np.bool_]
 
 
-def factor_room(plan: Elimination, before: Factor | None = None) -> Factor:
+def allocate_factor(plan: Elimination, before: Factor | None = None) -> Factor:
     """Return room for a factor by this plan: what there was before, where that is enough."""
     good = np.zeros(len(plan.first) - 1, np.bool_)
     if before is not None and len(before.panels) >= plan.panels[-1] and len(before.passed) >= plan.room:
@@ -57,7 +57,7 @@ def factorise(plan, starts, blocks, weights, between, out):
         plan: For the pattern of the matrix and for the links.
         starts, blocks: The matrix by rows; symmetric.
         weights, between: Of the links: of their vertices, shape (P, 4), and their blocks, shape (P, 3, 3).
-        out: From `factor_room`.
+        out: From `allocate_factor`.
     """
     threaded = plan.flops >= _SIDE_BY_SIDE
     if threaded:
@@ -93,11 +93,11 @@ def _bin(b, plan, starts, blocks, weights, between, out, threaded):
             rest[i, i:] = 0.0
         _gather(s, plan, starts, blocks, weights, between, panel, rest)
         for c in children:
-            _take_over(c, plan, out.passed, panel, rest, threaded)
+            _extend_add(c, plan, out.passed, panel, rest, threaded)
         out.good[s] = _eliminate(panel, threaded)
         if not out.good[s]:
             return
-        _pass_on(panel, rest, threaded)
+        _update_schur_complement(panel, rest, threaded)
 
 
 @njit(cache=True, error_model="numpy")
@@ -128,7 +128,7 @@ def _gather(s, plan, starts, blocks, weights, between, panel, rest):
 
 
 @njit(cache=True, error_model="numpy")
-def _take_over(c, plan, passed, panel, rest, threaded):
+def _extend_add(c, plan, passed, panel, rest, threaded):
     """Add what child c passes on."""
     begin, end = plan.row_starts[c], plan.row_starts[c + 1]
     count = end - begin
@@ -138,21 +138,21 @@ def _take_over(c, plan, passed, panel, rest, threaded):
     for a in range(count - 2, -1, -1):
         run[a] = run[a + 1] if within[a + 1] == within[a] + 1 else a + 1
     if threaded and given.size >= _TAKEN:
-        _take_rows_parallel(given, within, run, panel, rest)
+        _extend_add_rows_parallel(given, within, run, panel, rest)
     else:
-        _take_rows(given, within, run, panel, rest, 0, count)
+        _extend_add_rows(given, within, run, panel, rest, 0, count)
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
-def _take_rows_parallel(given, within, run, panel, rest):
+def _extend_add_rows_parallel(given, within, run, panel, rest):
     strips = (len(within) + _STRIP - 1) // _STRIP
     for k in prange(strips):
-        first = _STRIP * _in_turn(k, strips)
-        _take_rows(given, within, run, panel, rest, first, min(len(within), first + _STRIP))
+        first = _STRIP * _balanced_strip(k, strips)
+        _extend_add_rows(given, within, run, panel, rest, first, min(len(within), first + _STRIP))
 
 
 @njit(cache=True, error_model="numpy")
-def _take_rows(given, within, run, panel, rest, first, last):
+def _extend_add_rows(given, within, run, panel, rest, first, last):
     """Add some of the rows that a child passes on, each to a row of its own."""
     wide = len(panel)
     for a in range(first, last):
@@ -167,7 +167,7 @@ def _take_rows(given, within, run, panel, rest, first, last):
 
 
 @njit(cache=True, error_model="numpy")
-def _in_turn(k, strips):
+def _balanced_strip(k, strips):
     """Return the strip of a triangle that is the k-th to be taken: long and short ones in turn, for like work."""
     return k // 2 if k % 2 == 0 else strips - 1 - k // 2
 
@@ -255,7 +255,7 @@ def _subtract_three(pivots, count, panel, i, end):
 
 
 @njit(cache=True, error_model="numpy")
-def _pass_on(panel, rest, threaded):
+def _update_schur_complement(panel, rest, threaded):
     """Subtract from what is passed on the products of the eliminated columns."""
     wide, tall = len(panel), len(rest)
     for first in range(0, wide, _PIVOTS):
@@ -309,7 +309,7 @@ def _tiles(pivots, shift, width, begin):
 def _subtract_parallel(pivots, beside, rows, begin, end, shift):
     strips = (end - begin + _STRIP - 1) // _STRIP
     for k in prange(strips):
-        first = begin + _STRIP * _in_turn(k, strips)
+        first = begin + _STRIP * _balanced_strip(k, strips)
         _subtract(pivots, beside, rows, first, min(end, first + _STRIP), shift)
 
 

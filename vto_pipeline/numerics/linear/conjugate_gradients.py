@@ -8,8 +8,8 @@ import numpy as np
 from numba import njit, prange
 
 from vto_pipeline.numerics.linear.block_matrix import CHUNK, PARALLEL_FROM, row_times
-from vto_pipeline.numerics.linear.links import pull, pull_back
-from vto_pipeline.numerics.linear.multigrid import cycle
+from vto_pipeline.numerics.linear.links import apply_links, apply_links_transposed
+from vto_pipeline.numerics.linear.multigrid import v_cycle
 from vto_pipeline.numerics.vector import dot, load
 
 
@@ -21,7 +21,7 @@ def pcg(levels, right, x, reference, tolerance, iterations, multigrid):
     on the number of threads.
 
     Args:
-        levels: The matrix A, symmetric positive definite, as first level; see `multigrid.update`.
+        levels: The matrix A, symmetric positive definite, as first level; see `multigrid.update_hierarchy`.
         right: Shape (N, 3).
         x: First guess, and the solution, shape (N, 3).
         reference: What the residual is measured against, shape (N, 3): `right`, or less where some of it cancels.
@@ -46,7 +46,7 @@ def pcg(levels, right, x, reference, tolerance, iterations, multigrid):
     while done < iterations and (size > bound or soft_size > soft_bound):
         if multigrid:
             levels.right[: len(x)] = r
-            cycle(levels)
+            v_cycle(levels)
         else:
             _run(_JACOBI, matrix, links, inverse, z, right, x, r, q, p, 0.0, parts, threaded)
         rho, _, _, _ = _run(_INNER, matrix, links, inverse, z, right, x, r, q, p, 0.0, parts, threaded)
@@ -69,9 +69,9 @@ _BEGIN, _JACOBI, _INNER, _TURN, _MULTIPLY, _STEP = range(6)
 def _run(what, matrix, links, inverse, z, right, x, r, q, p, factor, parts, threaded):
     """Do one part of an iteration for all rows; return four sums over the rows."""
     if what == _BEGIN:
-        pull(links, 0, x)
+        apply_links(links, 0, x)
     elif what == _MULTIPLY:
-        pull(links, 0, p)
+        apply_links(links, 0, p)
     if threaded:
         _run_parallel(what, matrix, links, inverse, z, right, x, r, q, p, factor, parts)
     else:
@@ -98,7 +98,7 @@ def _run_chunk(what, matrix, links, inverse, z, right, x, r, q, p, factor, parts
     for i in range(CHUNK * chunk, min(len(x), CHUNK * chunk + CHUNK)):
         if what == _BEGIN:
             a, b, c = row_times(matrix, i, x)
-            d, e, f = pull_back(links, i)
+            d, e, f = apply_links_transposed(links, i)
             r[i, 0], r[i, 1], r[i, 2] = right[i, 0] - a - d, right[i, 1] - b - e, right[i, 2] - c - f
             one += dot(load(z, i), load(z, i))
             other += dot(load(r, i), load(r, i))
@@ -114,7 +114,7 @@ def _run_chunk(what, matrix, links, inverse, z, right, x, r, q, p, factor, parts
                 p[i, k] = z[i, k] + factor * p[i, k]
         elif what == _MULTIPLY:
             a, b, c = row_times(matrix, i, p)
-            d, e, f = pull_back(links, i)
+            d, e, f = apply_links_transposed(links, i)
             a, b, c = a + d, b + e, c + f
             q[i, 0], q[i, 1], q[i, 2] = a, b, c
             one += p[i, 0] * a + p[i, 1] * b + p[i, 2] * c

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vto_pipeline.numerics.linear.block_matrix import BlockMatrix
-from vto_pipeline.numerics.linear.cholesky import factor_room, factorise
-from vto_pipeline.numerics.linear.elimination import eliminate
+from vto_pipeline.numerics.linear.cholesky import allocate_factor, factorise
+from vto_pipeline.numerics.linear.elimination import plan_elimination
 from vto_pipeline.numerics.linear.elimination_tree import dissection
 from vto_pipeline.numerics.linear.substitution import solve
 
@@ -23,8 +23,8 @@ class DirectSolver:
         self._starts = matrix.starts
         self._weights, self._links = np.empty((0, 4)), np.empty((0, 3, 3))
         order = dissection(matrix.starts, matrix.columns)
-        self._plan = eliminate(matrix.starts, matrix.columns, order, np.empty((0, 4), np.int32), self._weights)
-        self._factor = factor_room(self._plan)
+        self._plan = plan_elimination(matrix.starts, matrix.columns, order, np.empty((0, 4), np.int32), self._weights)
+        self._factor = allocate_factor(self._plan)
 
     def factorise(self, blocks: NDArray[np.float64]) -> bool:
         """Factor a matrix of these blocks, shape (B, 3, 3); return whether it is positive definite."""

@@ -58,7 +58,7 @@ class Elimination(NamedTuple):
     flops: float
 
 
-def eliminate(
+def plan_elimination(
     starts: NDArray[np.int32],
     columns: NDArray[np.int32],
     order: NDArray[np.int32],

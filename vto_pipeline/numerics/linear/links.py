@@ -55,7 +55,7 @@ def no_links(rows: int) -> Links:
     )
 
 
-def link(vertices: NDArray[np.int32], weights: NDArray[np.float64], up: Sparse, rows: NDArray[np.int64]) -> Links:
+def make_links(vertices: NDArray[np.int32], weights: NDArray[np.float64], up: Sparse, rows: NDArray[np.int64]) -> Links:
     """Return links on all levels, with blocks of zero.
 
     Args:
@@ -67,7 +67,7 @@ def link(vertices: NDArray[np.int32], weights: NDArray[np.float64], up: Sparse, 
     count = len(vertices)
     if count == 0:
         return no_links(int(rows[-1]))
-    starts, columns, kept = _carry_up(vertices, weights, up, len(rows) - 1)
+    starts, columns, kept = _restrict_to_levels(vertices, weights, up, len(rows) - 1)
     owner = np.repeat(np.arange(len(starts) - 1, dtype=np.int32), np.diff(starts))
     order = np.argsort(columns, kind="stable")
     begin = np.searchsorted(columns[order], np.arange(rows[-1] + 1)).astype(np.int32)
@@ -86,7 +86,7 @@ def link(vertices: NDArray[np.int32], weights: NDArray[np.float64], up: Sparse, 
 
 
 @njit(cache=True, error_model="numpy")
-def _carry_up(vertices, weights, up, levels):
+def _restrict_to_levels(vertices, weights, up, levels):
     """Return G of the first level and G P of each following one, as starts, columns and weights."""
     count, corners = vertices.shape
     starts = np.zeros(count * levels + 1, np.int32)
@@ -124,7 +124,7 @@ def _doubled(array):
 
 
 @njit(cache=True, error_model="numpy")
-def pull(links, level, x):
+def apply_links(links, level, x):
     """Set links.pulls to B G x on a level; x of shape (rows, 3) is the level's part of the stacked rows."""
     count = len(links.blocks)
     if count >= PARALLEL_FROM:
@@ -156,7 +156,7 @@ def _pull_some(links, level, x, first, end):
 
 
 @njit(cache=True, error_model="numpy")
-def pull_back(links, i):
+def apply_links_transposed(links, i):
     """Return row i of Gᵀ links.pulls."""
     a = b = c = 0.0
     count = len(links.blocks)

@@ -15,7 +15,14 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from vto_pipeline.numerics.linear.block_matrix import CHUNK, PARALLEL_FROM, BlockMatrix, Sparse, row_times
-from vto_pipeline.numerics.linear.links import Links, add_to_dense, no_links, pull, pull_back, spread_block
+from vto_pipeline.numerics.linear.links import (
+    Links,
+    add_to_dense,
+    apply_links,
+    apply_links_transposed,
+    no_links,
+    spread_block,
+)
 
 _COARSEST = 24  # rows solved directly
 _DAMPING = 0.6  # of block Jacobi; stable while the largest eigenvalue of D⁻¹A, some 2, stays under 3.3
@@ -184,7 +191,7 @@ def _stack_sums(sums, slots) -> Sparse:  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def update(levels):
+def update_hierarchy(levels):
     """Make the coarse matrices and the inverses after the first level's blocks have been written."""
     matrix = levels.matrix
     last = len(levels.rows) - 2
@@ -292,7 +299,7 @@ def invert_dense(matrix):
 
 
 @njit(cache=True, error_model="numpy")
-def cycle(levels):
+def v_cycle(levels):
     """Take one V-cycle for A guess = right on the first level: `right` is read, `guess` written.
 
     One sweep of damped block Jacobi before and after, so the cycle is symmetric and may precondition CG.
@@ -317,7 +324,7 @@ def _each(what, levels, level):
     first, end = levels.rows[of], levels.rows[of + 1]
     links = levels.links
     if what in (_DOWN_RESIDUAL, _UP_RESIDUAL):
-        pull(links, level, levels.guess)
+        apply_links(links, level, levels.guess)
     matrix, inverse, up, down = levels.matrix, levels.inverse, levels.up, levels.down
     right, guess, rest = levels.right, levels.guess, levels.rest
     if end - first >= PARALLEL_FROM:
@@ -346,7 +353,7 @@ def _each_row(what, matrix, links, inverse, up, down, right, guess, rest, fine, 
                 guess[i, k] = _DAMPING * (inverse[i, k, 0] * r0 + inverse[i, k, 1] * r1 + inverse[i, k, 2] * r2)
         elif what == _DOWN_RESIDUAL:
             a, b, c = row_times(matrix, i, guess)
-            d, e, f = pull_back(links, i)
+            d, e, f = apply_links_transposed(links, i)
             rest[i, 0], rest[i, 1], rest[i, 2] = right[i, 0] - a - d, right[i, 1] - b - e, right[i, 2] - c - f
         elif what == _DOWN_RESTRICT:
             a = b = c = 0.0
@@ -364,7 +371,7 @@ def _each_row(what, matrix, links, inverse, up, down, right, guess, rest, fine, 
                 guess[i, 2] += w * guess[j, 2]
         else:
             a, b, c = row_times(matrix, i, guess)
-            d, e, f = pull_back(links, i)
+            d, e, f = apply_links_transposed(links, i)
             a, b, c = right[i, 0] - a - d, right[i, 1] - b - e, right[i, 2] - c - f
             for k in range(3):
                 rest[i, k] = _DAMPING * (inverse[i, k, 0] * a + inverse[i, k, 1] * b + inverse[i, k, 2] * c)

@@ -81,7 +81,7 @@ def pulls(along, slopes):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def on_corner(du, dv, pull_u, pull_v):
+def corner_force(du, dv, pull_u, pull_v):
     """Return the pull on a corner with shape gradient (du, dv)."""
     return axpy(du, pull_u, scale(dv, pull_v))
 
@@ -104,7 +104,7 @@ def mobility(slopes, w0, w1, w2, g):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def changes(slopes, du, dv):
+def strain_changes(slopes, du, dv):
     """Return how the strains change, to first order, as F_u and F_v change by du and dv."""
     return dot(slopes[0], du), dot(slopes[1], dv), dot(slopes[2], du) + dot(slopes[3], dv)
 

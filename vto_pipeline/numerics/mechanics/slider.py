@@ -20,19 +20,19 @@ def huber(extension, compliance, limit):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def secant(extension, compliance, limit):
+def secant_compliance(extension, compliance, limit):
     """Return the compliance that gives the same force at this extension: α, or |e| / limit beyond."""
     return max(compliance, abs(extension) / limit)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def slipped(extension, compliance, limit):
+def slider_slip(extension, compliance, limit):
     """Return how far the slider goes until the spring holds no more than the limit."""
     held = compliance * limit
     return extension - min(max(extension, -held), held)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def wrapped(angle):
+def wrap_angle(angle):
     """Return the angle between -π and π."""
     return angle - 2.0 * pi * floor(0.5 * angle / pi + 0.5)

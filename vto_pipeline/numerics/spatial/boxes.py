@@ -32,7 +32,7 @@ def simplex_boxes(boxes, simplices):
     for i in range(len(simplices)):
         box = load_box(boxes, simplices[i, 0])
         for k in range(1, simplices.shape[1]):
-            box = join(box, load_box(boxes, simplices[i, k]))
+            box = box_union(box, load_box(boxes, simplices[i, k]))
         store_box(around, i, box)
     return around
 
@@ -50,7 +50,7 @@ def store_box(boxes, i, a):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def join(a, b):
+def box_union(a, b):
     """Return the box about both."""
     return (
         min(a[0], b[0]),
@@ -63,7 +63,7 @@ def join(a, b):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def overlap(a, boxes, i):
+def boxes_overlap(a, boxes, i):
     """Return whether the closed boxes a and row i have a point in common.
 
     Without branches: which of the six fails first is a coin toss, and a wrong guess costs more than all of them.

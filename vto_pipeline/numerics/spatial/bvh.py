@@ -13,8 +13,8 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from vto_pipeline.numerics.distance import FACE, blend, closest_on_triangle
-from vto_pipeline.numerics.spatial.boxes import EMPTY, area, join, load_box, store_box, swept_boxes
+from vto_pipeline.numerics.distance import FACE, barycentric_point, closest_on_triangle
+from vto_pipeline.numerics.spatial.boxes import EMPTY, area, box_union, load_box, store_box, swept_boxes
 from vto_pipeline.numerics.spatial.morton import morton_order
 from vto_pipeline.numerics.vector import dot, load, sub
 
@@ -84,7 +84,7 @@ def _fit_parallel(order, nodes, triangles, boxes, faces):
     for root in prange(_SUBTREES - 1, 2 * _SUBTREES - 1):
         _fit_under(order, nodes, triangles, boxes, faces, root)
     for node in range(_SUBTREES - 2, -1, -1):
-        store_box(nodes, node, join(load_box(nodes, 2 * node + 1), load_box(nodes, 2 * node + 2)))
+        store_box(nodes, node, box_union(load_box(nodes, 2 * node + 1), load_box(nodes, 2 * node + 2)))
 
 
 @njit(cache=True, error_model="numpy")
@@ -96,21 +96,23 @@ def _fit_under(order, nodes, triangles, boxes, faces, root):
         first, count = 2 * first + 1, 2 * count
     for node in range(first, first + count):
         around = EMPTY
-        begin, end = places(len(order), leaves, node)
+        begin, end = leaf_range(len(order), leaves, node)
         for place in range(begin, end):
             t = order[place]
-            box = join(load_box(boxes, faces[t, 0]), join(load_box(boxes, faces[t, 1]), load_box(boxes, faces[t, 2])))
+            box = box_union(
+                load_box(boxes, faces[t, 0]), box_union(load_box(boxes, faces[t, 1]), load_box(boxes, faces[t, 2]))
+            )
             store_box(triangles, t, box)
-            around = join(around, box)
+            around = box_union(around, box)
         store_box(nodes, node, around)
     while first > root:
         first, count = (first - 1) // 2, count // 2
         for node in range(first, first + count):
-            store_box(nodes, node, join(load_box(nodes, 2 * node + 1), load_box(nodes, 2 * node + 2)))
+            store_box(nodes, node, box_union(load_box(nodes, 2 * node + 1), load_box(nodes, 2 * node + 2)))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def places(count, leaves, node):
+def leaf_range(count, leaves, node):
     """Return where the triangles of a leaf begin and end in the order; `count` is of triangles."""
     leaf = node - leaves + 1
     return leaf * count // leaves, (leaf + 1) * count // leaves
@@ -137,7 +139,7 @@ def _cost(nodes, triangles):
     return inner / whole if whole > 0.0 else 1.0
 
 
-def closest_points(tree, vertices, faces, points, reach, guess=None):
+def closest_triangles(tree, vertices, faces, points, reach, guess=None):
     """Return the nearest triangle to each point, or -1 beyond its reach, with the place on it.
 
     Args:
@@ -199,7 +201,7 @@ def _closest_range(tree, vertices, faces, points, reach, guess, first, last, tri
                 stack[depth], stack[depth + 1] = far, near
                 depth += 2
                 continue
-            first_place, last_place = places(len(order), leaves, node)
+            first_place, last_place = leaf_range(len(order), leaves, node)
             for k in range(first_place, last_place):
                 found, on, d_sq = _to_triangle(vertices, faces, order[k], p)
                 if d_sq < best_sq or (d_sq == best_sq and best < 0):
@@ -213,7 +215,7 @@ def _closest_range(tree, vertices, faces, points, reach, guess, first, last, tri
 def _to_triangle(vertices, faces, t, p):
     a, b, c = load(vertices, faces[t, 0]), load(vertices, faces[t, 1]), load(vertices, faces[t, 2])
     weights, feature = closest_on_triangle(p, a, b, c)
-    away = sub(p, blend(weights, a, b, c))
+    away = sub(p, barycentric_point(weights, a, b, c))
     return weights, feature, dot(away, away)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from vto_pipeline.numerics.spatial.boxes import load_box, overlap
-from vto_pipeline.numerics.spatial.bvh import Bvh, places
+from vto_pipeline.numerics.spatial.boxes import boxes_overlap, load_box
+from vto_pipeline.numerics.spatial.bvh import Bvh, leaf_range
 from vto_pipeline.numerics.spatial.pair_lists import collect
 
 _CHUNK = 16  # leaves a thread takes at a time
@@ -64,11 +64,11 @@ def _search(order, nodes, triangles, other_order, other_nodes, other_triangles, 
     stack = np.empty(128, np.int64)
     count = 0
     for node in range(leaves - 1 + first, leaves - 1 + last):
-        begin, end = places(len(order), leaves, node)
+        begin, end = leaf_range(len(order), leaves, node)
         box = load_box(nodes, node)
         if same:
             for i in range(begin, end):
-                count = _hold_against(order[i], triangles, order, triangles, i + 1, end, found, count)
+                count = _test_against(order[i], triangles, order, triangles, i + 1, end, found, count)
             depth, up = 0, node
             while up > 0:  # every later leaf is under the right sibling of this one or of one of its ancestors
                 if up % 2 == 1:
@@ -80,28 +80,28 @@ def _search(order, nodes, triangles, other_order, other_nodes, other_triangles, 
         while depth > 0:
             depth -= 1
             visit = stack[depth]
-            if not overlap(box, other_nodes, visit):
+            if not boxes_overlap(box, other_nodes, visit):
                 continue
             if visit < other_leaves - 1:
                 stack[depth], stack[depth + 1] = 2 * visit + 2, 2 * visit + 1
                 depth += 2
                 continue
-            other_begin, other_end = places(len(other_order), other_leaves, visit)
+            other_begin, other_end = leaf_range(len(other_order), other_leaves, visit)
             for i in range(begin, end):
-                if overlap(load_box(triangles, order[i]), other_nodes, visit):
-                    count = _hold_against(
+                if boxes_overlap(load_box(triangles, order[i]), other_nodes, visit):
+                    count = _test_against(
                         order[i], triangles, other_order, other_triangles, other_begin, other_end, found, count
                     )
     return count
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _hold_against(triangle, boxes, other_order, other_boxes, begin, end, found, count):
+def _test_against(triangle, boxes, other_order, other_boxes, begin, end, found, count):
     """Write a triangle's pairs with those at some places of the order; return how many there are now."""
     box = load_box(boxes, triangle)
     for place in range(begin, end):
         other = other_order[place]
         if count < len(found):
             found[count, 0], found[count, 1] = triangle, other  # kept or overwritten: a branch would be a coin toss
-        count += overlap(box, other_boxes, other)
+        count += boxes_overlap(box, other_boxes, other)
     return count

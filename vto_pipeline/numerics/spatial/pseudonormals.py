@@ -49,12 +49,12 @@ def pseudonormals(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Ps
         np.empty((len(key), 3)),
         np.empty((len(vertices), 3)),
     )
-    update(normals, vertices, faces)
+    update_pseudonormals(normals, vertices, faces)
     return normals
 
 
 @njit(cache=True)
-def update(normals, vertices, faces):
+def update_pseudonormals(normals, vertices, faces):
     """Recompute the normals for moved vertices, in place."""
     normals.edges[:] = 0.0
     normals.vertices[:] = 0.0
@@ -63,14 +63,14 @@ def update(normals, vertices, faces):
         a, b, c = load(vertices, faces[f, 0]), load(vertices, faces[f, 1]), load(vertices, faces[f, 2])
         n = unit(cross(sub(b, a), sub(c, a)))
         slivers += n == (0.0, 0.0, 0.0)
-        _spread(normals, vertices, faces, f, n)
+        _accumulate(normals, vertices, faces, f, n)
     if slivers > 0:
         for f in range(len(faces)):
             if load(normals.faces, f) == (0.0, 0.0, 0.0):  # where others meet in a line it is the seam: as they face
                 around = (0.0, 0.0, 0.0)
                 for k in range(3):
                     around = add(around, load(normals.edges, normals.face_edges[f, k]))
-                _spread(normals, vertices, faces, f, unit(around))
+                _accumulate(normals, vertices, faces, f, unit(around))
     for e in range(len(normals.edges)):
         if normals.rim_edges[e]:
             store(normals.edges, e, (0.0, 0.0, 0.0))
@@ -80,7 +80,7 @@ def update(normals, vertices, faces):
 
 
 @njit(cache=True)
-def _spread(normals, vertices, faces, f, n):
+def _accumulate(normals, vertices, faces, f, n):
     """Note the normal of a face, and add it to those of its edges and, by their angles, of its vertices."""
     store(normals.faces, f, n)
     for k in range(3):

@@ -11,14 +11,19 @@ from vto_pipeline.io.documents import read_json
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.settings import Config
 from vto_pipeline.pipeline.catalogue import Catalogue
-from vto_pipeline.pipeline.execution.folder import RECORD, claimed, existing_run
-from vto_pipeline.pipeline.execution.out import Out
+from vto_pipeline.pipeline.execution.folder import RECORD, existing_run, locked_run_folder
+from vto_pipeline.pipeline.execution.out import OutputFolder
 from vto_pipeline.pipeline.given import Given, resolve
 from vto_pipeline.pipeline.stage import Stage
 
 
 def make_final(
-    stage: Stage, settings: Config, out: Out, given: Mapping[str, Given], run_record: Mapping[str, Any], job: Job
+    stage: Stage,
+    settings: Config,
+    out: OutputFolder,
+    given: Mapping[str, Given],
+    run_record: Mapping[str, Any],
+    job: Job,
 ) -> None:
     """Run one final stage on RUN/out and write what it makes there.
 
@@ -56,9 +61,9 @@ def make_finals_again(folder: Path, catalogue: Catalogue) -> list[Path]:
             given[artifact] = resolve(one["key"], value, folder, catalogue.kind(artifact), str(folder / RECORD))
         except InputError:
             continue  # moved since: the page does without
-    out = Out(folder / "out", catalogue)
+    out = OutputFolder(folder / "out", catalogue)
     written = []
-    with claimed(folder):
+    with locked_run_folder(folder):
         for stage in catalogue.stages:
             if stage.final:
                 missing = [

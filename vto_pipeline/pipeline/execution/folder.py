@@ -20,7 +20,7 @@ def is_run(folder: Path) -> bool:
 
 
 @contextmanager
-def claimed(folder: Path, inputs: Iterable[Path] = ()) -> Iterator[None]:
+def locked_run_folder(folder: Path, inputs: Iterable[Path] = ()) -> Iterator[None]:
     """Create a run's folder if needed, and lock it.
 
     The lock is the operating system's, so that a killed run leaves none.

@@ -15,7 +15,7 @@ from vto_pipeline.pipeline.execution.digest import digest_file
 from vto_pipeline.pipeline.execution.store import Result
 
 
-class Out:
+class OutputFolder:
     """The folder of results for users."""
 
     def __init__(self, folder: Path, catalogue: Catalogue) -> None:

@@ -12,10 +12,10 @@ from vto_pipeline.pipeline.catalogue import Catalogue
 from vto_pipeline.pipeline.execution.cost import Meter
 from vto_pipeline.pipeline.execution.digest import digest_path, digest_value
 from vto_pipeline.pipeline.execution.final import make_final
-from vto_pipeline.pipeline.execution.folder import RECORD, claimed
+from vto_pipeline.pipeline.execution.folder import RECORD, locked_run_folder
 from vto_pipeline.pipeline.execution.key import result_key
 from vto_pipeline.pipeline.execution.listener import Listener
-from vto_pipeline.pipeline.execution.out import Out, write_value
+from vto_pipeline.pipeline.execution.out import OutputFolder, write_value
 from vto_pipeline.pipeline.execution.record import RunRecord, StageRecord
 from vto_pipeline.pipeline.execution.store import Result, Store
 from vto_pipeline.pipeline.plan import Plan, Step
@@ -49,7 +49,7 @@ def run(
         InputError: something given cannot be read.
         ComputationError: a stage failed; its partial result is under RUN/out/partial.
     """
-    with claimed(folder, [path for one in request.given.values() for path in one.paths]):
+    with locked_run_folder(folder, [path for one in request.given.values() for path in one.paths]):
         runner = _Run(request, plan, catalogue, folder, force_all, listener or Listener())
         return runner.run_all()
 
@@ -63,7 +63,7 @@ class _Run:
         self.request, self.plan, self.catalogue = request, plan, catalogue
         self.force_all, self.listener = force_all, listener
         self.store = Store(folder / "cache")
-        self.out = Out(folder / "out", catalogue)
+        self.out = OutputFolder(folder / "out", catalogue)
         self.record = RunRecord(folder / RECORD, request, plan)
         self.results: dict[str, Result] = {}
         self.given_digests: dict[str, str] = {}

@@ -15,7 +15,7 @@ RATIO, MAX_ERROR_PX, MIN_MATCHES = 0.8, 2.0, 25
 
 
 @dataclass(frozen=True)
-class Features:
+class ImageFeatures:
     """SIFT features of one frame.
 
     Args:
@@ -29,11 +29,11 @@ class Features:
     descriptors: NDArray[np.float32]
 
 
-def find_features(color: ByteArray | None, depth: NDArray[np.float32], camera: Intrinsics) -> Features:
+def find_features(color: ByteArray | None, depth: NDArray[np.float32], camera: Intrinsics) -> ImageFeatures:
     """Detect features (Lowe 2004) and look up their depth; without colour there are none."""
     import cv2
 
-    none = Features(np.empty((0, 2)), np.empty((0, 3)), np.empty((0, 128), np.float32))
+    none = ImageFeatures(np.empty((0, 2)), np.empty((0, 3)), np.empty((0, 128), np.float32))
     if color is None:
         return none
     found, descriptors = cv2.SIFT.create(2000).detectAndCompute(cv2.cvtColor(color, cv2.COLOR_RGB2GRAY), None)
@@ -43,12 +43,12 @@ def find_features(color: ByteArray | None, depth: NDArray[np.float32], camera: I
     column, row = np.round(pixels).astype(int).T
     z = depth[np.clip(row, 0, depth.shape[0] - 1), np.clip(column, 0, depth.shape[1] - 1)].astype(float)
     flat = (pixels - [camera.cx, camera.cy]) / [camera.fx, camera.fy]
-    return Features(
+    return ImageFeatures(
         pixels, np.column_stack([flat, np.ones(len(flat))]) * z[:, None], np.asarray(descriptors, np.float32)
     )
 
 
-def guess_motion(source: Features, target: Features, camera: Intrinsics) -> FloatArray | None:
+def guess_motion(source: ImageFeatures, target: ImageFeatures, camera: Intrinsics) -> FloatArray | None:
     """Estimate target_from_source by perspective-n-point with RANSAC.
 
     Returns:

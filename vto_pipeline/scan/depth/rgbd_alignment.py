@@ -48,7 +48,7 @@ class RgbdFrame:
 
 
 @dataclass(frozen=True)
-class Alignment:
+class RgbdAlignment:
     """Result of `align_frames`.
 
     Args:
@@ -84,7 +84,7 @@ def prepare_frame(color: ByteArray | None, depth: NDArray[np.float32], camera: I
 
 def align_frames(
     source: RgbdFrame, target: RgbdFrame, camera: Intrinsics, start: FloatArray, max_jump: float
-) -> Alignment:
+) -> RgbdAlignment:
     """Align by point-to-plane distance and brightness together, Gauss-Newton with Huber weights.
 
     Park et al. 2017 (joint photometric and geometric objective), with projective association (Newcombe et al. 2011).
@@ -113,7 +113,7 @@ def align_frames(
                 break
     points, brightness, total = _readings(source, 1)
     _, _, count, information = _sums(points, brightness, target, camera, transform, max_jump)
-    return Alignment(transform, information, count / max(total, 1))
+    return RgbdAlignment(transform, information, count / max(total, 1))
 
 
 def _readings(frame: RgbdFrame, stride: int) -> tuple[FloatArray, FloatArray, int]:

@@ -11,7 +11,7 @@ from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.frames import DepthFrameSet
 from vto_pipeline.scan.depth.depth_mask import clean_depth
 from vto_pipeline.scan.depth.pose_graph import Edge
-from vto_pipeline.scan.depth.pose_guess import Features, find_features, guess_motion
+from vto_pipeline.scan.depth.pose_guess import ImageFeatures, find_features, guess_motion
 from vto_pipeline.scan.depth.rgbd_alignment import RgbdFrame, align_frames, prepare_frame
 
 MIN_READINGS = 1000
@@ -34,7 +34,7 @@ class Tracker:
         """
         self.frames, self.min_overlap, self.max_jump = frames, min_overlap, max_jump
         self.ready: list[RgbdFrame] = []
-        self.features: list[Features] = []
+        self.features: list[ImageFeatures] = []
         for index, path in enumerate(frames.depth_paths):
             depth = clean_depth(read_depth(path, frames.depth_scale), frames.intrinsics)
             if np.count_nonzero(depth) < MIN_READINGS:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from vto_pipeline.model.settings import Config
-from vto_pipeline.scan.photos.rectify import Rectification, View, depth_in_view, warp
+from vto_pipeline.scan.photos.rectify import Rectification, StereoView, depth_in_view, warp
 from vto_pipeline.scan.photos.subpixel import refine_disparity
 
 
@@ -31,7 +31,7 @@ class MatchConfig(Config):
 
 
 def match_pair(
-    first: View, second: View, frame: Rectification, config: MatchConfig
+    first: StereoView, second: StereoView, frame: Rectification, config: MatchConfig
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Match two views and return depth in each.
 

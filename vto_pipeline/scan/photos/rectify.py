@@ -32,7 +32,7 @@ MIN_DISPARITY_PX = 1.0
 
 
 @dataclass(frozen=True)
-class View:
+class StereoView:
     """One photo as stereo sees it.
 
     Args:
@@ -70,7 +70,7 @@ class Rectification:
     typical_disparity: float
 
 
-def rectify(first: View, second: View, points: FloatArray, margin: float) -> Rectification:
+def rectify(first: StereoView, second: StereoView, points: FloatArray, margin: float) -> Rectification:
     """Choose the rectified frame and the window that the given scene points need.
 
     Args:
@@ -128,7 +128,7 @@ def _rotation(x: FloatArray, away: FloatArray) -> FloatArray:
     return np.stack([x, np.cross(z, x), z])
 
 
-def _window(view: View, rotation: FloatArray, seen: FloatArray, margin: float) -> tuple[FloatArray, FloatArray]:
+def _window(view: StereoView, rotation: FloatArray, seen: FloatArray, margin: float) -> tuple[FloatArray, FloatArray]:
     """Lower and upper end of the part of a picture that the points, seen there (N, 2), need [rad]."""
     pixel = 1 / view.camera.fx
     low, high = np.percentile(seen, [0.5, 99.5], axis=0)
@@ -142,7 +142,7 @@ def _window(view: View, rotation: FloatArray, seen: FloatArray, margin: float) -
     return low, high
 
 
-def _reach_of_picture(view: View, rotation: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _reach_of_picture(view: StereoView, rotation: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Lower and upper end of what a picture covers [rad]: all longitudes where it shows the axis."""
     camera, share = view.camera, np.linspace(0, 1, 33)
     zero, one = np.zeros(33), np.ones(33)
@@ -165,7 +165,7 @@ def _rays(camera: Intrinsics, u: FloatArray, v: FloatArray) -> FloatArray:
     return np.stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones(u.shape)], axis=-1)
 
 
-def warp(view: View, frame: Rectification, shift: int) -> NDArray[np.uint8]:
+def warp(view: StereoView, frame: Rectification, shift: int) -> NDArray[np.uint8]:
     """Return the part of a photo that the window shows, moved by `shift` pixels to the left; 0 beyond the photo."""
     import cv2
 
@@ -188,7 +188,7 @@ def warp(view: View, frame: Rectification, shift: int) -> NDArray[np.uint8]:
 
 
 def depth_in_view(
-    view: View, frame: Rectification, disparity: NDArray[np.float32], *, second: bool
+    view: StereoView, frame: Rectification, disparity: NDArray[np.float32], *, second: bool
 ) -> NDArray[np.float32]:
     """Return the depth of each pixel of the undistorted view from a disparity map of the window.
 

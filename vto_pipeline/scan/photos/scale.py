@@ -14,8 +14,8 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
 from vto_pipeline.model.settings import Config
 from vto_pipeline.scan.photos.board import board_corners, detect_board
-from vto_pipeline.scan.photos.sfm import moved
-from vto_pipeline.scan.photos.triangulation import triangulate
+from vto_pipeline.scan.photos.sfm import transform_reconstruction
+from vto_pipeline.scan.photos.triangulation import triangulate_points
 from vto_pipeline.scan.similarity import fit_similarity
 
 
@@ -51,7 +51,7 @@ def apply_board(
     job.progress(0.0, "looking for the board")
     found = detect_board(photos, cameras.names)
     world = board_corners(photos.board)
-    ids, observed = triangulate(found, cameras, config.max_error_px)
+    ids, observed = triangulate_points(found, cameras, config.max_error_px)
     if len(ids) < config.min_corners:
         sighted = sum(len(identity) > 0 for identity, _ in found)
         job.warn(
@@ -81,7 +81,7 @@ def apply_board(
     )
     if scale_error > config.max_scale_error:
         job.warn(f"the board fixes the scale to {100 * scale_error:.2f} % only; show more of it, in more photos")
-    placed, points = moved(cameras, cloud, board_from_scan, scale=scale, metric=True)
+    placed, points = transform_reconstruction(cameras, cloud, board_from_scan, scale=scale, metric=True)
     below = int((placed.world_from_cam[:, 1, 3] < 0).sum())
     if below > len(placed.names) / 2:
         job.warn(

@@ -121,10 +121,12 @@ def _intrinsics(camera: Any) -> Intrinsics:
 
 
 def _upright(cameras: CameraSet, cloud: PointCloud) -> tuple[CameraSet, PointCloud]:
-    return moved(cameras, cloud, upright_from_scan(cameras.world_from_cam, cloud.points), metric=False)
+    return transform_reconstruction(
+        cameras, cloud, upright_from_scan(cameras.world_from_cam, cloud.points), metric=False
+    )
 
 
-def moved(
+def transform_reconstruction(
     cameras: CameraSet, cloud: PointCloud, transform: FloatArray, *, scale: float = 1.0, metric: bool
 ) -> tuple[CameraSet, PointCloud]:
     """Cameras and points after scaling about the origin and then a rigid transform, shape (4, 4)."""

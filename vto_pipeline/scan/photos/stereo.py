@@ -23,7 +23,7 @@ from vto_pipeline.model.settings import Config
 from vto_pipeline.scan.photos.consistency import agreeing_views, consensus
 from vto_pipeline.scan.photos.disparity import MatchConfig, match_pair
 from vto_pipeline.scan.photos.neighbours import choose_pairs, visibility
-from vto_pipeline.scan.photos.rectify import View, rectify
+from vto_pipeline.scan.photos.rectify import StereoView, rectify
 
 PAIR_BYTES = 250
 """Working memory of one pair per pixel of a photo, with windows as large as they may be [B]."""
@@ -84,7 +84,7 @@ def estimate_depth_maps(
     return replace(merged, depth=checked)
 
 
-def _load(photos: PhotoSet, cameras: CameraSet, max_side: int) -> list[View]:
+def _load(photos: PhotoSet, cameras: CameraSet, max_side: int) -> list[StereoView]:
     import cv2
 
     paths = {path.name: path for path in photos.paths}
@@ -97,12 +97,12 @@ def _load(photos: PhotoSet, cameras: CameraSet, max_side: int) -> list[View]:
         if scale < 1:
             size = (round(gray.shape[1] * scale), round(gray.shape[0] * scale))
             gray = cv2.resize(gray, size, interpolation=cv2.INTER_AREA)
-            camera = scaled(camera, *size)
-        views.append(View(gray, camera, pose))
+            camera = resized_camera(camera, *size)
+        views.append(StereoView(gray, camera, pose))
     return views
 
 
-def scaled(camera: Intrinsics, width: int, height: int) -> Intrinsics:
+def resized_camera(camera: Intrinsics, width: int, height: int) -> Intrinsics:
     """The same camera with another number of pixels."""
     x, y = width / camera.width, height / camera.height
     cx, cy = (camera.cx + 0.5) * x - 0.5, (camera.cy + 0.5) * y - 0.5
@@ -113,7 +113,7 @@ def _undistorted(camera: Intrinsics) -> Intrinsics:
     return Intrinsics(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy)
 
 
-def _check_memory(views: list[View], pairs: list[tuple[int, int]], job: Job) -> None:
+def _check_memory(views: list[StereoView], pairs: list[tuple[int, int]], job: Job) -> None:
     """State the largest memory that matching needs, which follows from the pairs alone.
 
     Raises:
@@ -144,7 +144,7 @@ def _check_memory(views: list[View], pairs: list[tuple[int, int]], job: Job) -> 
 
 def _merge(
     names: tuple[str, ...],
-    views: list[View],
+    views: list[StereoView],
     pairs: list[tuple[int, int]],
     cloud: PointCloud,
     seen: NDArray[np.bool_],

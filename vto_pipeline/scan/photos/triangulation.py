@@ -8,7 +8,7 @@ from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.camera import CameraSet, Intrinsics
 
 
-def triangulate(
+def triangulate_points(
     found: list[tuple[IntArray, FloatArray]], cameras: CameraSet, max_error_px: float
 ) -> tuple[IntArray, FloatArray]:
     """Find where marked corners are: the point nearest to all rays that see it.

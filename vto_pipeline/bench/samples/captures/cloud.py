@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vto_pipeline.bench.samples.captures.render import PICTURE, Scene, pixel_rays
+from vto_pipeline.bench.samples.captures.render import PICTURE, RenderScene, pixel_rays
 from vto_pipeline.bench.samples.captures.viewpoints import on_ring
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.camera import Intrinsics
@@ -16,7 +16,7 @@ GRAZING = 0.2  # cosine of incidence below which nothing comes back
 
 
 def scan_stations(
-    scene: Scene, stations: FloatArray, holes: list[tuple[FloatArray, float]], count: int, seed: int
+    scene: RenderScene, stations: FloatArray, holes: list[tuple[FloatArray, float]], count: int, seed: int
 ) -> PointCloud:
     """Scan a scene.
 
@@ -52,7 +52,7 @@ def around_stations(
     return np.array(poses)
 
 
-def _one_station(scene: Scene, pose: FloatArray, rng: np.random.Generator) -> FloatArray:
+def _one_station(scene: RenderScene, pose: FloatArray, rng: np.random.Generator) -> FloatArray:
     """Points seen from one pose, shape (N, 3)."""
     rays = pixel_rays(FAN, pose)
     hit = {name: value.numpy() for name, value in scene.rays.cast_rays(rays).items()}
@@ -67,7 +67,7 @@ def _one_station(scene: Scene, pose: FloatArray, rng: np.random.Generator) -> Fl
     return points
 
 
-def _area(scene: Scene) -> float:
+def _area(scene: RenderScene) -> float:
     """Area of all scanned triangles [m²]."""
     kept = np.repeat(scene.paints < PICTURE, np.diff(scene.face_start))
     a, b, c = (scene.vertices[scene.faces[kept, i]] for i in range(3))

@@ -9,7 +9,7 @@ from PIL import Image
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from vto_pipeline.bench.samples.captures.photos import exposed
-from vto_pipeline.bench.samples.captures.render import PICTURE, Scene, pixel_rays, render
+from vto_pipeline.bench.samples.captures.render import PICTURE, RenderScene, pixel_rays, render
 from vto_pipeline.bench.samples.captures.viewpoints import on_ring
 from vto_pipeline.io.documents import write_json
 from vto_pipeline.io.files import replacing
@@ -65,7 +65,9 @@ def noisy_depth(depth: FloatArray, incidence: FloatArray, focal: float, rng: np.
     return np.where(seen & ~lost, reading, 0.0)
 
 
-def depth_frame(scene: Scene, camera: Intrinsics, world_from_cam: FloatArray, rng: np.random.Generator) -> FloatArray:
+def depth_frame(
+    scene: RenderScene, camera: Intrinsics, world_from_cam: FloatArray, rng: np.random.Generator
+) -> FloatArray:
     """One frame with its faults, shape (H, W) [m]. The floor and its board give no reading."""
     rays = pixel_rays(camera, world_from_cam)
     jitter = rng.normal(0.0, LATERAL, (*rays.shape[:2], 2)) / [camera.fx, camera.fy]
@@ -94,7 +96,7 @@ def around(
     return np.array(poses)
 
 
-def write_depth_frames(folder: Path, scene: Scene, camera: Intrinsics, poses: FloatArray, seed: int) -> None:
+def write_depth_frames(folder: Path, scene: RenderScene, camera: Intrinsics, poses: FloatArray, seed: int) -> None:
     """Write depth/*.png, color/*.jpg and intrinsics.json."""
     for index, pose in enumerate(poses):
         rng = np.random.default_rng([seed, index])

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from vto_pipeline.bench.samples.captures.render import Scene, render
+from vto_pipeline.bench.samples.captures.render import RenderScene, render
 from vto_pipeline.bench.samples.captures.viewpoints import on_ring
 from vto_pipeline.io.files import replacing
 from vto_pipeline.model.arrays import ByteArray, FloatArray
@@ -59,7 +59,7 @@ def write_photo(path: Path, picture: ByteArray) -> None:
         image.save(beside, quality=QUALITY, exif=exif)
 
 
-def write_photos(folder: Path, scene: Scene) -> CameraSet:
+def write_photos(folder: Path, scene: RenderScene) -> CameraSet:
     """Take and write all photos; returns where they were taken from."""
     cameras = photo_cameras()
     for index, (name, pose) in enumerate(zip(cameras.names, cameras.world_from_cam, strict=True)):

@@ -36,7 +36,7 @@ class Surface:
 
 
 @dataclass(frozen=True)
-class Scene:
+class RenderScene:
     """Surfaces made ready for rays. Built by `build_scene`."""
 
     rays: Any
@@ -50,7 +50,7 @@ class Scene:
     picture_scale: float
 
 
-def build_scene(surfaces: list[Surface], picture: ByteArray | None = None, picture_scale: float = 1.0) -> Scene:
+def build_scene(surfaces: list[Surface], picture: ByteArray | None = None, picture_scale: float = 1.0) -> RenderScene:
     """Collect surfaces and bake their light.
 
     Args:
@@ -71,7 +71,7 @@ def build_scene(surfaces: list[Surface], picture: ByteArray | None = None, pictu
         )
     flat = [s.coordinates if s.coordinates is not None else np.zeros((len(s.mesh.faces), 3, 2)) for s in surfaces]
     light = [_bake(rays, s.mesh) for s in surfaces]
-    return Scene(
+    return RenderScene(
         rays,
         np.array([s.paint for s in surfaces], dtype=np.int32),
         face_start,
@@ -93,7 +93,7 @@ def pixel_rays(camera: Intrinsics, world_from_cam: FloatArray, shift: tuple[floa
     return np.concatenate([origin, direction], axis=-1).astype(np.float32)
 
 
-def render(scene: Scene, camera: Intrinsics, world_from_cam: FloatArray, *, samples: int = 2) -> FloatArray:
+def render(scene: RenderScene, camera: Intrinsics, world_from_cam: FloatArray, *, samples: int = 2) -> FloatArray:
     """A picture without noise.
 
     Args:
@@ -119,7 +119,7 @@ def render(scene: Scene, camera: Intrinsics, world_from_cam: FloatArray, *, samp
     return srgb_curve(np.clip(total / samples**2, 0.0, 1.0))
 
 
-def vertex_normals(mesh: TriangleMesh) -> FloatArray:
+def area_weighted_normals(mesh: TriangleMesh) -> FloatArray:
     """Area-weighted unit normals, shape (V, 3)."""
     a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
     area = np.cross(b - a, c - a)
@@ -133,7 +133,7 @@ def vertex_normals(mesh: TriangleMesh) -> FloatArray:
 
 def _bake(rays: Any, mesh: TriangleMesh) -> FloatArray:
     """Light that reaches each vertex from in front of the surface and from behind it, shape (V, 2)."""
-    normals = vertex_normals(mesh)
+    normals = area_weighted_normals(mesh)
     light = np.zeros((len(normals), 2))
     for direction, strength in zip(*_lamps(), strict=True):
         facing = normals @ direction

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vto_pipeline.bench.samples.captures.board import BOARD, board_picture, board_surface
-from vto_pipeline.bench.samples.captures.render import CLOTH, FLOOR, LINEN, Scene, Surface, build_scene
+from vto_pipeline.bench.samples.captures.render import CLOTH, FLOOR, LINEN, RenderScene, Surface, build_scene
 from vto_pipeline.bench.samples.captures.textures import cloth_coordinates
 from vto_pipeline.bench.samples.garments.shirt import SLEEVE_RADIUS, TRUNK_RADIUS, sleeve_coordinates
 from vto_pipeline.bench.samples.solids.form import Form
@@ -16,7 +16,7 @@ FLOOR_RADIUS = 3.0  # [m]
 FLOOR_DROP = 0.0004  # the board lies on the floor; less than the offset of the light rays, or the board would shade it
 
 
-def dressed_form(form: Form, shirt: TriangleMesh) -> Scene:
+def dressed_form(form: Form, shirt: TriangleMesh) -> RenderScene:
     """The form in its shirt, the board at its foot, on a dull floor."""
     picture, scale = board_picture(BOARD)
     surfaces = [

@@ -1,7 +1,7 @@
 """The shirt on the form: an open shell with a neck, a hem and two cuffs.
 
-The shell is the zero level of one function that contains the form with some ease to spare, so it can meet neither the
-form nor itself. A later, simulated shirt only has to replace `make_shirt`.
+The shell is the zero level of one function that contains the form with some room to spare, so it can meet neither the
+form nor itself. A later, simulated shirt only has to replace `make_hanging_shirt`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from vto_pipeline.bench.samples.garments.folds import SLEEVE_FOLDS, TRUNK_FOLDS, fold_height, hem_flutes
 from vto_pipeline.bench.samples.solids.body import arm, leg_distance, torso_distance
-from vto_pipeline.bench.samples.solids.clip import clip, compact
+from vto_pipeline.bench.samples.solids.clip import clip_snapped, compact
 from vto_pipeline.bench.samples.solids.form import Form, body_frame, form_distance
 from vto_pipeline.bench.samples.solids.primitives import bump, cone, ellipsoid, smooth_cut, smooth_union
 from vto_pipeline.bench.samples.solids.surface_nets import Field, zero_surface
@@ -20,14 +20,14 @@ from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 
 CELL = 0.006
-TIGHT = 0.003  # ease on the shoulders [m]
+TIGHT = 0.003  # clearance on the shoulders [m]
 TRUNK_RADIUS = 0.15  # of the circle on which the arc of the trunk is measured [m]
 SLEEVE_RADIUS = 0.07
 HEM, WAIST, TRUNK_TOP = 0.215, 0.44, 0.735  # heights in the form's frame [m]
 SLEEVE = 0.235  # from the shoulder joint to the cuff [m]
 
 
-def make_shirt(form: Form, cell: float = CELL) -> TriangleMesh:
+def make_hanging_shirt(form: Form, cell: float = CELL) -> TriangleMesh:
     """A short-sleeved shirt hanging on the form.
 
     Args:
@@ -39,9 +39,9 @@ def make_shirt(form: Form, cell: float = CELL) -> TriangleMesh:
     """
     field = _shirt_field(form)
     closed = zero_surface(field, np.array([-0.48, 0.15, -0.28]), np.array([0.48, 0.90, 0.28]), cell)
-    below_neck = clip(closed, neck_distance(closed.vertices))
-    above_hem = clip(below_neck, below_neck.vertices[:, 1] - _hem_height(below_neck.vertices))
-    shell = clip(above_hem, _cuff_distance(form, above_hem.vertices))
+    below_neck = clip_snapped(closed, neck_distance(closed.vertices))
+    above_hem = clip_snapped(below_neck, below_neck.vertices[:, 1] - _hem_height(below_neck.vertices))
+    shell = clip_snapped(above_hem, _cuff_distance(form, above_hem.vertices))
     return _largest_piece(shell)
 
 
@@ -107,8 +107,8 @@ def _hanging_trunk(form: Form) -> RegularGridInterpolator:
     turns = np.linspace(-np.pi, np.pi, 361)
     heights = np.linspace(0.0, 0.9, 181)
     skin = _trunk_radius(form, turns, heights)
-    ease = np.interp(heights, [HEM, WAIST, 0.60, 0.70], [0.020, 0.016, 0.006, TIGHT])
-    clear = skin + ease
+    clearance = np.interp(heights, [HEM, WAIST, 0.60, 0.70], [0.020, 0.016, 0.006, TIGHT])
+    clear = skin + clearance
     hanging = clear.copy()
     fall = 0.16 * (heights[1] - heights[0])
     for row in range(len(heights) - 2, -1, -1):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vto_pipeline.bench.samples.garments.tailoring import sew
+from vto_pipeline.bench.samples.garments.tailoring import mesh_garment_field
 from vto_pipeline.bench.samples.garments.wearer import Wearer
 from vto_pipeline.bench.samples.solids.primitives import cone, ellipsoid, smooth_cut, smooth_union
 from vto_pipeline.model.arrays import FloatArray
@@ -15,17 +15,17 @@ _SLEEVE = 0.20  # from the shoulder joint to the cuff [m]
 _ROOM = 0.016  # of the sleeve about the arm [m]
 
 
-def make_shirt(wearer: Wearer, edge_mm: float = 12.0, *, ease: float = 0.025) -> Garment:
+def make_shirt(wearer: Wearer, edge_mm: float = 12.0, *, clearance: float = 0.025) -> Garment:
     """Return a shirt that ends at the hip; edges [mm], least gap to the trunk [m]."""
-    return _top(wearer, edge_mm, wearer.hip - 0.03, ease, flare=0.0)
+    return _top(wearer, edge_mm, wearer.hip - 0.03, clearance, flare=0.0)
 
 
-def make_dress(wearer: Wearer, edge_mm: float = 12.0, *, ease: float = 0.02, flare: float = 0.10) -> Garment:
+def make_dress(wearer: Wearer, edge_mm: float = 12.0, *, clearance: float = 0.02, flare: float = 0.10) -> Garment:
     """Return a dress that ends at the knee; edges [mm], least gap to the trunk [m], widening a metre."""
-    return _top(wearer, edge_mm, wearer.knee + 0.02, ease, flare)
+    return _top(wearer, edge_mm, wearer.knee + 0.02, clearance, flare)
 
 
-def _top(wearer: Wearer, edge_mm: float, hem: float, ease: float, flare: float) -> Garment:
+def _top(wearer: Wearer, edge_mm: float, hem: float, clearance: float, flare: float) -> Garment:
     arm = wearer.elbow - wearer.shoulder
     arm = arm / np.linalg.norm(arm)
     armpit = float(wearer.shoulder[1]) - 0.13
@@ -35,7 +35,7 @@ def _top(wearer: Wearer, edge_mm: float, hem: float, ease: float, flare: float) 
         return np.column_stack([np.abs(points[:, 0]), points[:, 1:]])
 
     def field(points: FloatArray) -> FloatArray:
-        around = wearer.tube(points, armpit, hem - 0.05, ease, flare)
+        around = wearer.tube(points, armpit, hem - 0.05, clearance, flare)
         trunk = smooth_cut(around, points[:, 1] - armpit - 0.03, 0.05)
         end = wearer.shoulder + 1.3 * _SLEEVE * arm
         sleeve = cone(left(points), wearer.shoulder, end, (0.052 + _ROOM, 0.052 + 1.5 * _ROOM))
@@ -52,5 +52,5 @@ def _top(wearer: Wearer, edge_mm: float, hem: float, ease: float, flare: float) 
 
     reach = float(wearer.shoulder[0]) + _SLEEVE
     low, high = np.array([-reach, hem, -0.35]), np.array([reach, float(wearer.neck[1]) + 0.1, 0.35])
-    mesh = sew(field, low, high, [outside_neck, before_cuff, lambda points: points[:, 1] - hem], edge_mm)
+    mesh = mesh_garment_field(field, low, high, [outside_neck, before_cuff, lambda points: points[:, 1] - hem], edge_mm)
     return Garment(mesh, RestShape(mesh.vertices))

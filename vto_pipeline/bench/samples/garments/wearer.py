@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.measuring.avatar_measurements import fit_levels
-from vto_pipeline.avatar.template.regions import legs, trunk
+from vto_pipeline.avatar.template.regions import leg_vertices, trunk_vertices
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Avatar, Measurements
@@ -58,22 +58,22 @@ class Wearer:
         self.neck_radii = 0.5 * np.ptp(base[:, [0, 2]], axis=0)
         self.axis_z = float(avatar.vertices[avatar.loops["waist"], 2].mean())
         self._surface = SurfaceDistance(avatar.mesh)
-        self._armless = avatar.vertices[trunk(avatar) | legs(avatar)]
+        self._armless = avatar.vertices[trunk_vertices(avatar) | leg_vertices(avatar)]
 
     def distance(self, points: FloatArray) -> FloatArray:
         """Return the signed distance to the whole body [m], shape (N,)."""
         return self._surface.signed(points).distance
 
-    def tube(self, points: FloatArray, top: float, low: float, ease: float, flare: float) -> FloatArray:
+    def tube(self, points: FloatArray, top: float, low: float, clearance: float, flare: float) -> FloatArray:
         """Return about how far points are outside the cloth that hangs about trunk and legs [m], shape (N,).
 
         Args:
             points: Shape (N, 3) [m].
             top, low: Heights between which it hangs [m].
-            ease: Least gap to the body [m].
+            clearance: Least gap to the body [m].
             flare: How much wider it becomes, a metre of height.
         """
-        radius = self._hanging(top, low, ease, flare)
+        radius = self._hanging(top, low, clearance, flare)
         x, z = points[:, 0], points[:, 2] - self.axis_z
         height = np.clip(points[:, 1], low, top)
         around = np.stack([np.arctan2(x, z), height], axis=1)
@@ -81,16 +81,16 @@ class Wearer:
         return out
 
     @cache  # noqa: B019  # lives as long as the bench that asks many times
-    def _hanging(self, top: float, low: float, ease: float, flare: float) -> RegularGridInterpolator:
+    def _hanging(self, top: float, low: float, clearance: float, flare: float) -> RegularGridInterpolator:
         """Return the radius over angle and height: a taut tape about each level, which narrows slowly downwards."""
         heights = np.linspace(low, top, max(2, int((top - low) / _STEP) + 1))
         step = heights[1] - heights[0]
         skin = np.stack([self._taut(height) for height in heights], axis=1)
-        hanging = skin + ease
+        hanging = skin + clearance
         for row in range(len(heights) - 2, -1, -1):
             hanging[:, row] = np.maximum(hanging[:, row], hanging[:, row + 1] - _FALL * step)
         smooth = gaussian_filter1d(hanging, _SMOOTH, axis=0, mode="wrap")
-        smooth = np.maximum(gaussian_filter1d(smooth, _SMOOTH, axis=1), skin + 0.7 * ease)
+        smooth = np.maximum(gaussian_filter1d(smooth, _SMOOTH, axis=1), skin + 0.7 * clearance)
         return RegularGridInterpolator((_TURNS, heights), smooth + flare * (top - heights))
 
     def _taut(self, height: float) -> FloatArray:

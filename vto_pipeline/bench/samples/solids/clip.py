@@ -11,7 +11,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 SNAP = 0.25  # a cut this close to a vertex, in shares of the edge, moves the vertex instead
 
 
-def clip(mesh: TriangleMesh, values: FloatArray) -> TriangleMesh:
+def clip_snapped(mesh: TriangleMesh, values: FloatArray) -> TriangleMesh:
     """Keep the part of a mesh where `values` is positive; triangles on the border are cut.
 
     Args:

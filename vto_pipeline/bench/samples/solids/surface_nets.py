@@ -31,24 +31,24 @@ def zero_surface(field: Field, low: FloatArray, high: FloatArray, cell: float, *
     Returns:
         A closed mesh (if the surface stays inside the box), vertices on the zero level to about a micrometre.
     """
-    values = _settle(_sample(field, low, high, cell))
+    values = _flip_checkerboards(_sample(field, low, high, cell))
     vertices, quads = _nets(values, low, cell)
-    vertices = project(field, vertices, cell)
+    vertices = newton_project(field, vertices, cell)
     for _ in range(relaxations):
-        vertices = project(field, _smooth(vertices, quads), cell)
-    return TriangleMesh(project(field, vertices, cell), _triangles(vertices, quads))
+        vertices = newton_project(field, _smooth(vertices, quads), cell)
+    return TriangleMesh(newton_project(field, vertices, cell), _triangles(vertices, quads))
 
 
-def gradient(field: Field, points: FloatArray, step: float = 1e-5) -> tuple[FloatArray, FloatArray]:
+def forward_gradient(field: Field, points: FloatArray, step: float = 1e-5) -> tuple[FloatArray, FloatArray]:
     """Values (N,) and their forward differences (N, 3)."""
     values = field(points)
     columns = [(field(points + step * axis) - values) / step for axis in np.eye(3)]
     return values, np.stack(columns, axis=1)
 
 
-def project(field: Field, points: FloatArray, longest: float) -> FloatArray:
+def newton_project(field: Field, points: FloatArray, longest: float) -> FloatArray:
     """One Newton step along the gradient onto the zero level, at most `longest` [m]."""
-    values, slope = gradient(field, points)
+    values, slope = forward_gradient(field, points)
     step = values[:, None] * slope / np.maximum(np.square(slope).sum(axis=1), 1e-6)[:, None]
     length = np.linalg.norm(step, axis=1, keepdims=True)
     return points - step * np.minimum(1.0, longest / np.maximum(length, 1e-12))
@@ -65,7 +65,7 @@ def _sample(field: Field, low: FloatArray, high: FloatArray, cell: float) -> Flo
     return fine
 
 
-def _settle(values: FloatArray) -> FloatArray:
+def _flip_checkerboards(values: FloatArray) -> FloatArray:
     """Flip the faintest corner of every checkerboard face, at which four triangles would share an edge.
 
     Where that goes to and fro between faces, what is outside is filled instead, which comes to an end.

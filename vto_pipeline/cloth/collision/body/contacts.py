@@ -22,7 +22,7 @@ from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.numerics.spatial import bvh
-from vto_pipeline.numerics.spatial.pseudonormals import Pseudonormals, pseudonormals, update
+from vto_pipeline.numerics.spatial.pseudonormals import Pseudonormals, pseudonormals, update_pseudonormals
 
 _SURELY = (
     0.55  # winding number above which a point is inside an open body; straight behind an open sheet it is one half
@@ -256,7 +256,7 @@ class BodyCollider:
         if not np.array_equal(before, self._fitted_to):
             faces, normals, searched = self._surface[:3]
             bvh.refit(searched.tree, before, faces)
-            update(normals, before, faces)
+            update_pseudonormals(normals, before, faces)
             self._surface = self._surface._replace(searched=searched._replace(vertices=before))
             self._fitted_to = before
         return before, self.at(span.end)

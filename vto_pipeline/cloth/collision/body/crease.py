@@ -12,7 +12,7 @@ from numba import njit
 
 from vto_pipeline.cloth.collision.body.nearest import Nearest, SurfaceTree
 from vto_pipeline.model.arrays import FloatArray, IntArray
-from vto_pipeline.numerics.distance import blend, closest_on_triangle
+from vto_pipeline.numerics.distance import barycentric_point, closest_on_triangle
 from vto_pipeline.numerics.vector import dot, load, norm, sub
 
 _ALIKE = 0.9995  # cosine of the angle between flanks (2°) under which one plane says what two would
@@ -53,7 +53,7 @@ def _shift_across(vertices, faces, points, triangles):  # type: ignore[no-untype
         t = triangles[i]
         a, b, c = load(vertices, faces[t, 0]), load(vertices, faces[t, 1]), load(vertices, faces[t, 2])
         weights, _ = closest_on_triangle(load(points, i), a, b, c)
-        on = blend(weights, a, b, c)
+        on = barycentric_point(weights, a, b, c)
         for d in range(3):
             over[i, d] = on[d] + _LEFT * (points[i, d] - on[d])
     return over
@@ -67,7 +67,7 @@ def _take_flanks(vertices, faces, points, near, asked, triangles, best, found): 
         if t < 0 or t == near.triangle[i]:
             continue
         p, n = load(points, i), near.triangle[i]
-        on = blend(
+        on = barycentric_point(
             (near.weights[i, 0], near.weights[i, 1], near.weights[i, 2]),
             load(vertices, faces[n, 0]),
             load(vertices, faces[n, 1]),
@@ -75,7 +75,7 @@ def _take_flanks(vertices, faces, points, near, asked, triangles, best, found): 
         )
         a, b, c = load(vertices, faces[t, 0]), load(vertices, faces[t, 1]), load(vertices, faces[t, 2])
         weights, feature = closest_on_triangle(p, a, b, c)
-        there = blend(weights, a, b, c)
+        there = barycentric_point(weights, a, b, c)
         away, away_there = sub(p, on), sub(p, there)
         distance, distance_there = norm(away), norm(away_there)
         if distance == 0.0 or distance_there == 0.0 or distance_there >= best[i]:

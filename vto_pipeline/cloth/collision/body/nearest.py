@@ -53,5 +53,5 @@ class SurfaceTree(NamedTuple):
     tree: bvh.Bvh
 
     def nearest(self, points: FloatArray, reach: FloatArray, guess: IntArray) -> Nearest:
-        """Return the nearest places; see `bvh.closest_points`."""
-        return Nearest(*bvh.closest_points(self.tree, self.vertices, self.faces, points, reach, guess))
+        """Return the nearest places; see `bvh.closest_triangles`."""
+        return Nearest(*bvh.closest_triangles(self.tree, self.vertices, self.faces, points, reach, guess))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from vto_pipeline.numerics.distance import blend
+from vto_pipeline.numerics.distance import barycentric_point
 from vto_pipeline.numerics.spatial.pseudonormals import feature_normal
 from vto_pipeline.numerics.vector import cross, dot, load, norm, scale, store, sub, unit
 
@@ -26,7 +26,7 @@ def sides(vertices, faces, normals, points, triangle, weights, feature):  # type
             side[i] = NOWHERE
             continue
         a, b, c = load(vertices, faces[t, 0]), load(vertices, faces[t, 1]), load(vertices, faces[t, 2])
-        away = sub(load(points, i), blend((weights[i, 0], weights[i, 1], weights[i, 2]), a, b, c))
+        away = sub(load(points, i), barycentric_point((weights[i, 0], weights[i, 1], weights[i, 2]), a, b, c))
         distance[i] = norm(away)
         out = feature_normal(normals, faces, t, feature[i])
         if out == (0.0, 0.0, 0.0):
@@ -62,7 +62,7 @@ def triangle_planes(before, after, faces, normals, positions, seen_from, side, t
             continue
         a, b, c = load(before, faces[t, 0]), load(before, faces[t, 1]), load(before, faces[t, 2])
         w = (weights[i, 0], weights[i, 1], weights[i, 2])
-        on = blend(w, a, b, c)
+        on = barycentric_point(w, a, b, c)
         away = sub(load(seen_from, i), on)
         length = norm(away)
         if length > _ROUNDING:
@@ -75,7 +75,7 @@ def triangle_planes(before, after, faces, normals, positions, seen_from, side, t
         near[i] = True
         distance[i] = dot(n, sub(load(positions, i), on))
         store(point[i], 0, on)
-        store(point[i], 1, blend(w, a1, b1, c1))
+        store(point[i], 1, barycentric_point(w, a1, b1, c1))
         store(normal[i], 0, n)
         store(normal[i], 1, _turned(n, a, b, c, a1, b1, c1))
     return distance, point, normal, near

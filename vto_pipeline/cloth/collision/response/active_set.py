@@ -34,19 +34,19 @@ class ActiveSet(NamedTuple):
         weights: Shape (K, 4): with x the point Σ w x, or the way between two points of the cloth; unused ones zero.
         normal: Unit, shape (K, 3).
         level: What normal · Σ w x must reach [m], shape (K,).
-        lift: How much farther the spring reaches, so that it pushes as it did last [m], shape (K,).
+        rest_offset: How much farther the spring reaches, so that it pushes as it did last [m], shape (K,).
         carried: How far the surface moves in the step, shape (K, 3) [m].
         friction: Coulomb coefficient, shape (K,).
         pushing: Whether it takes part in the solution, shape (K,).
-        spring: Stiffness along the normal [N/m], shape (K,).
-        cling: Stiffness along the surface, of what holds [N/m], shape (K,).
-        grip: Friction at the start of the step [N], shape (K, 3).
+        normal_stiffness: Stiffness along the normal [N/m], shape (K,).
+        tangential_stiffness: Stiffness along the surface, of what holds [N/m], shape (K,).
+        initial_friction: Friction at the start of the step [N], shape (K, 3).
         sliding: Whether the slider gives way, shape (K,).
         trial: What friction would have been when last seen, had the slider held [N], shape (K, 3).
-        across: Stiffness of what slides, across the trial's direction [N/m], shape (K,).
-        hold: Friction at most [N], shape (K,).
+        sliding_stiffness: Stiffness of what slides, across the trial's direction [N/m], shape (K,).
+        friction_limit: Friction at most [N], shape (K,).
         force: With which each pushed when last seen [N], shape (K,).
-        rub: Friction when last seen [N], shape (K, 3).
+        friction_force: Friction when last seen [N], shape (K, 3).
     """
 
     key: NDArray[np.int64]

@@ -20,7 +20,7 @@ from vto_pipeline.cloth.collision.self_collision.surface_features import Feature
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.numerics.distance import closest_on_segments, closest_on_triangle
 from vto_pipeline.numerics.spatial import bvh
-from vto_pipeline.numerics.spatial.pseudonormals import pseudonormals, update
+from vto_pipeline.numerics.spatial.pseudonormals import pseudonormals, update_pseudonormals
 from vto_pipeline.numerics.vector import axpy, dot, load, store, sub
 
 _ROUNDING = 1e-9  # share of a distance, far above what rounding can do
@@ -92,7 +92,7 @@ class BodyFeatures:
         self.moves = (self.begin != self.end).any(axis=1)
         now = (self.begin, self.end)
         if not all(map(np.array_equal, now, self._fitted_to)):
-            update(self._normals, self.begin, self._own.faces)
+            update_pseudonormals(self._normals, self.begin, self._own.faces)
             bvh.refit_swept(self._tree, *now, self._own.faces, np.zeros(len(self.begin)))
             self._fitted_to = now
         shown = np.concatenate([body.touchable_faces for body in self._bodies])

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vto_pipeline.cloth.collision.self_collision.surface_features import Features
 from vto_pipeline.model.arrays import FloatArray, IntArray
-from vto_pipeline.numerics.spatial.boxes import EMPTY, load_box, overlap, simplex_boxes, swept_boxes
+from vto_pipeline.numerics.spatial.boxes import EMPTY, boxes_overlap, load_box, simplex_boxes, swept_boxes
 from vto_pipeline.numerics.spatial.bvh import Bvh
 from vto_pipeline.numerics.spatial.bvh_pairs import cross_pairs, self_pairs
 from vto_pipeline.numerics.spatial.pair_lists import collect
@@ -90,9 +90,9 @@ def still_overlap(features, to_face, to_edge, start, end, radius):
     faces, edges = simplex_boxes(boxes, features.faces), simplex_boxes(boxes, features.edges)
     kept = np.empty(len(to_face) + len(to_edge), np.bool_)
     for p in range(len(to_face)):
-        kept[p] = overlap(load_box(boxes, to_face[p, 0]), faces, to_face[p, 1])
+        kept[p] = boxes_overlap(load_box(boxes, to_face[p, 0]), faces, to_face[p, 1])
     for p in range(len(to_edge)):
-        kept[len(to_face) + p] = overlap(load_box(edges, to_edge[p, 0]), edges, to_edge[p, 1])
+        kept[len(to_face) + p] = boxes_overlap(load_box(edges, to_edge[p, 0]), edges, to_edge[p, 1])
     return kept
 
 
@@ -181,7 +181,7 @@ def _vertices(pairs, side, own, vertices, faces, triangles, same, found):
             shared = (v == a) | (v == b) | (v == c)
             if count < len(found):
                 found[count, 0], found[count, 1] = v, face  # kept or overwritten: a branch would be a coin toss
-            count += overlap(box, vertices, v) & ~(same & shared)
+            count += boxes_overlap(box, vertices, v) & ~(same & shared)
     return count
 
 
@@ -218,5 +218,5 @@ def _edges(pairs, own, ends, boxes, other_own, other_ends, other_boxes, same, fo
                 shared = (a == c) | (a == d) | (b == c) | (b == d)
                 if count < len(found):
                     found[count, 0], found[count, 1] = (f, e) if same and f < e else (e, f)
-                count += overlap(box, other_boxes, f) & ~(same & shared)
+                count += boxes_overlap(box, other_boxes, f) & ~(same & shared)
     return count

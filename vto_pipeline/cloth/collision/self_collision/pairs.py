@@ -17,7 +17,14 @@ from numba import njit
 from numpy.typing import NDArray
 
 from vto_pipeline.cloth.collision.self_collision.surface_features import Features
-from vto_pipeline.numerics.distance import EDGE, FACE, VERTEX, blend, closest_on_segments, closest_on_triangle
+from vto_pipeline.numerics.distance import (
+    EDGE,
+    FACE,
+    VERTEX,
+    barycentric_point,
+    closest_on_segments,
+    closest_on_triangle,
+)
 from vto_pipeline.numerics.vector import axpy, cross, dot, load, norm, store, sub, unit
 
 _NEARER = 0.99  # of a distance: a face that near has what the vertex comes to first
@@ -216,7 +223,7 @@ def _places(x, faces, to_face):
         a, b, c = load(x, faces[f, 0]), load(x, faces[f, 1]), load(x, faces[f, 2])
         weights, feature[p] = closest_on_triangle(load(x, v), a, b, c)
         store(on, p, weights)
-        distance[p] = norm(sub(load(x, v), blend(weights, a, b, c)))
+        distance[p] = norm(sub(load(x, v), barycentric_point(weights, a, b, c)))
     return on, feature, distance
 
 

@@ -25,8 +25,8 @@ from numba import njit
 
 from vto_pipeline.cloth.collision.self_collision.pieces import SurfaceComponents
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.numerics.planar import gap_sq, least_turn, longest_sq, segment_distance, way_to
-from vto_pipeline.numerics.spatial.boxes import EMPTY, join, load_box, overlap, store_box, swept_boxes
+from vto_pipeline.numerics.planar import difference, gap_sq, least_turn, longest_sq, segment_distance
+from vto_pipeline.numerics.spatial.boxes import EMPTY, box_union, boxes_overlap, load_box, store_box, swept_boxes
 from vto_pipeline.numerics.vector import add, cross, dot, load, scale, store, sub, unit
 
 _ROUNDING = 1e-9  # share of a length or an area, far above what rounding can do
@@ -145,8 +145,8 @@ def _shows_one_side(faces, flat, way, altitude):
     """Return whether all altitudes of all projected triangles stay positive and above this one [m]."""
     for t in range(len(faces)):
         i, j, k = faces[t, 0], faces[t, 1], faces[t, 2]
-        b, c = way_to(flat, i, j), way_to(flat, i, k)
-        db, dc = way_to(way, i, j), way_to(way, i, k)
+        b, c = difference(flat, i, j), difference(flat, i, k)
+        db, dc = difference(way, i, j), difference(way, i, k)
         a, da = (c[0] - b[0], c[1] - b[1]), (dc[0] - db[0], dc[1] - db[1])
         most_sq = max(longest_sq(a, da), longest_sq(b, db), longest_sq(c, dc))
         if not least_turn(b, db, c, dc) > altitude * sqrt(most_sq) + _ROUNDING * most_sq:
@@ -159,7 +159,7 @@ def _corners_are_open(rim, after, flat, way):
     """Return whether each corner of the rim is convex, or open to 60° or more outside, all the time."""
     for r in range(len(rim)):
         i, j, k = rim[r, 0], rim[r, 1], rim[after[r], 1]
-        a, da, b, db = way_to(flat, i, j), way_to(way, i, j), way_to(flat, j, k), way_to(way, j, k)
+        a, da, b, db = difference(flat, i, j), difference(way, i, j), difference(flat, j, k), difference(way, j, k)
         rounding = _ROUNDING * (longest_sq(a, da) + longest_sq(b, db))
         convex = least_turn(a, da, b, db) > rounding
         if not (convex or least_turn(a, da, _turned(b), _turned(db)) > rounding):  # turns by -120° to 60°
@@ -203,9 +203,9 @@ def _pieces_keep_apart(faces, of_vertex, boxes):
     for t in range(len(faces)):
         piece = of_vertex[faces[t, 0]]
         for k in range(3):
-            store_box(around, piece, join(load_box(around, piece), load_box(boxes, faces[t, k])))
+            store_box(around, piece, box_union(load_box(around, piece), load_box(boxes, faces[t, k])))
     for piece in range(count):
         for other in range(piece + 1, count):
-            if overlap(load_box(around, piece), around, other):
+            if boxes_overlap(load_box(around, piece), around, other):
                 return False
     return True

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit, prange
 
 from vto_pipeline.numerics.ccd import edge_edge_time, vertex_face_time
-from vto_pipeline.numerics.distance import blend, closest_on_segments, closest_on_triangle
+from vto_pipeline.numerics.distance import barycentric_point, closest_on_segments, closest_on_triangle
 from vto_pipeline.numerics.vector import axpy, dot, load, norm, store, sub
 
 _KEEP = 0.1  # share of the distance to be kept, or of that at the begin if it is less, that is left at least
@@ -139,7 +139,7 @@ def _distance(is_face, a, b, c, d):
     """Return the distance of vertex a from face bcd, or of edge ab from cd."""
     if is_face:
         on, _ = closest_on_triangle(a, b, c, d)
-        return norm(sub(a, blend(on, b, c, d)))
+        return norm(sub(a, barycentric_point(on, b, c, d)))
     s, t = closest_on_segments(a, b, c, d)
     return norm(sub(axpy(s, sub(b, a), a), axpy(t, sub(d, c), c)))
 

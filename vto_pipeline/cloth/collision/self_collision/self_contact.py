@@ -96,7 +96,7 @@ class SelfContact:
             self._all_reach = np.concatenate([reach, np.zeros(len(self._bodies.friction))])
             self._friction = np.concatenate([self._friction, self._bodies.friction])
         self._owners = owners(self._features, len(self._all_reach))
-        self._pieces = surface_components(faces, len(reach))
+        self._components = surface_components(faces, len(reach))
         self._crossed = np.zeros(len(reach), np.bool_) if crossed is None else crossed.copy()
         self._force_all = force_all
         self._recovery, self._regained = (np.inf, 1.0) if at_once else (_RECOVERY, _REGAINED)
@@ -289,7 +289,7 @@ class SelfContact:
             self._wait -= 1
             return False
         began = time.perf_counter()
-        proof = prove_separation(self._pieces, x, end, radius)
+        proof = prove_separation(self._components, x, end, radius)
         self.counters.proof_s += time.perf_counter() - began
         self._failed = 0 if proof.out else min(self._failed + 1, _LOOK)
         self._wait = max(self._failed - 1, 0)

@@ -25,7 +25,7 @@ from vto_pipeline.cloth.constraints.bending.hinge import (
 )
 from vto_pipeline.cloth.constraints.kind import Kind
 from vto_pipeline.numerics.linear.coloured_blocks import blocks
-from vto_pipeline.numerics.mechanics.slider import huber, secant, slipped, wrapped
+from vto_pipeline.numerics.mechanics.slider import huber, secant_compliance, slider_slip, wrap_angle
 from vto_pipeline.numerics.mechanics.xpbd_row import bounded_step
 from vto_pipeline.numerics.vector import dot, store_at
 
@@ -86,7 +86,7 @@ def bend_friction(
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _extension(i, angle, data):
     """Return by how much the spring is turned: the angle less rest angle and slider, the short way round."""
-    return wrapped(angle - data.rest[i] - data.slider[i, 0])
+    return wrap_angle(angle - data.rest[i] - data.slider[i, 0])
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -116,14 +116,14 @@ def _linearise(i, x, data, values, gradients, compliance):
     values[0] = _extension(i, angle, data)
     for s in range(4):
         store_at(gradients, 0, s, slopes[s])
-    compliance[0, 0] = secant(values[0], data.compliance[i], data.limit[i])
+    compliance[0, 0] = secant_compliance(values[0], data.compliance[i], data.limit[i])
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _slip(i, x, data):
     angle, slopes = hinge_angle_gradients(i, x, data)
     if dot(slopes[2], slopes[2]) > 0.0:  # a hinge without area has no angle
-        data.slider[i, 0] += slipped(_extension(i, angle, data), data.compliance[i], data.limit[i])
+        data.slider[i, 0] += slider_slip(_extension(i, angle, data), data.compliance[i], data.limit[i])
 
 
 KIND = Kind(BendFriction, 1, _project, _force, _linearise, None, slip=_slip)

@@ -2,7 +2,7 @@
 
 Volino, Magnenat-Thalmann & Faure 2009, "A simple approach to nonlinear tensile stiffness for accurate cloth
 simulation", with monotone curves in place of polynomials. Energy A (W_warp(ε_u) + W_weft(ε_v) + ½ G γ²) with the
-strains of `numerics.membrane.thread_strains`; warp and weft do not know each other.
+strains of `mechanics.membrane.thread_strains`; warp and weft do not know each other.
 
 In XPBD one Newton step on the force: from λ + λ' = -h² A σ(ε + ∇ε W ∇εᵀ λ') follows the linear step with the tangent's
 compliance α = 1 / (A σ') and C = σ / σ'. So the fixed point is that of implicit Euler, whatever the curve.

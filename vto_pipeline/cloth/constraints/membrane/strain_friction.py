@@ -2,7 +2,7 @@
 
 As `constraints.bend_friction` for hinges: the loop in shear that KES measures is 2HG wide; in stretch what it calls
 resilience is what is left of the work. With a high limit and part of the stiffness it is plastic strain with linear
-hardening. Strains are those of `numerics.membrane.thread_strains`, each with a slider of its own.
+hardening. Strains are those of `mechanics.membrane.thread_strains`, each with a slider of its own.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from vto_pipeline.cloth.constraints.membrane.triangle import (
 )
 from vto_pipeline.numerics.mechanics.membrane import pulls, thread_strains
 from vto_pipeline.numerics.mechanics.plane_stress import scaled
-from vto_pipeline.numerics.mechanics.slider import huber, secant, slipped
+from vto_pipeline.numerics.mechanics.slider import huber, secant_compliance, slider_slip
 from vto_pipeline.numerics.mechanics.tension import thread_tension
 from vto_pipeline.numerics.vector import load, scale, sub
 
@@ -109,9 +109,9 @@ def _force(t, x, data, forces):
 def _secants(extension, data):
     """Return the compliance [m/N] of the springs as they are; 1 for those without friction, which have no force."""
     return (
-        secant(extension[0], data.compliance[0], data.limit[0]) if data.limit[0] > 0.0 else 1.0,
-        secant(extension[1], data.compliance[1], data.limit[1]) if data.limit[1] > 0.0 else 1.0,
-        secant(extension[2], data.compliance[2], data.limit[2]) if data.limit[2] > 0.0 else 1.0,
+        secant_compliance(extension[0], data.compliance[0], data.limit[0]) if data.limit[0] > 0.0 else 1.0,
+        secant_compliance(extension[1], data.compliance[1], data.limit[1]) if data.limit[1] > 0.0 else 1.0,
+        secant_compliance(extension[2], data.compliance[2], data.limit[2]) if data.limit[2] > 0.0 else 1.0,
         0.0,
     )
 
@@ -147,7 +147,7 @@ def _stiffness(t, x, data, material, stress, blocks):
 def _slip(t, x, data):
     extension, _, _ = _extended(t, x, data)
     for row in range(3):
-        data.slider[t, row] += slipped(extension[row], data.compliance[row], data.limit[row])
+        data.slider[t, row] += slider_slip(extension[row], data.compliance[row], data.limit[row])
 
 
 KIND = Kind(StrainFriction, 3, _project, _force, _linearise, None, _stiffness, _slip)

@@ -1,7 +1,7 @@
 """Strain limiting: nothing inside the limits, a stiff or rigid stop beyond; Provot 1995, as an inequality constraint.
 
 Warp and weft stop at a tensile strain, shear at an angle to either side, where the threads of a weave lock. The strains
-are those of `numerics.membrane.thread_strains`. With a compliance, energy ½ (excess)² / α; with none, rigid.
+are those of `mechanics.membrane.thread_strains`. With a compliance, energy ½ (excess)² / α; with none, rigid.
 In XPBD λ must pull back: the three rows are solved one after the other with λ clamped (projected Gauss-Seidel), whose
 fixed point is that of the complementarity problem.
 """

@@ -1,6 +1,6 @@
 """Membrane: an orthotropic sheet that resists warp, weft and shear strain of its threads.
 
-Energy ½ A εᵀ K ε with the strains of `numerics.membrane.thread_strains` and the plane-stress stiffness K of the fabric
+Energy ½ A εᵀ K ε with the strains of `mechanics.membrane.thread_strains` and the plane-stress stiffness K of the fabric
 [N/m]; its compliance in XPBD is K⁻¹ / A (Macklin 2016, eq. 2). The three are solved together (a 3 x 3 system), so that
 warp, weft and Poisson's coupling act at once.
 """

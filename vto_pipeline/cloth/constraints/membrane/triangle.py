@@ -14,7 +14,14 @@ from numpy.typing import NDArray
 from vto_pipeline.cloth.constraints.membrane.slivers import SLIVER, slenderness
 from vto_pipeline.cloth.constraints.membrane.yarns import thread_axes
 from vto_pipeline.numerics.linear.coloured_blocks import blocks
-from vto_pipeline.numerics.mechanics.membrane import changes, deformation, mobility, on_corner, pulls, solve_symmetric
+from vto_pipeline.numerics.mechanics.membrane import (
+    corner_force,
+    deformation,
+    mobility,
+    pulls,
+    solve_symmetric,
+    strain_changes,
+)
 from vto_pipeline.numerics.mechanics.tension import tension_pulls
 from vto_pipeline.numerics.mechanics.xpbd_row import bounded_step
 from vto_pipeline.numerics.vector import add, axpy, load, scale, store, store_at, sub
@@ -76,9 +83,9 @@ def add_pulls(t, x, data, pull_u, pull_v):
     """Add to row i of x, shape (V, 3), what pulls on F_u and F_v do to corner i of triangle t."""
     i, j, k = data.vertices[t, 0], data.vertices[t, 1], data.vertices[t, 2]
     g = shape_gradients(t, data)
-    store(x, i, add(on_corner(g[0], g[1], pull_u, pull_v), load(x, i)))
-    store(x, j, add(on_corner(g[2], g[3], pull_u, pull_v), load(x, j)))
-    store(x, k, add(on_corner(g[4], g[5], pull_u, pull_v), load(x, k)))
+    store(x, i, add(corner_force(g[0], g[1], pull_u, pull_v), load(x, i)))
+    store(x, j, add(corner_force(g[2], g[3], pull_u, pull_v), load(x, j)))
+    store(x, k, add(corner_force(g[4], g[5], pull_u, pull_v), load(x, k)))
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -107,7 +114,7 @@ def xpbd_strain_system(t, x, start, inverse_mass, data, soft, lambdas, values, s
         damped += viscous
         moved_i, moved_j = sub(load(x, i), load(start, i)), sub(load(x, j), load(start, j))
         du, dv = deformation(moved_i, moved_j, sub(load(x, k), load(start, k)), g)
-        change = changes(slopes, du, dv)
+        change = strain_changes(slopes, du, dv)
         ru, rv, rs = ru - viscous * change[0], rv - viscous * change[1], rs - viscous * change[2]
     matrix = (
         damped * uu + s_uu,
@@ -126,9 +133,9 @@ def apply_strain_multipliers(t, x, inverse_mass, data, slopes, shift):
     i, j, k = data.vertices[t, 0], data.vertices[t, 1], data.vertices[t, 2]
     g = shape_gradients(t, data)
     pull_u, pull_v = pulls(shift, slopes)
-    store(x, i, axpy(inverse_mass[i], on_corner(g[0], g[1], pull_u, pull_v), load(x, i)))
-    store(x, j, axpy(inverse_mass[j], on_corner(g[2], g[3], pull_u, pull_v), load(x, j)))
-    store(x, k, axpy(inverse_mass[k], on_corner(g[4], g[5], pull_u, pull_v), load(x, k)))
+    store(x, i, axpy(inverse_mass[i], corner_force(g[0], g[1], pull_u, pull_v), load(x, i)))
+    store(x, j, axpy(inverse_mass[j], corner_force(g[2], g[3], pull_u, pull_v), load(x, j)))
+    store(x, k, axpy(inverse_mass[k], corner_force(g[4], g[5], pull_u, pull_v), load(x, k)))
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -163,7 +170,7 @@ def fill_rows(t, data, slopes, soft, gradients, compliance):
         du, dv = data.gradients[t, 2 * corner], data.gradients[t, 2 * corner + 1]
         store_at(gradients, 0, corner, scale(du, slopes[0]))
         store_at(gradients, 1, corner, scale(dv, slopes[1]))
-        store_at(gradients, 2, corner, on_corner(du, dv, slopes[2], slopes[3]))
+        store_at(gradients, 2, corner, corner_force(du, dv, slopes[2], slopes[3]))
     compliance[0, 0], compliance[1, 1], compliance[2, 2] = soft[0], soft[1], soft[2]
     compliance[0, 1] = compliance[1, 0] = soft[3]
     compliance[0, 2] = compliance[2, 0] = compliance[1, 2] = compliance[2, 1] = 0.0
@@ -190,5 +197,5 @@ def write_stiffness(t, data, stiff, slopes, tension, blocks):
             turned_u, turned_v = tension_pulls(tension, du, dv, m)
             pull_u, pull_v = add(strained_u, turned_u), add(strained_v, turned_v)
             for i in range(3):
-                pull = on_corner(g[t, 2 * i], g[t, 2 * i + 1], pull_u, pull_v)
+                pull = corner_force(g[t, 2 * i], g[t, 2 * i + 1], pull_u, pull_v)
                 blocks[j, i, m, 0], blocks[j, i, m, 1], blocks[j, i, m, 2] = pull

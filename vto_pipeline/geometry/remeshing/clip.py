@@ -14,7 +14,7 @@ SNAP = 0.15
 """A line that crosses an edge nearer than this share of its length to one end goes through that end."""
 
 
-def keep_positive(mesh: TriangleMesh, values: FloatArray) -> TriangleMesh:
+def clip_to_positive(mesh: TriangleMesh, values: FloatArray) -> TriangleMesh:
     """Return the part of the surface where a value, linear on faces, is positive.
 
     Args:
