@@ -13,6 +13,8 @@ from scan_scene import distances
 from vto_pipeline.errors import ScanError
 from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
+from vto_pipeline.scan.photos import scale as scale_module
+from vto_pipeline.scan.photos.board import board_corners
 from vto_pipeline.scan.photos.mapping import _copy
 from vto_pipeline.scan.photos.scale import ScaleConfig, apply_board
 from vto_pipeline.scan.photos.sfm import SfmConfig, estimate_cameras
@@ -91,6 +93,20 @@ def test_wrong_board_warns_and_leaves_the_scale_alone(sparse, shot):
     cameras, _ = apply_board(replace(shot[0], board=wrong), *sparse[:2], ScaleConfig(), job)
     assert not cameras.metric
     assert "board.yaml" in job.warnings[0]
+
+
+def test_corners_on_one_line_fix_no_floor(sparse, shot, true_cameras, monkeypatch):
+    """The board could be turned about that line. The corners are projected here, so that they are exact."""
+    row = board_corners(shot[0].board)[:8]
+    seen = []
+    for pose in shot[1]:
+        local = (row - pose[:3, 3]) @ pose[:3, :3]
+        seen.append((np.arange(8, dtype=np.int32), 528 * local[:, :2] / local[:, 2:] + [239.5, 179.5]))
+    monkeypatch.setattr(scale_module, "detect_board", lambda *args: seen)
+    job = Job()
+    cameras, _ = apply_board(shot[0], true_cameras, sparse[1], ScaleConfig(), job)
+    assert cameras is true_cameras
+    assert "one line" in job.warnings[0]
 
 
 def grey_photos(folder, count, values):

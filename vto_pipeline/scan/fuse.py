@@ -19,6 +19,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
 from vto_pipeline.scan.canonical import canonical_mesh, drop_small_pieces, drop_vertices
 from vto_pipeline.scan.depth.depth_mask import clean_depth
+from vto_pipeline.scan.library_message import library_message
 from vto_pipeline.scan.photos.consistency import views_on_surface
 
 GREY = 200
@@ -127,7 +128,10 @@ def _fuse(maps: DepthMaps, color_of: Callable[[int], ByteArray], config: FuseCon
     far = sum(int((depth > _farthest(c, voxel)).sum()) for depth, c in zip(maps.depth, maps.intrinsics, strict=True))
     if far:
         job.note(f"left out {far} readings so far away that their pixels are larger than {_PIXEL_VOXELS:.0f} voxels")
-    mesh = _level_set(maps, color_of, voxel, blocks, config, job)
+    try:
+        mesh = _level_set(maps, color_of, voxel, blocks, config, job)
+    except RuntimeError as error:
+        raise ScanError(f"the depth maps could not be fused: {library_message(error)}") from error
     views = views_on_surface(mesh.vertices, maps, config.support_voxels * voxel)
     mesh = drop_small_pieces(drop_vertices(mesh, views < config.min_views), config.min_piece, job)
     job.measure(voxel_mm=round(1000 * voxel, 3), points=len(mesh.vertices), triangles=len(mesh.faces))
@@ -187,19 +191,23 @@ def _level_set(
 
     core: Any = o3d.core
     reach, grid = config.truncation_voxels, _grid(voxel, blocks)
+    fused = 0
     for index, camera in enumerate(maps.intrinsics):
         view = _posed(grid, maps, index, voxel, reach)
         if view is None:
             job.note(f"{maps.names[index]}: {np.count_nonzero(maps.depth[index])} readings are too few to fuse")
         else:
+            fused += 1
             seen, depth, matrix, inverse, limit = view
             size = (camera.width, camera.height)
             picture = cv2.resize(color_of(index), size, interpolation=cv2.INTER_AREA).astype(np.float32) / 255
             color = o3d.t.geometry.Image(core.Tensor(picture))
             grid.integrate(seen, depth, color, matrix, inverse, DEPTH_SCALE, limit, reach)
         job.progress(0.8 * (index + 1) / len(maps.names), f"fusing view {index + 1} of {len(maps.names)}")
-    surface = grid.extract_triangle_mesh(config.min_views - 0.5)  # Open3D keeps what weighs more, and a view weighs 1
-    if "indices" not in surface.triangle or len(surface.triangle.indices) == 0:
+    surface = None
+    if fused >= config.min_views:
+        surface = grid.extract_triangle_mesh(config.min_views - 0.5)  # Open3D keeps what weighs more; a view weighs 1
+    if surface is None or "indices" not in surface.triangle or len(surface.triangle.indices) == 0:
         hint = "are the poses right? lower min_views, or take more overlapping views"
         raise ScanError(f"no surface was seen by {config.min_views} of {len(maps.names)} views", hint=hint)
     colors = np.clip(np.round(255 * surface.vertex.colors.numpy()), 0, 255).astype(np.uint8)

@@ -8,6 +8,8 @@ from vto_pipeline.errors import InputError
 from vto_pipeline.io.captures.images import read_image
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.frames import CharucoBoard, PhotoSet
+from vto_pipeline.model.job import Job
+from vto_pipeline.scan.library_message import library_message
 
 
 def board_corners(board: CharucoBoard) -> FloatArray:
@@ -24,8 +26,13 @@ def board_corners(board: CharucoBoard) -> FloatArray:
     return corners
 
 
-def detect_board(photos: PhotoSet, names: tuple[str, ...]) -> list[tuple[IntArray, FloatArray]]:
+def detect_board(photos: PhotoSet, names: tuple[str, ...], job: Job) -> list[tuple[IntArray, FloatArray]]:
     """Detect the board's corners in the named photos.
+
+    Args:
+        photos: The photos and the board.
+        names: Of the photos to look at.
+        job: Notified of photos that the detector failed on.
 
     Returns:
         Per photo: corner ids (K,), and pixels (K, 2), of which there may be none.
@@ -45,7 +52,12 @@ def detect_board(photos: PhotoSet, names: tuple[str, ...]) -> list[tuple[IntArra
     paths = {path.name: path for path in photos.paths}
     found = []
     for name in names:
-        pixels, ids, _, _ = detector.detectBoard(cv2.cvtColor(read_image(paths[name]), cv2.COLOR_RGB2GRAY))
+        try:
+            pixels, ids, _, _ = detector.detectBoard(cv2.cvtColor(read_image(paths[name]), cv2.COLOR_RGB2GRAY))
+        except cv2.error as error:
+            job.note(f"no board in {name}: {library_message(error)}")
+            found.append((np.empty(0, np.int32), np.empty((0, 2))))
+            continue
         none = ids is None or pixels is None
         identity = np.empty(0, np.int32) if none else np.asarray(ids, np.int32).ravel()
         found.append((identity, np.empty((0, 2)) if none else np.asarray(pixels, float).reshape(-1, 2)))

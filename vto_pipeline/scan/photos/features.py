@@ -8,10 +8,12 @@ from pathlib import Path
 
 from pydantic import Field
 
+from vto_pipeline.errors import ScanError
 from vto_pipeline.io.captures.images import read_image_size
 from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.settings import Config
+from vto_pipeline.scan.library_message import COLMAP_ERRORS, library_message
 
 GUESSED_FOCAL = 1.2
 """COLMAP's guess where EXIF says nothing, in longer sides of the picture."""
@@ -45,26 +47,37 @@ def detect(photos: PhotoSet, database: Path, contrast: float, config: FeatureCon
 
     Returns:
         Features per photo.
+
+    Raises:
+        ScanError: COLMAP cannot read the photos.
     """
     import pycolmap
 
     folder = photos.paths[0].parent
+    names = [path.name for path in photos.paths]
     pycolmap.Database.open(str(database)).close()
-    for (width, height, known), names in _groups(photos).items():
+    for (width, height, known), group in _groups(photos).items():
         reader = pycolmap.ImageReaderOptions(camera_model="SIMPLE_RADIAL")
         if known is not None:
             reader.camera_params = f"{known.fx},{known.cx + 0.5},{known.cy + 0.5},{known.k1}"
         else:
             reader.camera_params = f"{GUESSED_FOCAL * max(width, height)},{width / 2},{height / 2},0"
-        pycolmap.import_images(database, folder, pycolmap.CameraMode.SINGLE, names, reader)
+        try:
+            pycolmap.import_images(database, folder, pycolmap.CameraMode.SINGLE, group, reader)
+        except COLMAP_ERRORS as error:
+            problem = f"COLMAP cannot take {', '.join(group)}: {library_message(error)}"
+            raise ScanError(problem, where=str(folder), hint="save them again as plain JPEG or PNG") from error
     options = pycolmap.FeatureExtractionOptions(max_image_size=config.max_side_px, use_gpu=False)
     options.sift.max_num_features = config.max_features
     options.sift.peak_threshold = contrast
-    names = [path.name for path in photos.paths]
-    pycolmap.extract_features(database, folder, names, extraction_options=options, device=pycolmap.Device.cpu)
+    try:
+        pycolmap.extract_features(database, folder, names, extraction_options=options, device=pycolmap.Device.cpu)
+    except COLMAP_ERRORS as error:
+        problem = f"no features could be extracted from {len(names)} photos: {library_message(error)}"
+        raise ScanError(problem, where=str(folder)) from error
     with pycolmap.Database.open(str(database)) as opened:
         counts = {image.name: opened.num_keypoints_for_image(image.image_id) for image in opened.read_all_images()}
-    return [counts[name] for name in names]
+    return [counts.get(name, 0) for name in names]
 
 
 def match(photos: PhotoSet, database: Path, config: FeatureConfig, seed: int) -> int:
@@ -78,6 +91,9 @@ def match(photos: PhotoSet, database: Path, config: FeatureConfig, seed: int) ->
 
     Returns:
         Number of matched pairs.
+
+    Raises:
+        ScanError: COLMAP cannot match them.
     """
     import pycolmap
 
@@ -85,13 +101,17 @@ def match(photos: PhotoSet, database: Path, config: FeatureConfig, seed: int) ->
     pairs.write_text("".join(f"{a} {b}\n" for a, b in _pairs([path.name for path in photos.paths], config)))
     verification = pycolmap.TwoViewGeometryOptions()
     verification.ransac.random_seed = seed
-    pycolmap.match_image_pairs(
-        database,
-        pycolmap.FeatureMatchingOptions(use_gpu=False),
-        pycolmap.ImportedPairingOptions(match_list_path=pairs),
-        verification,
-        device=pycolmap.Device.cpu,
-    )
+    try:
+        pycolmap.match_image_pairs(
+            database,
+            pycolmap.FeatureMatchingOptions(use_gpu=False),
+            pycolmap.ImportedPairingOptions(match_list_path=pairs),
+            verification,
+            device=pycolmap.Device.cpu,
+        )
+    except COLMAP_ERRORS as error:
+        problem = f"the features of {len(photos.paths)} photos could not be matched: {library_message(error)}"
+        raise ScanError(problem, where=str(photos.paths[0].parent)) from error
     with pycolmap.Database.open(str(database)) as opened:
         _, inliers = opened.read_two_view_geometry_num_inliers()
         return sum(count > 0 for count in inliers)

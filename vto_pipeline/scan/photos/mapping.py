@@ -7,11 +7,14 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+from vto_pipeline.model.job import Job
+from vto_pipeline.scan.library_message import COLMAP_ERRORS, library_message
+
 MIN_PHOTOS = 3
 """Smaller models are chance."""
 
 
-def map_photos(database: Path, folder: Path, count: int, seed: int) -> Any | None:
+def map_photos(database: Path, folder: Path, count: int, job: Job) -> Any | None:
     """Reconstruct with the global mapper; if it leaves photos out, try the incremental one and keep the better model.
 
     Pan et al. 2024 (GLOMAP); Schönberger and Frahm 2016 (COLMAP). Solved by one thread: with more, the sums of the
@@ -21,14 +24,18 @@ def map_photos(database: Path, folder: Path, count: int, seed: int) -> Any | Non
         database: Features and verified matches.
         folder: Of the photos, for the points' colours.
         count: Number of photos.
-        seed: For the mappers.
+        job: Seeds the mappers; notified when one of them fails.
 
     Returns:
         The pycolmap Reconstruction with the most photos, the least error among equals; None when there is none.
     """
-    models = _global(_copy(database, "global"), folder, seed)
-    if max((model.num_reg_images() for model in models), default=0) < count:
-        models += _incremental(_copy(database, "incremental"), folder, seed)
+    models: list[Any] = []
+    for name, mapper in (("global", _global), ("incremental", _incremental)):
+        if max((model.num_reg_images() for model in models), default=0) < count:
+            try:
+                models += mapper(_copy(database, name), folder, job.seed)
+            except COLMAP_ERRORS as error:
+                job.note(f"the {name} mapper failed: {library_message(error)}")
     return max(models, key=_merit, default=None)
 
 

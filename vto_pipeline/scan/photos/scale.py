@@ -49,7 +49,7 @@ def apply_board(
         job.warn("no board.yaml with the photos: the scan has no scale; lengths are arbitrary")
         return cameras, cloud
     job.progress(0.0, "looking for the board")
-    found = detect_board(photos, cameras.names)
+    found = detect_board(photos, cameras.names, job)
     world = board_corners(photos.board)
     ids, observed = triangulate_points(found, cameras, config.max_error_px)
     if len(ids) < config.min_corners:
@@ -67,6 +67,9 @@ def apply_board(
     error_px = np.linalg.norm(fit.fun.reshape(-1, 2), axis=1)
     good = error_px < config.max_error_px
     jacobian = fit.jac.reshape(-1, 2, 7)[good].reshape(-1, 7)
+    if not _determined(jacobian):
+        job.warn(f"{len(ids)} board corners do not fix the floor: do they lie on one line? The scan has no scale.")
+        return cameras, cloud
     variance = (error_px[good] ** 2).sum() / max(2 * good.sum() - 7, 1)
     scale_error = float(np.sqrt(variance * np.linalg.inv(jacobian.T @ jacobian)[0, 0]))
     residual = scale * observed @ board_from_scan[:3, :3].T + board_from_scan[:3, 3] - world[ids]
@@ -122,6 +125,14 @@ def _refine(pixels: _Pixels, scale: float, transform: FloatArray, softness: floa
     turn = Rotation.from_matrix(transform[:3, :3]).as_rotvec()
     start = np.concatenate([[np.log(scale)], turn, transform[:3, 3]])
     return least_squares(pixels.residual, start, loss="soft_l1", f_scale=softness / 4, x_scale="jac")
+
+
+def _determined(jacobian: FloatArray) -> bool:
+    """Whether a Jacobian (N, 7) fixes every parameter, whatever their units; one of finite differences has 8 digits."""
+    if len(jacobian) < 7:
+        return False
+    length = np.linalg.norm(jacobian, axis=0)
+    return bool(length.min() > 0 and np.linalg.svd(jacobian / length, compute_uv=False)[-1] > 1e-5)
 
 
 def _robust_similarity(source: FloatArray, target: FloatArray) -> tuple[float, FloatArray]:

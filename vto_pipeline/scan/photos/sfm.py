@@ -65,7 +65,7 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
         job.progress(0.3, f"matching {len(photos.paths)} photos")
         pairs = match(photos, database, config.features, job.seed)
         job.progress(0.7, f"placing cameras, {pairs} matched pairs")
-        model = map_photos(database, photos.paths[0].parent, len(photos.paths), job.seed)
+        model = map_photos(database, photos.paths[0].parent, len(photos.paths), job)
     names = [path.name for path in photos.paths]
     if model is None or model.num_reg_images() < MIN_PHOTOS:
         each = ", ".join(f"{name} {count}" for name, count in zip(names, counts, strict=True))

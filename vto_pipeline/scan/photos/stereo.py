@@ -20,6 +20,7 @@ from vto_pipeline.model.frames import DepthMaps, PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
 from vto_pipeline.model.settings import Config
+from vto_pipeline.scan.library_message import library_message
 from vto_pipeline.scan.photos.consistency import agreeing_views, consensus
 from vto_pipeline.scan.photos.disparity import MatchConfig, match_pair
 from vto_pipeline.scan.photos.neighbours import choose_pairs, visibility
@@ -164,10 +165,8 @@ def _merge(
         try:
             frame = rectify(first, second, cloud.points[seen[pair[0]] & seen[pair[1]]], config.range_margin)
             return (frame.typical_disparity**2, *match_pair(first, second, frame, config.match))
-        except cv2.error as error:
-            return error.err or str(error)
-        except ScanError as error:
-            return error.problem
+        except (cv2.error, ScanError) as error:
+            return library_message(error) if isinstance(error, cv2.error) else error.problem
 
     for done, (pair, matched) in enumerate(_in_order(work, pairs)):
         if isinstance(matched, str):

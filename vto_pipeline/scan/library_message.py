@@ -1,0 +1,15 @@
+"""What the exceptions of the native libraries say, in one line for a message of ours."""
+
+from __future__ import annotations
+
+import re
+
+COLMAP_ERRORS = (RuntimeError, ValueError, IndexError)
+"""What pycolmap raises when COLMAP cannot do something."""
+
+
+def library_message(error: Exception) -> str:
+    """Return the text of a library's exception without colours, source places and line breaks."""
+    text = re.sub(r"\x1b\[[0-9;]*m", "", getattr(error, "err", "") or str(error))
+    text = re.sub(r"^\[?(Open3D Error\] \(.*?\) \S+:\d+:|[\w./]+:\d+\])\s*", "", text.strip())
+    return " ".join(text.split()) or type(error).__name__
