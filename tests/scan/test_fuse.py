@@ -13,6 +13,7 @@ from vto_pipeline.errors import ScanError
 from vto_pipeline.model.camera import CameraSet, Intrinsics
 from vto_pipeline.model.frames import DepthMaps, PhotoSet
 from vto_pipeline.model.job import Job
+from vto_pipeline.scan import fuse
 from vto_pipeline.scan.canonical import canonical_mesh
 from vto_pipeline.scan.depth.depth_mask import clean_depth
 from vto_pipeline.scan.fuse import FuseConfig, fuse_depth_frames, fuse_depth_maps
@@ -162,3 +163,24 @@ def test_flying_pixels_and_grazing_surfaces_are_masked():
     u = np.arange(64)
     wall = np.tile((1.0 / (1 + 9 * (u - 31.5) / 60 * 0.1)).astype(np.float32), (48, 1))
     assert (clean_depth(wall, camera) > 0).mean() > 0.9  # tilted 42 degrees: kept
+
+
+def test_voxels_grow_until_the_scene_fits_in_memory(true_maps, true_cameras, shot, scene, monkeypatch):
+    monkeypatch.setattr(fuse, "MAX_BLOCKS", 60)
+    job = Job()
+    mesh = fuse_depth_maps(shot[0], true_cameras, true_maps, COARSE, job)
+    assert "instead of 4 mm" in job.warnings[0]
+    assert 5 < job.metrics["voxel_mm"] < 40
+    error = distances(scene, mesh.vertices[mesh.vertices[:, 1] > 0.1])
+    assert np.median(error) < 1e-3 * job.metrics["voxel_mm"]
+
+
+def test_a_far_background_takes_no_voxels(true_maps, true_cameras, shot):
+    """A pixel on a wall 40 m away covers 19 voxels: there is no surface to be had, only blocks of memory."""
+    wall = np.where(true_maps.depth > 0, true_maps.depth, 40)
+    maps = DepthMaps(true_maps.names, true_maps.intrinsics, true_maps.world_from_cam, wall)
+    job = Job()
+    mesh = fuse_depth_maps(shot[0], true_cameras, maps, COARSE, job)
+    assert np.abs(mesh.vertices).max() < 2
+    assert any("readings so far away" in note for note in job.notes)
+    assert not job.warnings

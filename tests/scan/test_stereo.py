@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import tracemalloc
 
 import cv2
 import numpy as np
@@ -12,8 +13,9 @@ from vto_pipeline.errors import InputError, ScanError
 from vto_pipeline.model.camera import CameraSet, Intrinsics
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
+from vto_pipeline.scan.photos import stereo
 from vto_pipeline.scan.photos.consistency import consensus
-from vto_pipeline.scan.photos.disparity import _in_second
+from vto_pipeline.scan.photos.disparity import MatchConfig, _in_second, match_pair
 from vto_pipeline.scan.photos.neighbours import choose_pairs, visibility
 from vto_pipeline.scan.photos.rectify import StereoView, depth_in_view, rectify, warp
 from vto_pipeline.scan.photos.stereo import StereoConfig, estimate_depth_maps
@@ -50,10 +52,15 @@ def test_depth_agrees_with_the_ray_cast_truth(maps, shot, scene):
     assert 0.5 < job.metrics["consistent_share"] <= 1
 
 
-def test_same_bits_on_one_core_and_on_all(maps, shot, true_cameras, sparse, monkeypatch):
+def test_same_bits_on_one_core_and_on_all_in_the_stated_memory(maps, shot, true_cameras, sparse, monkeypatch):
     monkeypatch.setattr(os, "cpu_count", lambda: 1)
-    again = estimate_depth_maps(shot[0], true_cameras, sparse, StereoConfig(), Job())
+    job = Job()
+    tracemalloc.start()
+    again = estimate_depth_maps(shot[0], true_cameras, sparse, StereoConfig(), job)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
     assert again.depth.tobytes() == maps[0].depth.tobytes()
+    assert 0.3e6 * job.metrics["memory_bound_mb"] < peak < 1e6 * job.metrics["memory_bound_mb"]
 
 
 def test_plain_surface_is_refused(tmp_path, true_cameras, sparse):
@@ -102,11 +109,10 @@ def test_a_point_falls_on_the_same_row_of_both_windows(true_cameras):
     frame = rectify(first, second, points, 0.1)
     for view, shift in ((first, 0), (second, frame.min_disparity)):
         window = warp(view, frame, shift)
-        local = (points - first.world_from_cam[:3, 3]) @ frame.rect_from_world.T
-        if view is second:
-            local -= [frame.baseline, 0, 0]
-        u = frame.focal * local[:, 0] / local[:, 2] - frame.corner[0] + shift
-        v = frame.focal * local[:, 1] / local[:, 2] - frame.corner[1]
+        local = (points - view.world_from_cam[:3, 3]) @ frame.rect_from_world.T
+        sine = local[:, 0] / np.linalg.norm(local, axis=1)
+        u = frame.scale * np.arctanh(sine) - frame.corner[0] + shift
+        v = frame.scale * np.arctan2(local[:, 1], local[:, 2]) - frame.corner[1]
         inside = (points - view.world_from_cam[:3, 3]) @ view.world_from_cam[:3, :3]
         flat = inside[:, :2] / inside[:, 2:]
         truth = camera.fx * flat[:, 0] * (1 - 0.2 * (flat**2).sum(1)) + camera.cx
@@ -115,18 +121,146 @@ def test_a_point_falls_on_the_same_row_of_both_windows(true_cameras):
     assert frame.disparities % 16 == 0
 
 
-def test_depth_of_a_plane_comes_back(true_cameras):
-    """A constant disparity is a plane at f B / d in the rectified frame."""
+@pytest.mark.parametrize("second", [False, True])
+def test_depth_puts_points_where_both_cameras_see_the_disparity(true_cameras, second):
+    """From the angles at both cameras: the isometric latitude of an angle t to the axis is artanh(cos t)."""
     camera = bent_view(0.0)
     views = [StereoView(np.zeros((120, 160), np.uint8), camera, true_cameras.world_from_cam[k]) for k in (3, 4)]
     frame = rectify(*views, cluster(), 0.1)
-    disparity = np.full(frame.size[::-1], frame.focal * frame.baseline / 0.9, np.float32)
-    depth = depth_in_view(views[0], frame, disparity, 0)
+    disparity = np.full(frame.size[::-1], 0.4 * frame.scale, np.float32)
+    depth = depth_in_view(views[second], frame, disparity, second=second)
     v, u = np.nonzero(depth)
     assert len(v) > 1000
     ray = np.stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones(len(u))], axis=1)
-    world = (ray * depth[v, u][:, None]) @ views[0].world_from_cam[:3, :3].T
-    assert_allclose(world @ frame.rect_from_world[2], 0.9, rtol=1e-5, atol=0)  # single precision
+    pose = views[second].world_from_cam
+    world = (ray * depth[v, u][:, None]) @ pose[:3, :3].T + pose[:3, 3]
+    centers = [view.world_from_cam[:3, 3] for view in views]
+    baseline = (centers[1] - centers[0]) / np.linalg.norm(centers[1] - centers[0])
+    cosines = [(world - c) @ baseline / np.linalg.norm(world - c, axis=1) for c in centers]
+    assert_allclose(np.arctanh(cosines[0]) - np.arctanh(cosines[1]), 0.4, rtol=1e-5, atol=0)  # single precision
+
+
+PLANE = 2.0
+"""Where the plane of the next tests stands, z [m]."""
+
+
+def plane_view(camera, pose):
+    """A printed plane z = PLANE as a camera sees it, and the plane's depth: both in closed form."""
+    texture = smooth_texture(1500, 500)[:, :1500].astype(np.float32)  # 2.5 mm a texel, 1.9 m about the axis
+    u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
+    rays = np.stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones(u.shape)], -1) @ pose[:3, :3].T
+    depth = (PLANE - pose[2, 3]) / rays[..., 2]
+    x, y = np.moveaxis(pose[:2, 3] + depth[..., None] * rays[..., :2], -1, 0)
+    seen = cv2.remap(texture, (750 + 400 * x).astype(np.float32), (750 + 400 * y).astype(np.float32), cv2.INTER_CUBIC)
+    return StereoView(np.clip(np.round(seen), 0, 255).astype(np.uint8), camera, pose), depth
+
+
+def plane_points(camera, view, other):
+    """Points of the plane that both views show."""
+    x, y = np.meshgrid(np.linspace(-1.5, 1.5, 61), np.linspace(-1.5, 1.5, 61))
+    points = np.stack([x.ravel(), y.ravel(), np.full(x.size, PLANE)], axis=1)
+    poses = np.stack([view.world_from_cam, other.world_from_cam])
+    return points[visibility(CameraSet(("a", "b"), (camera, camera), poses), PointCloud(points)).all(0)]
+
+
+@pytest.mark.parametrize(
+    ("step", "turn_deg"),
+    [
+        ((0, 0, 0.4), 0),
+        ((0, 0, -0.4), 0),
+        ((0.1, 0.05, 0.4), 5),
+        ((0.3, 0, 0.4), 0),
+        ((0, 0.35, 0.1), -4),
+        ((0.35, 0, 0), 3),
+    ],
+)
+def test_a_plane_is_measured_wherever_the_second_camera_stands(step, turn_deg):
+    """Forward and backward along the view (the axis is in the picture), beside its middle, at its border, sideways."""
+    camera = Intrinsics(480, 360, 500.0, 500.0, 239.5, 179.5)
+    turn = np.eye(4)
+    turn[:3, :3] = cv2.Rodrigues(np.radians([[0.3 * turn_deg], [turn_deg], [turn_deg]]))[0]
+    turn[:3, 3] = step
+    (first, near), (second, far) = plane_view(camera, np.eye(4)), plane_view(camera, turn)
+    frame = rectify(first, second, plane_points(camera, first, second), 0.1)
+    assert frame.size[0] * frame.size[1] < 2.2 * 480 * 360  # 2, and the rounding of the disparities
+    for measured, truth in zip(match_pair(first, second, frame, MatchConfig()), (near, far), strict=True):
+        known = measured > 0
+        assert known.mean() > 0.5
+        error = np.abs(measured / truth - 1)[known]
+        assert 1e-5 < np.median(error) < 2e-3
+        assert np.percentile(error, 90) < 0.01
+
+
+def test_no_pair_of_cameras_needs_a_large_window():
+    """Cameras anywhere, looking anywhere, so that the axis is in, near and far from the picture."""
+    random = np.random.default_rng(5)
+    camera = Intrinsics(400, 300, 420.0, 420.0, 199.5, 149.5)
+    gray, axis_shown = np.zeros((300, 400), np.uint8), 0
+    for _ in range(300):
+        poses = np.tile(np.eye(4), (2, 1, 1))
+        poses[1, :3, :3] = cv2.Rodrigues(random.normal(0, 0.2, 3))[0]
+        poses[1, :3, 3] = random.normal(size=3) * 10 ** random.uniform(-3, 0.3)
+        points = random.uniform([-0.4, -0.3, 0.3], [0.4, 0.3, 1], (200, 3)) * 10 ** random.uniform(-0.5, 1.5, (200, 1))
+        points = points[visibility(CameraSet(("a", "b"), (camera, camera), poses), PointCloud(points)).all(0)]
+        if len(points) < 12:
+            continue
+        frame = rectify(StereoView(gray, camera, poses[0]), StereoView(gray, camera, poses[1]), points, 0.1)
+        axis = poses[1, :3, 3] / poses[1, 2, 3] * 420
+        axis_shown += abs(axis[0]) < 200 and abs(axis[1]) < 150
+        assert 16 <= frame.size[0] * frame.size[1] < 2.3 * gray.size
+        assert max(frame.size) < 2**15  # OpenCV's limit
+    assert axis_shown > 20
+
+
+def test_points_on_the_axis_do_not_cost_the_others_their_resolution():
+    """The axis itself is infinitely far up the map."""
+    camera, ahead = Intrinsics(400, 300, 420.0, 420.0, 199.5, 149.5), np.eye(4)
+    ahead[2, 3] = 0.1
+    first, second = (StereoView(np.zeros((300, 400), np.uint8), camera, pose) for pose in (np.eye(4), ahead))
+    turn = np.linspace(0, 2 * np.pi, 100)
+    ring = np.stack([0.3 * np.cos(turn), 0.3 * np.sin(turn), np.ones(100)], axis=1)
+    alone = rectify(first, second, ring, 0.1)
+    together = rectify(first, second, np.concatenate([ring, np.tile([0, 0, 1.0], (5, 1))]), 0.1)
+    assert 0.7 * alone.scale < together.scale < 1.4 * alone.scale
+
+
+def test_photos_from_one_place_cannot_be_rectified(true_cameras):
+    view = StereoView(np.zeros((120, 160), np.uint8), bent_view(0.0), true_cameras.world_from_cam[0])
+    with pytest.raises(ScanError, match="one place"):
+        rectify(view, view, cluster(), 0.1)
+
+
+def test_a_pair_that_fails_is_left_out_with_its_names(shot, true_cameras, sparse, monkeypatch):
+    few = CameraSet(true_cameras.names[:5], true_cameras.intrinsics[:5], true_cameras.world_from_cam[:5])
+
+    def failing(first, second, *rest):
+        if np.array_equal(first.world_from_cam, few.world_from_cam[0]):
+            raise cv2.error("Insufficient memory")
+        return match_pair(first, second, *rest)
+
+    monkeypatch.setattr(stereo, "match_pair", failing)
+    job = Job()
+    found = estimate_depth_maps(shot[0], few, sparse, StereoConfig(check_views=1), job)
+    assert found.depth[1:].any(axis=(1, 2)).all()
+    assert "000.jpg and 001.jpg: Insufficient memory" in job.warnings[0]
+
+
+def test_photos_that_need_more_memory_than_there_is_are_refused(shot, true_cameras, sparse, monkeypatch):
+    monkeypatch.setattr(os, "sysconf", lambda name: 4096)  # 4096 pages of 4096 bytes
+    with pytest.raises(ScanError, match="this machine has 0.0") as caught:
+        estimate_depth_maps(shot[0], true_cameras, sparse, StereoConfig(), Job())
+    assert "max_side_px" in caught.value.hint
+
+
+def test_photos_that_see_the_points_under_small_angles_are_no_pair(true_cameras, sparse):
+    """Two steps towards the points, and a third aside: their baselines have the same length."""
+    start, target = true_cameras.world_from_cam[0].copy(), sparse.points.mean(0)
+    ahead, aside = start.copy(), start.copy()
+    ahead[:3, 3] += 0.25 * start[:3, 2]
+    aside[:3, 3] += 0.25 * start[:3, 0]
+    cameras = CameraSet(("a", "b", "c"), true_cameras.intrinsics[:3], np.stack([start, ahead, aside]))
+    near = PointCloud(target + np.random.default_rng(1).uniform(-0.02, 0.02, (40, 3)))
+    assert choose_pairs(cameras, near, visibility(cameras, near), per_photo=2, min_shared=12) == [(0, 2), (1, 2)]
 
 
 def smooth_texture(height, width):

@@ -24,9 +24,16 @@ from vto_pipeline.scan.photos.consistency import views_on_surface
 GREY = 200
 """Colour of a surface without photos."""
 
+BLOCK, SEEN_STRIDE = 16, 4
+"""Open3D opens blocks of 16³ voxels for every fourth pixel, and fails when none of those has a reading."""
 
-SEEN_STRIDE = 4
-"""Open3D opens blocks of voxels for every fourth pixel, and fails when none of those has a reading."""
+DEPTH_SCALE = 1.0
+"""Depth is in metres."""
+
+_PIXEL_VOXELS = BLOCK / SEEN_STRIDE
+
+MAX_BLOCKS = 20_000
+"""1.6 GB of distances, weights and colours; a scene that needs more gets coarser voxels."""
 
 
 class FuseConfig(Config):
@@ -111,7 +118,16 @@ def _fuse(maps: DepthMaps, color_of: Callable[[int], ByteArray], config: FuseCon
     if not readings.any():
         raise ScanError(f"none of {len(maps.names)} depth maps holds a reading", hint="is depth_scale right?")
     voxel = config.voxel_mm / 1000 if config.voxel_mm else config.voxel_pixels * _pixel_on_surface(maps)
-    mesh = _level_set(maps, color_of, voxel, config, job)
+    wish = voxel
+    while (blocks := _count_blocks(maps, voxel, config.truncation_voxels)) > MAX_BLOCKS:
+        voxel *= max(1.05, np.sqrt(blocks / MAX_BLOCKS))  # a surface meets 1 / side² of them
+    if voxel > wish:
+        problem = f"voxels of {1000 * voxel:.3g} mm instead of {1000 * wish:.3g} mm, so that all fit in memory"
+        job.warn(f"{problem}; leave out what is not the object")
+    far = sum(int((depth > _farthest(c, voxel)).sum()) for depth, c in zip(maps.depth, maps.intrinsics, strict=True))
+    if far:
+        job.note(f"left out {far} readings so far away that their pixels are larger than {_PIXEL_VOXELS:.0f} voxels")
+    mesh = _level_set(maps, color_of, voxel, blocks, config, job)
     views = views_on_surface(mesh.vertices, maps, config.support_voxels * voxel)
     mesh = drop_small_pieces(drop_vertices(mesh, views < config.min_views), config.min_piece, job)
     job.measure(voxel_mm=round(1000 * voxel, 3), points=len(mesh.vertices), triangles=len(mesh.faces))
@@ -124,29 +140,63 @@ def _pixel_on_surface(maps: DepthMaps) -> float:
     return float(np.median(sizes))
 
 
+def _farthest(camera: Intrinsics, voxel: float) -> float:
+    """Depth [m] beyond which the blocks that Open3D opens no longer touch each other."""
+    return _PIXEL_VOXELS * voxel * camera.fx
+
+
+def _count_blocks(maps: DepthMaps, voxel: float, reach: float) -> int:
+    """Blocks of voxels that all maps together need."""
+    grid = _grid(voxel, 1)
+    views = [_posed(grid, maps, index, voxel, reach) for index in range(len(maps.names))]
+    seen = [view[0].numpy() for view in views if view is not None]
+    return len(np.unique(np.concatenate(seen), axis=0)) if seen else 1
+
+
+def _grid(voxel: float, blocks: int) -> Any:
+    import open3d as o3d
+
+    core: Any = o3d.core  # its stubs know no NumPy array
+    names, channels = ("tsdf", "weight", "color"), tuple(map(core.SizeVector, ([1], [1], [3])))
+    types = (core.float32,) * 3
+    return o3d.t.geometry.VoxelBlockGrid(names, types, channels, voxel, BLOCK, blocks, core.Device("CPU:0"))
+
+
+def _posed(grid: Any, maps: DepthMaps, index: int, voxel: float, reach: float) -> tuple[Any, ...] | None:
+    """Blocks, depth image, camera matrix, camera from world and largest depth of a view; None if nothing is seen."""
+    import open3d as o3d
+
+    core: Any = o3d.core
+    camera = maps.intrinsics[index]
+    values = np.ascontiguousarray(maps.depth[index, : camera.height, : camera.width])
+    values = np.where(values < _farthest(camera, voxel), values, 0)
+    if not values[::SEEN_STRIDE, ::SEEN_STRIDE].any():
+        return None
+    depth, limit = o3d.t.geometry.Image(core.Tensor(values)), float(values.max()) + voxel
+    matrix, inverse = core.Tensor(camera.matrix), core.Tensor(np.linalg.inv(maps.world_from_cam[index]))
+    blocks = grid.compute_unique_block_coordinates(depth, matrix, inverse, DEPTH_SCALE, limit, reach)
+    return blocks, depth, matrix, inverse, limit
+
+
 def _level_set(
-    maps: DepthMaps, color_of: Callable[[int], ByteArray], voxel: float, config: FuseConfig, job: Job
+    maps: DepthMaps, color_of: Callable[[int], ByteArray], voxel: float, blocks: int, config: FuseConfig, job: Job
 ) -> TriangleMesh:
     """Integrate all maps (Curless and Levoy 1996) and extract the zero level set."""
     import cv2
     import open3d as o3d
 
-    core: Any = o3d.core  # its stubs know no NumPy array
-    reach, scale = config.truncation_voxels, 1.0
-    names, channels = ("tsdf", "weight", "color"), tuple(map(core.SizeVector, ([1], [1], [3])))
-    grid = o3d.t.geometry.VoxelBlockGrid(names, (core.float32,) * 3, channels, voxel, 16, 20_000, core.Device("CPU:0"))
-    for index, (camera, pose) in enumerate(zip(maps.intrinsics, maps.world_from_cam, strict=True)):
-        values = np.ascontiguousarray(maps.depth[index, : camera.height, : camera.width])
-        if not values[::SEEN_STRIDE, ::SEEN_STRIDE].any():
-            job.note(f"{maps.names[index]}: {np.count_nonzero(values)} readings are too few to fuse")
+    core: Any = o3d.core
+    reach, grid = config.truncation_voxels, _grid(voxel, blocks)
+    for index, camera in enumerate(maps.intrinsics):
+        view = _posed(grid, maps, index, voxel, reach)
+        if view is None:
+            job.note(f"{maps.names[index]}: {np.count_nonzero(maps.depth[index])} readings are too few to fuse")
         else:
+            seen, depth, matrix, inverse, limit = view
             size = (camera.width, camera.height)
             picture = cv2.resize(color_of(index), size, interpolation=cv2.INTER_AREA).astype(np.float32) / 255
-            depth, color = o3d.t.geometry.Image(core.Tensor(values)), o3d.t.geometry.Image(core.Tensor(picture))
-            matrix, inverse = core.Tensor(camera.matrix), core.Tensor(np.linalg.inv(pose))
-            limit = float(values.max()) + voxel
-            blocks = grid.compute_unique_block_coordinates(depth, matrix, inverse, scale, limit, reach)
-            grid.integrate(blocks, depth, color, matrix, inverse, scale, limit, reach)
+            color = o3d.t.geometry.Image(core.Tensor(picture))
+            grid.integrate(seen, depth, color, matrix, inverse, DEPTH_SCALE, limit, reach)
         job.progress(0.8 * (index + 1) / len(maps.names), f"fusing view {index + 1} of {len(maps.names)}")
     surface = grid.extract_triangle_mesh(config.min_views - 0.5)  # Open3D keeps what weighs more, and a view weighs 1
     if "indices" not in surface.triangle or len(surface.triangle.indices) == 0:

@@ -68,7 +68,7 @@ def match_pair(
         radius, steps = config.refine_radius, config.refine_steps
         forward = refine_disparity(left, right, forward, frame.min_disparity, radius, steps, config.min_correlation)
     backward = _in_second(forward, frame.min_disparity)
-    return depth_in_view(first, frame, forward, 0), depth_in_view(second, frame, backward, frame.min_disparity)
+    return depth_in_view(first, frame, forward, second=False), depth_in_view(second, frame, backward, second=True)
 
 
 @njit(cache=True, nogil=True)

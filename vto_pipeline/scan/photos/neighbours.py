@@ -17,6 +17,10 @@ FACING_COS = 0.5
 BEST_ANGLE_DEG, ANGLE_SPREAD_DEG = 14.0, 8.0
 """Wider pairs measure depth better, narrower pairs match more surely; the best compromise and how fast it falls off."""
 
+MIN_ANGLE_DEG = 3.0
+"""Points that two photos see under a smaller angle do not count: so small a baseline, or one towards the points, tells
+no depth. The limit of COLMAP's dense stereo (Schönberger et al. 2016)."""
+
 
 def camera_points(points: FloatArray, world_from_cam: FloatArray) -> FloatArray:
     """Points in the frame of one camera, shape (N, 3)."""
@@ -53,6 +57,9 @@ def choose_pairs(
 ) -> list[tuple[int, int]]:
     """Pairs for stereo: each photo's best neighbours by shared points, weighted by the angle between their rays.
 
+    The angle depends on the baseline's length and on its direction, point by point: along the line through both cameras
+    it is zero.
+
     Returns:
         Sorted pairs (i, j), i < j.
     """
@@ -67,7 +74,7 @@ def choose_pairs(
         cosine = (a * b).sum(1) / np.linalg.norm(a, axis=1) / np.linalg.norm(b, axis=1)
         angle = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
         weight = np.exp(-0.5 * ((angle - BEST_ANGLE_DEG) / ANGLE_SPREAD_DEG) ** 2)
-        score[i, j] = score[j, i] = weight.sum()
+        score[i, j] = score[j, i] = weight[angle >= MIN_ANGLE_DEG].sum()
     pairs = set()
     for i in range(count):
         best = np.argsort(-score[i], kind="stable")[:per_photo]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
@@ -23,6 +24,9 @@ from vto_pipeline.scan.photos.consistency import agreeing_views, consensus
 from vto_pipeline.scan.photos.disparity import MatchConfig, match_pair
 from vto_pipeline.scan.photos.neighbours import choose_pairs, visibility
 from vto_pipeline.scan.photos.rectify import StereoView, rectify
+
+PAIR_BYTES = 250
+"""Working memory of one pair per pixel of a photo, with windows as large as they may be [B]."""
 
 
 class StereoConfig(Config):
@@ -56,7 +60,7 @@ def estimate_depth_maps(
 
     Raises:
         InputError: a camera names a photo that is not there.
-        ScanError: no two photos share enough of the surface, or no depth is agreed on.
+        ScanError: no two photos share enough of the surface, the memory is too small, or no depth is agreed on.
     """
     views = _load(photos, cameras, config.max_side_px)
     seen = visibility(cameras, cloud)
@@ -64,8 +68,10 @@ def estimate_depth_maps(
     if not pairs:
         hint = "photos about 15 degrees apart work best; is there texture?"
         raise ScanError(f"no two of {len(views)} photos share {config.min_shared_points} sparse points", hint=hint)
+    _check_memory(views, pairs, job)
     pinholes = tuple(_undistorted(view.camera) for view in views)
-    merged = DepthMaps(cameras.names, pinholes, cameras.world_from_cam, _merge(views, pairs, cloud, seen, config, job))
+    depth = _merge(cameras.names, views, pairs, cloud, seen, config, job)
+    merged = DepthMaps(cameras.names, pinholes, cameras.world_from_cam, depth)
     checked = _check(merged, pairs, config, job)
     measured, kept = int((merged.depth > 0).sum()), int((checked > 0).sum())
     if kept == 0:
@@ -107,7 +113,37 @@ def _undistorted(camera: Intrinsics) -> Intrinsics:
     return Intrinsics(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy)
 
 
+def _check_memory(views: list[StereoView], pairs: list[tuple[int, int]], job: Job) -> None:
+    """State the largest memory that matching needs, which follows from the pairs alone.
+
+    Raises:
+        ScanError: the machine has less.
+    """
+    pixels = max(view.gray.shape[0] for view in views) * max(view.gray.shape[1] for view in views)
+    left = np.bincount(np.array(pairs).ravel(), minlength=len(views))
+    waiting = most = 0
+    found = np.zeros(len(views), dtype=int)
+    for pair in pairs:  # in this order; a photo's maps are merged when its last pair is done
+        for index in pair:
+            found[index] += 1
+            waiting += 1
+            most = max(most, waiting)
+            if found[index] == left[index]:
+                waiting -= left[index]
+    kept = (1 + 4 + 4) * len(views) + 4 * (most + left.max())  # grey, merged, checked; maps, and those being merged
+    needed = pixels * (kept + PAIR_BYTES * (os.cpu_count() or 1))
+    present = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    job.measure(memory_bound_mb=round(needed / 1e6))
+    if needed > present:
+        problem = (
+            f"{len(views)} photos need up to {needed / 1e9:.1f} GB of memory; this machine has {present / 1e9:.1f} GB"
+        )
+        raise ScanError(problem, hint="lower stereo.max_side_px")
+    job.note(f"{len(pairs)} pairs in at most {needed / 1e9:.1f} GB of memory")
+
+
 def _merge(
+    names: tuple[str, ...],
     views: list[StereoView],
     pairs: list[tuple[int, int]],
     cloud: PointCloud,
@@ -116,33 +152,56 @@ def _merge(
     job: Job,
 ) -> NDArray[np.float32]:
     """Match all pairs and merge the findings of each photo's neighbours, shape (C, H, W)."""
+    import cv2
+
     height, width = max(v.gray.shape[0] for v in views), max(v.gray.shape[1] for v in views)
     merged = np.zeros((len(views), height, width), dtype=np.float32)
     waiting = np.bincount(np.array(pairs).ravel(), minlength=len(views))
     found: list[list[tuple[float, NDArray[np.float32]]]] = [[] for _ in views]
 
-    def work(pair: tuple[int, int]) -> tuple[float, NDArray[np.float32], NDArray[np.float32]]:
+    def work(pair: tuple[int, int]) -> tuple[float, NDArray[np.float32], NDArray[np.float32]] | str:
         first, second = views[pair[0]], views[pair[1]]
-        frame = rectify(first, second, cloud.points[seen[pair[0]] & seen[pair[1]]], config.range_margin)
-        return ((frame.focal * frame.baseline) ** 2, *match_pair(first, second, frame, config.match))
+        try:
+            frame = rectify(first, second, cloud.points[seen[pair[0]] & seen[pair[1]]], config.range_margin)
+            return (frame.typical_disparity**2, *match_pair(first, second, frame, config.match))
+        except cv2.error as error:
+            return error.err or str(error)
+        except ScanError as error:
+            return error.problem
 
-    for done, ((i, j), (weight, *maps)) in enumerate(_in_order(work, pairs)):
-        for index, depth in ((i, maps[0]), (j, maps[1])):
-            found[index].append((weight, depth))
+    for done, (pair, matched) in enumerate(_in_order(work, pairs)):
+        if isinstance(matched, str):
+            job.warn(f"left out the pair {names[pair[0]]} and {names[pair[1]]}: {matched}")
+        for side, index in enumerate(pair):
+            if not isinstance(matched, str):
+                found[index].append((matched[0], matched[1 + side]))
             waiting[index] -= 1
-            if waiting[index] == 0:
+            if waiting[index] == 0 and found[index]:
                 depths, weights = np.stack([d for _, d in found[index]]), np.array([w for w, _ in found[index]])
                 agreed = consensus(depths, weights, config.consensus_tolerance, config.consensus_needed)
                 merged[index, : agreed.shape[0], : agreed.shape[1]] = agreed
                 found[index] = []
         job.progress(0.9 * (done + 1) / len(pairs), f"pair {done + 1} of {len(pairs)}")
+    merged.flags.writeable = False  # so that it is not copied
     return merged
 
 
 def _in_order(work: Callable[[Any], Any], pairs: list[tuple[int, int]]) -> Iterator[tuple[tuple[int, int], Any]]:
-    """Run pairs on all cores and give the results in the order of the pairs, so that sums are reproducible."""
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        yield from zip(pairs, pool.map(work, pairs), strict=True)
+    """Run pairs on all cores and give the results in the order of the pairs, so that sums are reproducible.
+
+    No more than two pairs a core are under way or waiting for their turn: that bounds the memory.
+    """
+    cores = os.cpu_count() or 1
+    with ThreadPoolExecutor(cores) as pool:
+        running: deque[tuple[tuple[int, int], Future[Any]]] = deque()
+        for pair in pairs:
+            running.append((pair, pool.submit(work, pair)))
+            if len(running) == 2 * cores:
+                pair, future = running.popleft()
+                yield pair, future.result()
+        while running:
+            pair, future = running.popleft()
+            yield pair, future.result()
 
 
 def _check(merged: DepthMaps, pairs: list[tuple[int, int]], config: StereoConfig, job: Job) -> NDArray[np.float32]:
@@ -154,4 +213,5 @@ def _check(merged: DepthMaps, pairs: list[tuple[int, int]], config: StereoConfig
             votes = agreeing_views(merged, i, others, config.check_tolerance)
             checked[i] = np.where(votes >= config.check_views, depth, 0)
         job.progress(0.9 + 0.1 * (i + 1) / len(checked), f"checking photo {i + 1} of {len(checked)}")
+    checked.flags.writeable = False
     return checked
