@@ -20,6 +20,8 @@ _COARSE = 2.0  # times the bound: waiting longer for a coarse answer, itself in 
 _STILL, _LONG = 1e-4, 10  # m, looks in a row: what stays within that is waited for no longer, in balance or not
 _VAGUE = 3e-3  # m: what is not known to be stable may still buckle by as much, as dresses of `vto bench drape` do
 _NEAR = 1e-3  # m a look: slow enough to ask whether it is
+_JAMMED = 100.0  # weights left over: cloth on its way to rest has forces of the order of its weight
+_JAM_LOOKS, _JAM_FALL = 5, 0.8  # looks, and the share that their least residual has to fall below
 _SLOWEST = 0.95  # a decay slower than this cannot be told from none
 
 
@@ -54,6 +56,7 @@ class SettlingResult:
         error: Predicted distance to the state of rest, rms over vertices [m]; infinite while unknown.
         residual: Residual force as a share of weight.
         trace: One row for each look.
+        jammed: Whether it was stopped since contacts hold forces far above its weight, and they do not fall.
     """
 
     state: ClothState
@@ -61,6 +64,7 @@ class SettlingResult:
     error: float = np.inf
     residual: float = np.inf
     trace: list[TraceRow] = field(default_factory=list)
+    jammed: bool = False
 
     @property
     def error_mm(self) -> float | None:
@@ -71,9 +75,13 @@ class SettlingResult:
     def not_settled_warning(self) -> str:
         """The warning where it did not settle."""
         if self.error_mm is None:
-            return "not at rest, error unknown"
+            return f"not at rest, error unknown{self._jam}"
         left = f"a residual force of {self.residual:.2g} of a vertex's weight"
-        return f"not at rest: {self.error_mm:.1f} mm of motion predicted, {left}"
+        return f"not at rest: {self.error_mm:.1f} mm of motion predicted, {left}{self._jam}"
+
+    @property
+    def _jam(self) -> str:
+        return "; cloth is jammed between contacts, and waiting will not free it" if self.jammed else ""
 
 
 def relax_to_rest(
@@ -143,6 +151,9 @@ def relax_to_rest(
         row = TraceRow(seconds, stepper.steps, 1e3 * result.error, result.residual, contacts=stepper.pushing_contacts)
         result.trace.append(row)
         watch(share, result.error)
+        if _is_jammed([one.residual for one in result.trace]):
+            result.jammed = True
+            break
         if brief:
             newton_steps.choose(moved < _STILL, residual)
             continue
@@ -172,6 +183,14 @@ def relax_to_rest(
 
 def _rms(moves: FloatArray) -> float:
     return float(np.sqrt((moves**2).sum(axis=1).mean()))
+
+
+def _is_jammed(residuals: list[float]) -> bool:
+    """Return whether forces far above the cloth's weight have ceased to fall."""
+    if len(residuals) < 2 * _JAM_LOOKS:
+        return False
+    before, last = min(residuals[-2 * _JAM_LOOKS : -_JAM_LOOKS]), min(residuals[-_JAM_LOOKS:])
+    return last > max(_JAMMED, _JAM_FALL * before)
 
 
 def _still_to_come(drifts: list[float]) -> float:

@@ -89,14 +89,13 @@ class _CoarseToFine:
         """Return the garment at rest on its own mesh."""
         trace: list[TraceRow] = []
         before: tuple[Phases, ...] = ()
-        start = self._coarser[-1].garment if self._coarser else self._garment
+        garments = [self._garment, *(one.garment for one in self._coarser)]
+        start, motion, fresh = garments[-1], body, True
         for level in range(len(self._coarser), 0, -1):
             now = time.perf_counter()
-            finer = self._coarser[level - 2].garment if level > 1 else self._garment
-            found = self._rest_on(level, start, body, now + _FIRST * (deadline - now))
+            found = self._rest_on(level, start, motion, now + _FIRST * (deadline - now), fresh=fresh)
             if found is None:
-                self._coarser.pop()
-                start = finer
+                start, motion, fresh = garments[level - 1], body, True
                 continue
             trace += found.settling.trace
             before += (found.phases,)
@@ -105,18 +104,28 @@ class _CoarseToFine:
                 f"{found.stepper.steps} steps"
             )
             there = self._coarser[level - 1].prolong(found.settling.state.positions)
-            start = Garment(TriangleMesh(there, finer.mesh.faces), finer.rest)
-            body = MovingBody(body.keyframes[-1:], body.faces)
-        reached = self._rest_on(0, start, body, deadline)
+            finer = garments[level - 1]
+            start, fresh = Garment(TriangleMesh(there, finer.mesh.faces), finer.rest), False
+            motion = MovingBody(body.keyframes[-1:], body.faces)
+        reached = self._rest_on(0, start, motion, deadline, fresh=fresh)
         assert reached is not None  # only coarser ones are given up
         reached.settling.trace[:0] = trace
         return reached._replace(before=before)
 
-    def _rest_on(self, level: int, garment: Garment, body: MovingBody, deadline: float) -> RestOnMesh | None:
+    def _rest_on(
+        self, level: int, garment: Garment, body: MovingBody, deadline: float, *, fresh: bool
+    ) -> RestOnMesh | None:
         """Return the garment at rest on one mesh: 0 is its own, the last the coarsest.
 
-        None where that is coarser and too coarse to be freed from the body: between large triangles that pass through
-        it, layers would be wedged, and never come to rest.
+        None where that is coarser, and too coarse for its layers to lie between one another and the body: what is
+        wedged there never comes to rest, and a finer mesh would begin with it.
+
+        Args:
+            level: Of which mesh.
+            garment: Where it starts.
+            body: What it lies on.
+            deadline: `time.perf_counter` at which to stop settling.
+            fresh: Whether it starts where the garment was given, not where a coarser mesh came to rest.
         """
         model, config, job = self._model, self._config, self._job
         if level > 0:
@@ -125,13 +134,11 @@ class _CoarseToFine:
         phases = Phases(model, garment.rest, self._fabric, config, job)
         first = TriangleMesh(body.keyframes[0], body.faces)
         state = phases.resolve_crossings(at_rest(garment.mesh.vertices))
-        if level == len(self._coarser):  # the others start outside the body, but for corners that edges have cut
+        if fresh:  # the others start outside the body, but for corners that edges have cut
             state = phases.resolve_crossings(phases.grow_body(state, first), first)
             if level > 0 and phases.crossings_left > 0:
-                self._job.leave_out(
-                    f"coming to rest on {len(model.mass)} vertices first",
-                    f"too coarse to clear the body: {phases.crossings_left} pairs of triangles still intersect",
-                )
+                left = f"{phases.crossings_left} pairs of triangles still intersect"
+                self._leave_out(model, f"too coarse to clear the body: {left}")
                 return None
         collider = phases.collider(body, TriangleMesh(state.positions, model.faces))
         stepper = phases.stepper(model, collider, config.damping)
@@ -142,10 +149,17 @@ class _CoarseToFine:
         settling = phases.settle_and_clear(
             state, stepper, body.final, deadline, (ROUGH,) if level > 0 else (ROUGH, REST)
         )
+        if level > 0 and settling.jammed:
+            weights = f"{settling.residual:.0f} times a vertex's weight"
+            self._leave_out(model, f"too coarse: its layers are jammed, with forces of {weights}")
+            return None
         settling.trace = [replace(row, seconds=before + row.seconds, level=level) for row in settling.trace]
         if level > 0:  # what matters in the end warns again
             self._job.notes += [f"on {len(model.mass)} vertices: {text}" for text in job.warnings]
         return RestOnMesh(model, phases, stepper, settling)
+
+    def _leave_out(self, model: ClothModel, why: str) -> None:
+        self._job.leave_out(f"coming to rest on {len(model.mass)} vertices first", why)
 
     def _part(self, level: int) -> Job:
         """Return a job whose progress is a part of the first half of the whole one's."""

@@ -183,7 +183,7 @@ class Phases:
                 settling.settled, settling.error = False, np.inf
             if len(crossing) > 0 and self._config.clear_rounds > 0:  # nor will waiting clear it
                 break
-            if lies_clear and turn + 1 >= len(passes):
+            if lies_clear and (settling.jammed or turn + 1 >= len(passes)):
                 break
         return settling
 
