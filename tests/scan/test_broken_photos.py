@@ -16,7 +16,7 @@ from vto_pipeline.io.captures.photos import read_photos
 from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.frames import DepthMaps
 from vto_pipeline.model.job import Job
-from vto_pipeline.scan.fuse import FuseConfig, fuse_depth_maps
+from vto_pipeline.scan.fuse import FuseConfig, PhotoFuseConfig, check_coverage, fuse_depth_maps
 from vto_pipeline.scan.library_message import library_message
 from vto_pipeline.scan.photos.board import detect_board
 from vto_pipeline.scan.photos.scale import ScaleConfig, apply_board
@@ -42,7 +42,9 @@ def reconstruct(folder: Path, job: Job) -> int:
     found = read_photos(folder, job=job)
     cameras, cloud = apply_board(found, *estimate_cameras(found, SfmConfig(), job), ScaleConfig(), job)
     maps = estimate_depth_maps(found, cameras, cloud, StereoConfig(), job)
-    return len(fuse_depth_maps(found, cameras, maps, FuseConfig(), job).faces)
+    surface = fuse_depth_maps(found, cameras, maps, FuseConfig(), job)
+    check_coverage(surface, maps, cloud, PhotoFuseConfig(), job)
+    return len(surface.faces)
 
 
 def decoded(data: bytes) -> np.ndarray:

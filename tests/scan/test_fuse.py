@@ -13,10 +13,18 @@ from vto_pipeline.errors import ScanError
 from vto_pipeline.model.camera import CameraSet, Intrinsics
 from vto_pipeline.model.frames import DepthMaps, PhotoSet
 from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import PointCloud
 from vto_pipeline.scan import fuse
 from vto_pipeline.scan.canonical import canonical_mesh
 from vto_pipeline.scan.depth.depth_mask import clean_depth
-from vto_pipeline.scan.fuse import FuseConfig, fuse_depth_frames, fuse_depth_maps
+from vto_pipeline.scan.fuse import (
+    FuseConfig,
+    PhotoFuseConfig,
+    check_coverage,
+    fuse_depth_frames,
+    fuse_depth_maps,
+)
+from vto_pipeline.scan.photos.coverage import covered_share
 
 COARSE = FuseConfig(voxel_mm=4)
 
@@ -184,3 +192,40 @@ def test_a_far_background_takes_no_voxels(true_maps, true_cameras, shot):
     assert np.abs(mesh.vertices).max() < 2
     assert any("readings so far away" in note for note in job.notes)
     assert not job.warnings
+
+
+def wall_and_points(depth):
+    """Two cameras before a wall 2 m away, and points that span 60 x 30 of the 100 x 80 pixels of each."""
+    camera, poses = Intrinsics(100, 80, 100.0, 100.0, 49.5, 39.5), np.tile(np.eye(4), (2, 1, 1))
+    u, v = np.meshgrid(np.arange(20, 81, 5), np.arange(10, 41, 5))
+    points = np.stack([2 * (u - 49.5) / 100, 2 * (v - 39.5) / 100, np.full(u.shape, 2.0)], axis=-1).reshape(-1, 3)
+    return DepthMaps(("a", "b"), (camera, camera), poses, depth), PointCloud(points)
+
+
+def test_coverage_is_the_share_of_pixels_between_the_points():
+    depth = np.zeros((2, 80, 100), np.float32)
+    depth[0, 10:41, 20:51] = 2.0  # the left half of the region
+    depth[1, :, 50:] = 2.0  # the right half and more
+    maps, cloud = wall_and_points(depth)
+    assert_allclose(covered_share(maps, cloud), 0.5, rtol=0, atol=0.02)  # whole pixels: a row of 61, a column of 31
+    far = PointCloud(np.concatenate([np.repeat(cloud.points, 3, axis=0), [[0.9, 0.7, 2.0]]]))
+    assert_allclose(covered_share(maps, far), 0.5, rtol=0, atol=0.02)  # one stray point does not widen the region
+    assert covered_share(maps, PointCloud(cloud.points[:2])) == 0
+
+
+def test_scraps_are_refused_and_kept_as_a_partial_result(true_maps, true_cameras, shot, scene):
+    """Depth in every tenth patch of the tube only. The sparse points are the tube's."""
+    points = PointCloud(scene.vertices[::37])
+    good = Job()
+    whole = fuse_depth_maps(shot[0], true_cameras, true_maps, COARSE, Job())
+    check_coverage(whole, true_maps, points, PhotoFuseConfig(), good)
+    assert 0.9 < good.metrics["coverage"] <= 1
+    holes = np.add.outer(np.arange(360) // 24, np.arange(480) // 24) % 10 == 0
+    maps = replace(true_maps, depth=np.where(holes, true_maps.depth, 0))
+    scraps = fuse_depth_maps(shot[0], true_cameras, maps, FuseConfig(voxel_mm=4, min_views=1), Job())
+    job = Job()
+    with pytest.raises(ScanError, match="the surface covers .* pieces is") as caught:
+        check_coverage(scraps, maps, points, PhotoFuseConfig(), job)
+    assert 0.05 < job.metrics["coverage"] < 0.15
+    assert caught.value.partial["surface"] is scraps
+    check_coverage(scraps, maps, points, PhotoFuseConfig(min_coverage=0.02), Job())

@@ -9,18 +9,20 @@ import numpy as np
 from pydantic import Field
 
 from vto_pipeline.errors import ScanError
+from vto_pipeline.geometry.topology import component_areas
 from vto_pipeline.io.captures.depth import read_depth
 from vto_pipeline.io.captures.images import read_image
 from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.camera import CameraSet, Intrinsics
 from vto_pipeline.model.frames import DepthFrameSet, DepthMaps, PhotoSet
 from vto_pipeline.model.job import Job
-from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.mesh import PointCloud, TriangleMesh
 from vto_pipeline.model.settings import Config
 from vto_pipeline.scan.canonical import canonical_mesh, drop_small_pieces, drop_vertices
 from vto_pipeline.scan.depth.depth_mask import clean_depth
 from vto_pipeline.scan.library_message import library_message
 from vto_pipeline.scan.photos.consistency import views_on_surface
+from vto_pipeline.scan.photos.coverage import covered_share
 
 GREY = 200
 """Colour of a surface without photos."""
@@ -46,6 +48,19 @@ class FuseConfig(Config):
     min_views: int = Field(2, ge=1, le=100, description="Depth maps that must agree with the surface at a vertex")
     support_voxels: float = Field(1.5, gt=0, le=16, description="Distance within which maps agree, in voxels")
     min_piece: float = Field(0.01, ge=0, le=1, description="Smallest piece kept, as a share of the largest's area")
+
+
+class PhotoFuseConfig(FuseConfig):
+    """Settings of the fusion of photos."""
+
+    min_coverage: float = Field(0.25, ge=0, le=1, description="Least share of the seen region that has depth")
+
+
+SCRAPS = (
+    "plain or glossy things need a pattern, matt spray or even light, and photos 10 to 15 degrees apart; on a "
+    "turntable, cover what does not turn; avoid prints that repeat; a depth camera needs no texture; a lower "
+    "min_coverage accepts the surface as it is"
+)
 
 
 def fuse_depth_maps(
@@ -74,6 +89,32 @@ def fuse_depth_maps(
         return undistorted(read_image(paths[name]), lenses[name])
 
     return _fuse(maps, color_of, config, job)
+
+
+def check_coverage(
+    surface: TriangleMesh, maps: DepthMaps, cloud: PointCloud, config: PhotoFuseConfig, job: Job
+) -> None:
+    """Refuse a surface that covers too little of what the photos see.
+
+    Args:
+        surface: Of these maps.
+        maps: Depth that several photos confirm.
+        cloud: Sparse points in the same frame, which tell what the photos see.
+        config: Settings.
+        job: Receives the share covered and the share of the largest piece.
+
+    Raises:
+        ScanError: too little is covered; the surface is its partial result.
+    """
+    coverage = covered_share(maps, cloud)
+    _, area = component_areas(surface)
+    largest = float(area.max() / area.sum())
+    job.measure(coverage=round(coverage, 3), largest_piece_share=round(largest, 3))
+    if coverage < config.min_coverage:
+        covered = f"the surface covers {100 * coverage:.1f} % of what the photos see between their matched points"
+        pieces = f"the largest of its {len(area)} pieces is {100 * largest:.0f} % of it"
+        problem = f"{covered}; at least {100 * config.min_coverage:.0f} % is needed; {pieces}"
+        raise ScanError(problem, hint=SCRAPS, partial={"surface": surface})
 
 
 def fuse_depth_frames(frames: DepthFrameSet, world_from_cam: FloatArray, config: FuseConfig, job: Job) -> TriangleMesh:

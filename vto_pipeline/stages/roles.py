@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from vto_pipeline.errors import ComputationError
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.settings import Config
 from vto_pipeline.pipeline.stage import Stage
@@ -36,7 +37,12 @@ def for_each_role(
             return {key.removeprefix(prefix): value for key, value in inputs.items()}
 
         def bound(inputs: Mapping[str, Any], settings: Any, job: Job) -> dict[str, Any]:
-            return {prefix + key: value for key, value in run(bare(inputs), settings, job).items()}
+            try:
+                made = run(bare(inputs), settings, job)
+            except ComputationError as error:
+                error.partial = {prefix + key: value for key, value in error.partial.items()}
+                raise
+            return {prefix + key: value for key, value in made.items()}
 
         return Stage(
             name=f"{role}.{name}",

@@ -8,7 +8,7 @@ from typing import Any
 from vto_pipeline.model.job import Job
 from vto_pipeline.pipeline.stage import Stage
 from vto_pipeline.scan.depth.odometry import OdometryConfig, estimate_trajectory
-from vto_pipeline.scan.fuse import FuseConfig, fuse_depth_frames, fuse_depth_maps
+from vto_pipeline.scan.fuse import FuseConfig, PhotoFuseConfig, check_coverage, fuse_depth_frames, fuse_depth_maps
 from vto_pipeline.scan.photos.scale import ScaleConfig, apply_board
 from vto_pipeline.scan.photos.sfm import SfmConfig, estimate_cameras
 from vto_pipeline.scan.photos.stereo import StereoConfig, estimate_depth_maps
@@ -33,9 +33,11 @@ def _stereo(inputs: Inputs, settings: StereoConfig, job: Job) -> Outputs:
     return {"depth_maps": estimate_depth_maps(inputs["photos"], inputs["cameras"], inputs["points"], settings, job)}
 
 
-def _fuse_photos(inputs: Inputs, settings: FuseConfig, job: Job) -> Outputs:
-    photos, cameras, maps = (inputs[name] for name in ("photos", "cameras", "depth_maps"))
-    return {"surface": fuse_depth_maps(photos, cameras, maps, settings, job)}
+def _fuse_photos(inputs: Inputs, settings: PhotoFuseConfig, job: Job) -> Outputs:
+    photos, cameras, points, maps = (inputs[name] for name in ("photos", "cameras", "points", "depth_maps"))
+    surface = fuse_depth_maps(photos, cameras, maps, settings, job)
+    check_coverage(surface, maps, points, settings, job)
+    return {"surface": surface}
 
 
 def _odometry(inputs: Inputs, settings: OdometryConfig, job: Job) -> Outputs:
@@ -81,10 +83,10 @@ STAGES: tuple[Stage, ...] = (
     *for_each_role(
         "fuse_photos",
         "one surface from the depth maps",
-        needs=("photos", "cameras", "depth_maps"),
+        needs=("photos", "cameras", "points", "depth_maps"),
         makes=("surface",),
         run=_fuse_photos,
-        settings=FuseConfig,
+        settings=PhotoFuseConfig,
         uses=("open3d",),
     ),
     *for_each_role(
