@@ -15,6 +15,7 @@ from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.scan.photos import scale as scale_module
 from vto_pipeline.scan.photos.board import board_corners
+from vto_pipeline.scan.photos.features import SURE, FeatureConfig, detect, match
 from vto_pipeline.scan.photos.mapping import _copy
 from vto_pipeline.scan.photos.scale import ScaleConfig, apply_board
 from vto_pipeline.scan.photos.sfm import SfmConfig, estimate_cameras
@@ -121,6 +122,24 @@ def test_plain_photos_are_refused_with_counts_and_advice(tmp_path):
     with pytest.raises(ScanError, match="grey1.png 0") as caught:
         estimate_cameras(grey_photos(tmp_path, 4, (90, 130)), SfmConfig(), Job())
     assert "texture" in caught.value.hint
+
+
+@pytest.mark.parametrize(("turned", "kept"), [(0.0, 1), (0.15, 1), (0.5, 0)])
+def test_a_pair_whose_matches_contradict_each_other_is_dropped(tmp_path, turned, kept):
+    """A right part of the second picture is turned by 25 degrees, which no geometry explains together with the rest."""
+    noise = np.random.default_rng(6).normal(size=(480, 640)).astype(np.float32)
+    first = np.clip(128 + 40 * sum(cv2.GaussianBlur(noise, (0, 0), s) * s for s in (2, 5)), 0, 255).astype(np.uint8)
+    second = first.copy()
+    if turned:
+        left = round(640 * (1 - turned))
+        turn = cv2.getRotationMatrix2D(((640 + left) / 2, 240), 25, 1.0)
+        second[:, left:] = cv2.warpAffine(first, turn, (640, 480), flags=cv2.INTER_CUBIC)[:, left:]
+    paths = tmp_path / "a.png", tmp_path / "b.png"
+    for path, picture in zip(paths, (first, second), strict=True):
+        cv2.imwrite(str(path), picture)
+    found, database = PhotoSet(paths, (None, None)), tmp_path / "x.db"
+    assert min(detect(found, database, SURE, FeatureConfig())) > 500
+    assert match(found, database, FeatureConfig(), 0) == kept
 
 
 @pytest.mark.parametrize("copies", [2, 5])

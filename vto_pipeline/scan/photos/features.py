@@ -22,6 +22,11 @@ SURE, FAINT = 0.0067, 0.0015
 """Contrast a SIFT feature must have: the usual, and for plain fabric."""
 
 
+MIN_AGREEMENT = 0.7
+"""Share of two photos' matches that one geometry must explain. A match has passed the test of ratios and of both
+directions: where a third of them contradict, a print repeats, or the background did not turn with the object."""
+
+
 class FeatureConfig(Config):
     """Settings of features and matching."""
 
@@ -81,7 +86,7 @@ def detect(photos: PhotoSet, database: Path, contrast: float, config: FeatureCon
 
 
 def match(photos: PhotoSet, database: Path, config: FeatureConfig, seed: int) -> int:
-    """Match features between photos and keep what a two-view geometry explains.
+    """Match features between photos, and keep the pairs that one two-view geometry explains.
 
     Args:
         photos: Photos.
@@ -112,9 +117,15 @@ def match(photos: PhotoSet, database: Path, config: FeatureConfig, seed: int) ->
     except COLMAP_ERRORS as error:
         problem = f"the features of {len(photos.paths)} photos could not be matched: {library_message(error)}"
         raise ScanError(problem, where=str(photos.paths[0].parent)) from error
+    kept = 0
     with pycolmap.Database.open(str(database)) as opened:
-        _, inliers = opened.read_two_view_geometry_num_inliers()
-        return sum(count > 0 for count in inliers)
+        for pair, inliers in zip(*opened.read_two_view_geometry_num_inliers(), strict=True):
+            first, second = pycolmap.pair_id_to_image_pair(pair)
+            if inliers >= MIN_AGREEMENT * len(opened.read_matches(first, second)):
+                kept += inliers > 0
+            else:
+                opened.delete_two_view_geometry(first, second)
+    return kept
 
 
 def _groups(photos: PhotoSet) -> dict[tuple[int, int, Intrinsics | None], list[str]]:
