@@ -62,13 +62,18 @@ def guess_motion(source: ImageFeatures, target: ImageFeatures, camera: Intrinsic
     pairs = [(m.queryIdx, m.trainIdx) for m, second in matches if m.distance < RATIO * second.distance]
     a, b = np.array(pairs, dtype=int).reshape(-1, 2).T
     near = source.points[a, 2] > 0
-    if near.sum() < MIN_MATCHES:
+    matched = np.hstack([source.points[a], target.pixels[b]])[near]
+    matched = matched[np.sort(np.unique(matched, axis=0, return_index=True)[1])]  # SIFT: a row for each orientation
+    if len(matched) < MIN_MATCHES:
         return None
     cv2.setRNGSeed(0)
-    found, turn, shift, inliers = cv2.solvePnPRansac(
-        source.points[a][near], target.pixels[b][near], camera.matrix, None,
-        iterationsCount=500, reprojectionError=MAX_ERROR_PX, confidence=0.999, flags=cv2.SOLVEPNP_SQPNP,
-    )  # fmt: skip
+    try:
+        found, turn, shift, inliers = cv2.solvePnPRansac(
+            matched[:, :3], matched[:, 3:], camera.matrix, None,
+            iterationsCount=500, reprojectionError=MAX_ERROR_PX, confidence=0.999, flags=cv2.SOLVEPNP_SQPNP,
+        )  # fmt: skip
+    except cv2.error:  # a sample without extent, which SQPnP refuses: the features are all but in one place
+        return None
     if not found or inliers is None or len(inliers) < MIN_MATCHES:
         return None
     transform = np.eye(4)
