@@ -30,7 +30,7 @@ def main() -> None:
     """Read the command line, drape, and print a row each."""
     parser = argparse.ArgumentParser(prog="python -m vto_pipeline.bench.drape.garments", description=__doc__)
     parser.add_argument("--garment", type=Path, nargs="+", required=True, help="mesh files")
-    parser.add_argument("--body", type=Path, required=True, help="mesh file of who wears them")
+    parser.add_argument("--body", type=Path, required=True, help="mesh file of the wearer")
     parser.add_argument(
         "--limit", type=float, default=150.0, metavar="SECONDS", help="of a run, after which it is ended"
     )
