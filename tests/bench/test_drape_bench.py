@@ -186,3 +186,11 @@ def test_a_garment_that_is_refused_is_a_row(tmp_path):
     row = drape_row(tmp_path / "none.obj", tmp_path / "none.obj", tmp_path / "run", [], 60.0)
     assert row["outcome"] == "refused"
     assert "none.obj" in (tmp_path / "run.log").read_text()
+
+
+def test_what_a_failed_run_reached_is_in_its_row(tmp_path):
+    (tmp_path / "run" / "out" / "partial").mkdir(parents=True)
+    audit = '{"body_intersections": 5, "self_intersections": 2, "settled": false, "residual": 3.0, "max_stretch": 8.2}'
+    (tmp_path / "run" / "out" / "partial" / "audit.json").write_text(audit)
+    row = drape_row(Path("none.obj"), Path("nobody.obj"), tmp_path / "run", [], 0.01)
+    assert (row["crossings"], row["settled"], row["residual"], row["stretch"]) == (7, False, 3.0, 8.2)

@@ -84,7 +84,7 @@ def drape_row(garment: Path, body: Path, folder: Path, settings: Sequence[str], 
 
 def _figures(folder: Path) -> dict[str, Value]:
     """Return the figures of a run's files, as far as it has got."""
-    audit = _document(folder / "out" / "audit.json")
+    audit = _document(folder / "out" / "audit.json") or _document(folder / "out" / "partial" / "audit.json")
     kinds = ("body_intersections", "self_intersections")
     found = [audit[kind] for kind in kinds if kind in audit]
     stages = {stage["name"]: stage for stage in _document(folder / "run.json").get("stages", [])}
