@@ -1,6 +1,7 @@
 """The drape bench: its judgements on made-up drapes, its cases, and the picture of all kinds of rows."""
 
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from numpy.testing import assert_allclose
 from vto_pipeline.bench.bench import Row, Watch
 from vto_pipeline.bench.drape import budget, left_out, refinement, scanned
 from vto_pipeline.bench.drape.case import DrapeCase
+from vto_pipeline.bench.drape.garments import drape_row
 from vto_pipeline.bench.measures import distance_mm, edge_strain
 from vto_pipeline.bench.plots.drape_plot import draw_drape
 from vto_pipeline.bench.samples.garments.wearer import wearer
@@ -170,3 +172,25 @@ def test_quick_rows_name_what_they_measure(monkeypatch):
     found = [row for part in parts for row in part(True, Watch())]
     assert len({row.key for row in found}) == len(found) > 6
     assert all(200 < row.vertices < 3000 for row in found)
+
+
+def test_a_run_that_takes_too_long_is_a_row(tmp_path):
+    row = drape_row(Path("none.obj"), Path("nobody.obj"), tmp_path / "run", [], 0.01)
+    assert row["outcome"] == "unfinished"
+    assert 0.01 <= row["seconds"] < 5.0
+    assert row["crossings"] is row["settled"] is row["vertices"] is None
+
+
+def test_a_garment_that_is_refused_is_a_row(tmp_path):
+    (tmp_path / "none.obj").write_text("")
+    row = drape_row(tmp_path / "none.obj", tmp_path / "none.obj", tmp_path / "run", [], 60.0)
+    assert row["outcome"] == "refused"
+    assert "none.obj" in (tmp_path / "run.log").read_text()
+
+
+def test_what_a_failed_run_reached_is_in_its_row(tmp_path):
+    (tmp_path / "run" / "out" / "partial").mkdir(parents=True)
+    audit = '{"body_intersections": 5, "self_intersections": 2, "settled": false, "residual": 3.0, "max_stretch": 8.2}'
+    (tmp_path / "run" / "out" / "partial" / "audit.json").write_text(audit)
+    row = drape_row(Path("none.obj"), Path("nobody.obj"), tmp_path / "run", [], 0.01)
+    assert (row["crossings"], row["settled"], row["residual"], row["stretch"]) == (7, False, 3.0, 8.2)

@@ -142,3 +142,12 @@ def test_forces_far_above_the_weight_that_no_longer_fall_end_the_wait(monkeypatc
     assert not found.settled
     assert len(found.trace) == (10 if jammed else 30)
     assert ("jammed" in found.not_settled_warning) is jammed
+
+
+def test_cloth_that_is_caught_is_not_waited_for():
+    stepper, start = pressed_springs(1e-3)
+    found = relax_to_rest(stepper, start, SettleLimits(1e-9, 0.01, 3.0, 320), is_caught=lambda positions: True)
+    assert found.caught
+    assert not found.settled
+    assert len(found.trace) == 5  # of 30
+    assert "caught" in found.not_settled_warning

@@ -36,9 +36,7 @@ def ended(monkeypatch, clearings):
         moves, pairs = left.pop(0)
         return (replace(state, positions=state.positions + 0.001) if moves else state), pairs
 
-    monkeypatch.setattr(
-        module, "relax_to_rest", lambda stepper, state, limits, watch: SettlingResult(state, True, 1e-4, 1e-3)
-    )
+    monkeypatch.setattr(module, "relax_to_rest", lambda stepper, state, *given: SettlingResult(state, True, 1e-4, 1e-3))
     monkeypatch.setattr(module, "clear_body_crossings", clear)
     found = Phases(model, rest, fabric(), DrapeConfig(), Job()).settle_and_clear(
         at_rest(mesh.vertices), Ready(), ball(0.3, levels=1), np.inf
@@ -64,3 +62,33 @@ def test_what_the_last_clearing_moved_is_not_at_rest(monkeypatch, pairs):
     assert found.settled is False
     assert found.error == np.inf  # what was predicted was of another place
     assert found.not_settled_warning == "not at rest, error unknown"
+
+
+@pytest.mark.parametrize(("crossings_left", "stretched", "caught"), [(1, 3.0, True), (1, 1.5, False), (0, 3.0, False)])
+def test_what_never_came_free_of_the_body_and_is_stretched_about_it_is_not_waited_for(
+    monkeypatch, crossings_left, stretched, caught
+):
+    """A sheet through the middle of a ball, its edges so many times as long as at rest."""
+    mesh = sheet(12, 12, 0.4, 0.4)
+    middle = mesh.vertices.mean(axis=0)
+    phases = Phases(
+        build_cloth(mesh, RestShape(mesh.vertices), fabric()), RestShape(mesh.vertices), fabric(), DrapeConfig(), Job()
+    )
+    phases.crossings_left = crossings_left
+    cleared = []
+
+    def clear(stepper, state, *given):
+        cleared.append(state)
+        return state, ONE
+
+    monkeypatch.setattr(
+        module,
+        "relax_to_rest",
+        lambda stepper, state, limits, watch, is_caught: SettlingResult(
+            state, True, 1e-4, 1e-3, caught=is_caught(state.positions)
+        ),
+    )
+    monkeypatch.setattr(module, "clear_body_crossings", clear)
+    found = phases.settle_and_clear(at_rest(stretched * (mesh.vertices - middle)), Ready(), ball(0.3, levels=2), np.inf)
+    assert found.caught is caught
+    assert len(cleared) == (0 if caught else 1)

@@ -270,7 +270,7 @@ def test_a_spike_between_the_vertices_is_cleared():
     stepper = Stepper(model, [BodyCollider(body, 0.0, 0.3)], np.full(16, 1e-3), StepConfig(), damping=5.0)
     state = stepper.run(at_rest(mesh.vertices), 0.2)
     assert len(intersecting_faces(TriangleMesh(state.positions, mesh.faces), spiked)) > 0
-    state, pairs = clear_body_crossings(stepper, state, mesh.faces, spiked, 40)
+    state, pairs = clear_body_crossings(stepper, state, mesh.vertices, mesh.faces, spiked, 40)
     assert len(pairs) == 0
     assert len(intersecting_faces(TriangleMesh(state.positions, mesh.faces), spiked)) == 0
     assert 1e-3 < stepper.skin.max() < 0.03
@@ -288,11 +288,32 @@ def test_a_steep_bump_is_cleared_without_stretching_the_cloth_over_it():
     stepper = Stepper(model, [body], np.full(49, 1e-3), StepConfig(), damping=5.0)
     state = stepper.run(at_rest(mesh.vertices), 0.5)
     assert len(intersecting_faces(TriangleMesh(state.positions, mesh.faces), ground)) > 0
-    state, pairs = clear_body_crossings(stepper, state, mesh.faces, ground, 40)
+    state, pairs = clear_body_crossings(stepper, state, mesh.vertices, mesh.faces, ground, 40)
     assert len(pairs) == 0
     ends = edges(mesh)
     was, now = (np.linalg.norm(at[ends[:, 1]] - at[ends[:, 0]], axis=1) for at in (mesh.vertices, state.positions))
     assert (now / was - 1.0).max() < 0.02
+    assert not stepper.loose.any()
+
+
+def test_what_a_thicker_skin_only_stretches_is_left_as_it_was():
+    """Each round makes the sheet through a ball a half longer."""
+    mesh = sheet(12, 12, 0.4, 0.4)
+    mesh = TriangleMesh(mesh.vertices - mesh.vertices.mean(axis=0), mesh.faces)
+
+    class Stretcher:
+        skin, loose, contact_memory = np.full(144, 1e-3), np.zeros(144, np.bool_), "before"
+
+        def run(self, state, seconds):
+            self.contact_memory = "after"
+            return at_rest(1.5 * state.positions)
+
+    stepper, state = Stretcher(), at_rest(mesh.vertices)
+    found, pairs = clear_body_crossings(stepper, state, mesh.vertices, mesh.faces, ball(0.1, levels=2), 30)
+    assert found is state
+    assert len(pairs) > 0
+    assert (stepper.skin == 1e-3).all()
+    assert stepper.contact_memory == "before"
     assert not stepper.loose.any()
 
 

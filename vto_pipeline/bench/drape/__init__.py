@@ -1,4 +1,7 @@
-"""Draping: error against run time, accuracy of its prediction, refinement, rest shapes, and work left out."""
+"""Draping: error against run time, accuracy of its prediction, refinement, rest shapes, and work left out.
+
+`garments` is no part of `vto bench`: it drapes the files that it is given.
+"""
 
 from __future__ import annotations
 

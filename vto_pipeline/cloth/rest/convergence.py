@@ -57,6 +57,7 @@ class SettlingResult:
         residual: Residual force as a share of weight.
         trace: One row for each look.
         jammed: Whether it was stopped since contacts hold forces far above its weight, and they do not fall.
+        caught: Whether it was stopped since it passes through a body that has stretched it beyond what cloth bears.
     """
 
     state: ClothState
@@ -65,6 +66,7 @@ class SettlingResult:
     residual: float = np.inf
     trace: list[TraceRow] = field(default_factory=list)
     jammed: bool = False
+    caught: bool = False
 
     @property
     def error_mm(self) -> float | None:
@@ -81,6 +83,8 @@ class SettlingResult:
 
     @property
     def _jam(self) -> str:
+        if self.caught:
+            return "; cloth passes through the body, caught and stretched, and waiting will not free it"
         return "; cloth is jammed between contacts, and waiting will not free it" if self.jammed else ""
 
 
@@ -89,6 +93,7 @@ def relax_to_rest(
     state: ClothState,
     limits: SettleLimits,
     watch: Callable[[float, float], None] = lambda done, error: None,
+    is_caught: Callable[[FloatArray], bool] = lambda positions: False,
 ) -> SettlingResult:
     """Run until rest; where that depends on the steps, halve them until halving changes no more than the bound.
 
@@ -107,6 +112,7 @@ def relax_to_rest(
         state: Where to begin.
         limits: When to stop.
         watch: Receives the share of time used and the error [m] at each look.
+        is_caught: Whether there is no way on from positions [m], shape (V, 3); asked once the first pull is over.
 
     Raises:
         FallenError: all of it is under the lowest thing that could hold it.
@@ -151,8 +157,9 @@ def relax_to_rest(
         row = TraceRow(seconds, stepper.steps, 1e3 * result.error, result.residual, contacts=stepper.pushing_contacts)
         result.trace.append(row)
         watch(share, result.error)
-        if _is_jammed([one.residual for one in result.trace]):
-            result.jammed = True
+        result.caught = looks >= _JAM_LOOKS and is_caught(after.positions)
+        result.jammed = _is_jammed([one.residual for one in result.trace])
+        if result.caught or result.jammed:
             break
         if brief:
             newton_steps.choose(moved < _STILL, residual)

@@ -149,9 +149,10 @@ class _CoarseToFine:
         settling = phases.settle_and_clear(
             state, stepper, body.final, deadline, (ROUGH,) if level > 0 else (ROUGH, REST)
         )
-        if level > 0 and settling.jammed:
-            weights = f"{settling.residual:.0f} times a vertex's weight"
-            self._leave_out(model, f"too coarse: its layers are jammed, with forces of {weights}")
+        if level > 0 and (settling.jammed or settling.caught):
+            weights = f"with forces of {settling.residual:.0f} times a vertex's weight"
+            what = "it is caught in the body" if settling.caught else "its layers are jammed"
+            self._leave_out(model, f"too coarse: {what}, {weights}")
             return None
         settling.trace = [replace(row, seconds=before + row.seconds, level=level) for row in settling.trace]
         if level > 0:  # what matters in the end warns again

@@ -14,11 +14,13 @@ from vto_pipeline.cloth.dynamics.body_motion import VariableSpeedBody, body_trav
 from vto_pipeline.cloth.dynamics.stepper import Stepper
 from vto_pipeline.cloth.model.build import ClothModel, ClothState, at_rest, without_gravity
 from vto_pipeline.cloth.placement.body_growth import plan_body_growth
-from vto_pipeline.cloth.placement.clear_body import clear_body_crossings
+from vto_pipeline.cloth.placement.clear_body import OVERSTRETCHED, clear_body_crossings, longest_stretch
 from vto_pipeline.cloth.placement.collision_free_start import find_collision_free_start
 from vto_pipeline.cloth.rest.convergence import SettleLimits, SettlingResult, relax_to_rest
 from vto_pipeline.cloth.simulation import default_skin
+from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.cloth import TraceRow
 from vto_pipeline.model.fabric import Fabric
@@ -162,6 +164,14 @@ class Phases:
             deadline=deadline,
             lowest=float(body.vertices[:, 1].min()),
         )
+        faces, rest = self._model.faces, self._rest.positions
+
+        def is_caught(positions: FloatArray) -> bool:
+            """Return whether what never came free of the body is stretched about it as no cloth can be."""
+            if self.crossings_left == 0 or longest_stretch(positions, rest, faces) < OVERSTRETCHED:
+                return False
+            return len(intersecting_faces(TriangleMesh(positions, faces), body)) > 0
+
         stepper.prepare(state.positions)
         if self._config.substeps is None and stepper.has_exact_rest:
             stepper.substeps = min(stepper.substeps, _LONG)
@@ -171,17 +181,21 @@ class Phases:
             error, times = passes[min(turn, len(passes) - 1)]
             enough = replace(limits, error=max(error, limits.error), residual=times * limits.residual)
             spent = time.perf_counter() - began
-            settling = relax_to_rest(stepper, state, enough, watch)
+            settling = relax_to_rest(stepper, state, enough, watch, is_caught)
             trace += [replace(row, seconds=spent + row.seconds) for row in settling.trace]
+            if settling.caught:  # a thicker skin only stretches it more
+                settling.trace = trace
+                break
             self._job.progress(0.9, "clearing the body")
             state, crossing = clear_body_crossings(
-                stepper, settling.state, self._model.faces, body, self._config.clear_rounds
+                stepper, settling.state, rest, faces, body, self._config.clear_rounds
             )
             lies_clear = state is settling.state
             settling.state, settling.trace = state, trace
             if not lies_clear:  # nobody has looked at it since it was moved
                 settling.settled, settling.error = False, np.inf
             if len(crossing) > 0 and self._config.clear_rounds > 0:  # nor will waiting clear it
+                settling.settled, settling.error = False, np.inf
                 break
             if lies_clear and (settling.jammed or turn + 1 >= len(passes)):
                 break
