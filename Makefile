@@ -43,6 +43,7 @@ test-processors: $(READY)  ## Run the tests as other processors compute (an hour
 	.ci/processors $(NAMES)
 
 check-demo: $(READY)  ## Run the sample documents from photos, depth, cloud and mesh to the page, against their bars
+	mkdir -p runs
 	$(BIN)/python -m pytest -m check_demo --basetemp runs/check
 
 check: $(READY)  ## Lint, format, types, layers, spelling, pages
