@@ -148,7 +148,8 @@ def test_another_reader_finds_the_garment_where_it_was_draped(ended: Ended) -> N
     (shown,) = trimesh.load(out / "render_mesh.glb").geometry.values()
     draped = trimesh.load(out / "draped.ply", process=False)
     garment = trimesh.load(out / "garment.ply", process=False)
-    assert len(shown.faces) == min(len(garment.faces), DressConfig().max_triangles)  # as fine as it came
+    fine = min(len(garment.faces), DressConfig().max_triangles)
+    assert fine - 1 <= len(shown.faces) <= fine  # as fine as it came; a collapse takes two triangles out at once
     # the render mesh has folds that the simulation's does not, of some millimetres
     assert_allclose(shown.bounds, draped.bounds, rtol=0, atol=0.02)
 
