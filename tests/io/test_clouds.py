@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from io_shapes import write_e57, write_las, write_pts
 from numpy.testing import assert_allclose, assert_array_equal
 
 from vto_pipeline.errors import FormatError
@@ -85,6 +86,40 @@ def test_xyz_with_colours(tmp_path: Path) -> None:
     assert back.normals is None
 
 
+@pytest.mark.parametrize("suffix", [".las", ".laz"])
+def test_las_with_colours(tmp_path: Path, suffix: str) -> None:
+    truth = cloud()
+    write_las(tmp_path / f"a{suffix}", truth.points, truth.colors)
+    back = read_cloud(tmp_path / f"a{suffix}")
+    assert_allclose(back.points, truth.points, rtol=0, atol=6e-5)  # m: half a step of the file's 0.1 mm
+    assert_array_equal(back.colors, truth.colors)
+
+
+def test_pts_of_several_scans(tmp_path: Path) -> None:
+    truth = cloud()
+    write_pts(tmp_path / "a.pts", truth.points, truth.colors)
+    twice = (tmp_path / "a.pts").read_text() * 2
+    (tmp_path / "b.pts").write_text(twice)
+    back = read_cloud(tmp_path / "b.pts")
+    assert_allclose(back.points, np.tile(truth.points, (2, 1)), rtol=0, atol=1e-8)  # m: nine decimals
+    assert_array_equal(back.colors, np.tile(truth.colors, (2, 1)))
+
+
+def test_e57_scans_lie_in_one_frame_in_metres(tmp_path: Path) -> None:
+    """A scan of 4 m is no scan in decimetres: the format is metric."""
+    truth = cloud()
+    quarter = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    large = 4.0 * truth.points
+    poses = [(np.eye(3), np.zeros(3)), (quarter, np.array([0.3, -0.2, 1.0]))]
+    local = [(large - shift) @ turn for turn, shift in poses]
+    write_e57(tmp_path / "a.e57", local, [truth.colors] * 2, poses)
+    job = Job()
+    back = read_cloud(tmp_path / "a.e57", job=job)
+    assert_allclose(back.points, np.tile(large, (2, 1)), rtol=0, atol=1e-6)  # m: pye57 writes single precision
+    assert_array_equal(back.colors, np.tile(truth.colors, (2, 1)))
+    assert "a.e57: 2 scans" in job.notes
+
+
 def test_unusable_normals_are_left_out_and_told(tmp_path: Path) -> None:
     np.savetxt(tmp_path / "a.xyz", np.hstack([cloud().points, np.zeros((COUNT, 3))]))
     job = Job()
@@ -132,6 +167,12 @@ def test_points_without_a_reading_are_dropped_and_told(tmp_path: Path) -> None:
         ("j.pcd", b"FIELDS x y w\nSIZE 4 4 4\nTYPE F F F\nPOINTS 1\nDATA ascii\n1 2 3\n", "no x, y, z; found x, y, w"),
         ("e.pcd", b"FIELDS x y z\nSIZE 4 4\nTYPE F F F\nPOINTS 1\nDATA ascii\n1 2 3\n", "differ in length"),
         ("f.pcd", b"FIELDS x y z\nSIZE 3 4 4\nTYPE F F F\nPOINTS 1\nDATA ascii\n1 2 3\n", "cannot parse the header"),
+        ("a.pts", b"2\n1 2 3\n", "2 points promised, 1 lines follow"),
+        ("b.pts", b"1 2 3\n4 5 6\n", "begins with the number of its points"),
+        ("c.pts", b"1\n1 2 3 0 256 0 0\n", "a colour is not in 0 to 255"),
+        ("a.las", b"LASF" + bytes(50), "no LASF at its begin"),
+        ("b.las", b"LASF" + bytes(300), "LAS version 0.0"),
+        ("a.e57", b"ASTM-E57" + bytes(2000), "pye57 cannot read it"),
         ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nend_header\n", "there are no vertices"),
     ],
 )

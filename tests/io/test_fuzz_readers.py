@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from io_shapes import DAMAGES, capsule, damages, write_all_formats
+from io_shapes import DAMAGES, capsule, damages, write_all_formats, write_e57, write_las, write_pts
 from PIL import Image
 
 from vto_pipeline.errors import InputError
@@ -84,11 +84,17 @@ def write_others(folder: Path) -> dict[str, Path]:
     for name in ("a.png", "a.jpg", "a.tif"):
         picture.save(files[name], exif=tags)
     Image.fromarray(rng.integers(0, 65536, (30, 40)).astype(np.uint16)).save(files["deep.png"])
+    colors = rng.integers(0, 256, points.shape)
+    for name in ("a.las", "a.laz"):
+        write_las(files[name], points, colors)
+    write_e57(files["a.e57"], [points], [colors])
+    write_pts(files["a.pts"], points, colors)
     return files
 
 
 MESHES = ["ply", "ply_ascii", "obj", "stl", "stl_ascii", "off", "glb"]
-OTHERS = ["a.xyz", "ascii.pcd", "binary.pcd", "compressed.pcd", "a.png", "a.jpg", "a.tif", "deep.png"]
+OTHERS = ["a.xyz", "a.pts", "ascii.pcd", "binary.pcd", "compressed.pcd", "a.las", "a.laz", "a.e57"]
+OTHERS += ["a.png", "a.jpg", "a.tif", "deep.png"]
 
 
 @pytest.mark.parametrize("name", MESHES + OTHERS)

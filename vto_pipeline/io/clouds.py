@@ -11,8 +11,11 @@ from vto_pipeline.errors import FormatError
 from vto_pipeline.io.arrays import Arrays
 from vto_pipeline.io.files import check_file
 from vto_pipeline.io.formats.clean_up import check_sound
+from vto_pipeline.io.formats.e57 import parse_e57
+from vto_pipeline.io.formats.las import parse_las
 from vto_pipeline.io.formats.pcd import parse_pcd
 from vto_pipeline.io.formats.ply import parse_ply
+from vto_pipeline.io.formats.pts import parse_pts
 from vto_pipeline.io.formats.xyz import parse_xyz
 from vto_pipeline.io.lengths import to_metres
 from vto_pipeline.io.sandbox import run_limited
@@ -24,6 +27,10 @@ PARSERS: dict[str, Callable[[str], Arrays]] = {
     ".xyz": parse_xyz,
     ".txt": parse_xyz,
     ".pcd": parse_pcd,
+    ".pts": parse_pts,
+    ".las": parse_las,
+    ".laz": parse_las,
+    ".e57": parse_e57,
 }
 """Suffix -> parser."""
 
@@ -34,8 +41,8 @@ def read_cloud(path: Path, *, unit: str | None = None, job: Job | None = None) -
     """Read a foreign cloud: parsed in a limited child process, checked, scaled to metres.
 
     Args:
-        path: PLY, XYZ or PCD.
-        unit: Unit of length in the file, a key of `units.LENGTH_M`; None: guessed from the size.
+        path: PLY, XYZ, PCD, PTS, LAS, LAZ or E57.
+        unit: Unit of length in the file, a key of `units.LENGTH_M`; None: the format's, else guessed from the size.
         job: Notified of the guessed unit and of every change.
 
     Returns:
@@ -59,7 +66,8 @@ def read_cloud(path: Path, *, unit: str | None = None, job: Job | None = None) -
         if not usable:
             notes.append("ignored the normals, as some are zero or not finite")
         normals = normals / lengths if usable else None
-    points = to_metres(arrays["vertices"], unit, path, job)
+    known = str(arrays["unit"]) if "unit" in arrays else None
+    points = to_metres(arrays["vertices"], unit or known, path, job)
     if job is not None:
         for note in notes:
             job.note(f"{path.name}: {note}")

@@ -1,6 +1,6 @@
 """Mesh and cloud formats, one file each.
 
-obj, off, stl, ply, ply_header, pcd, xyz: the formats (glTF has a folder of its own)
+obj, off, stl, ply, ply_header, pcd, pts, xyz, las, e57: the formats (glTF has a folder of its own)
 polygons: polygons to triangles
 clean_up: a mesh made sound, every change reported
 """
