@@ -101,6 +101,7 @@ def test_a_render_mesh_is_stable_after_its_first_rounding(tmp_path: Path) -> Non
 
 def test_every_kind_has_a_case_or_is_only_given_or_stands_for_a_role() -> None:
     tried = set(VALUES) | {"render_mesh", "avatar", "fitted_avatar", "source_avatar"}  # the avatars in test_bodies.py
+    tried |= {"garment_photos"}  # tests/scan/test_keyframes.py
     rest = {k.name for k in ARTIFACTS if k.filename} - tried
     assert all(name.removeprefix("body_").removeprefix("mannequin_") in _garment_suffixes() for name in rest)
 

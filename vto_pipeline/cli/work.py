@@ -53,15 +53,16 @@ def run_tables(folder: Path, tables: Catalogue) -> Catalogue:
 
 
 def captured_kind(path: Path, session: Session) -> str:
-    """Return the kind of a capture, "photos", "depth", "cloud" or "surface", and print why.
+    """Return the kind of a capture, "photos", "video", "depth", "cloud" or "surface"; print why.
 
     Raises:
         InputError: it is none of these.
     """
     kind, reason = find_kind(path)
-    if kind not in ("photos", "depth", "cloud", "surface"):
+    if kind not in ("photos", "video", "depth", "cloud", "surface"):
         raise InputError(
-            f"this looks like {kind} ({reason}); expected photos, depth frames, a cloud or a mesh", where=str(path)
+            f"this looks like {kind} ({reason}); expected photos, a video, depth frames, a cloud or a mesh",
+            where=str(path),
         )
     session.say(f"{path}: {kind}, because {reason}")
     return kind

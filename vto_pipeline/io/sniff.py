@@ -8,14 +8,14 @@ from pathlib import Path
 from vto_pipeline.errors import InputError
 from vto_pipeline.io import clouds, meshes
 from vto_pipeline.io.bodies import makehuman
-from vto_pipeline.io.captures import images
+from vto_pipeline.io.captures import images, video
 from vto_pipeline.io.documents import load_yaml
 from vto_pipeline.io.files import listed
 from vto_pipeline.io.formats.ply_header import read_header
 
 _WANTED = (
-    "a folder of photos, of depth frames, of front and side pictures, or of MakeHuman; a point cloud, a mesh, a body "
-    "model, a measurements file, or an avatar"
+    "a folder of photos, of depth frames, of front and side pictures, or of MakeHuman; a video, a point cloud, a mesh, "
+    "a body model, a measurements file, or an avatar"
 )
 
 
@@ -26,7 +26,7 @@ def find_kind(path: Path) -> tuple[str, str]:
         path: File or folder.
 
     Returns:
-        "photos", "depth", "cloud", "surface", "silhouettes", "measurements" or "avatar", and the reason.
+        "photos", "video", "depth", "cloud", "surface", "silhouettes", "measurements" or "avatar", and the reason.
 
     Raises:
         InputError: nothing there, or nothing known.
@@ -52,6 +52,8 @@ def _folder(path: Path) -> tuple[str, str] | None:
         return "silhouettes", "it holds front and side pictures and stature.yaml"
     if pictures:
         return "photos", f"it holds {len(pictures)} pictures"
+    if len(listed(path, video.SUFFIXES)) == 1:
+        return "video", "it holds a video"
     return None
 
 
@@ -70,6 +72,8 @@ def _file(path: Path) -> tuple[str, str] | None:
         )
     if suffix == ".ply":
         return _ply(path)
+    if suffix in video.SUFFIXES:
+        return "video", f"{suffix} files hold videos"
     if suffix in clouds.PARSERS:
         return "cloud", f"{suffix} files hold points"
     if suffix in meshes.PARSERS:

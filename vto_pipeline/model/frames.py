@@ -35,6 +35,22 @@ class PhotoSet:
 
 
 @dataclass(frozen=True)
+class Video:
+    """A video taken on a way round an object.
+
+    Args:
+        path: The file.
+        width, height: Of its frames [px].
+        board: ChArUco board lying in the scene, or None.
+    """
+
+    path: Path
+    width: int
+    height: int
+    board: CharucoBoard | None = None
+
+
+@dataclass(frozen=True)
 class CharucoBoard:
     """A printed ChArUco board.
 

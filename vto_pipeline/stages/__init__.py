@@ -12,7 +12,7 @@ from vto_pipeline.pipeline.catalogue import Catalogue
 from vto_pipeline.stages import avatar, cloth, garment, output, scan
 from vto_pipeline.stages.roles import ROLES
 
-_SCANNED = ("photos", "depth", "cloud", "surface")
+_SCANNED = ("photos", "video", "depth", "cloud", "surface")
 
 GIVEN = {
     **{f"{role}.{kind}": f"{role}_{kind}" for role in ROLES for kind in _SCANNED},

@@ -9,6 +9,7 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.pipeline.stage import Stage
 from vto_pipeline.scan.depth.odometry import OdometryConfig, estimate_trajectory
 from vto_pipeline.scan.fuse import FuseConfig, PhotoFuseConfig, check_coverage, fuse_depth_frames, fuse_depth_maps
+from vto_pipeline.scan.keyframes import KeyframesConfig, take_keyframes
 from vto_pipeline.scan.photos.scale import ScaleConfig, apply_board
 from vto_pipeline.scan.photos.sfm import SfmConfig, estimate_cameras
 from vto_pipeline.scan.photos.stereo import StereoConfig, estimate_depth_maps
@@ -17,6 +18,10 @@ from vto_pipeline.stages.roles import for_each_role
 
 Inputs = Mapping[str, Any]
 Outputs = Mapping[str, Any]
+
+
+def _keyframes(inputs: Inputs, settings: KeyframesConfig, job: Job) -> Outputs:
+    return {"photos": take_keyframes(inputs["video"], settings, job)}
 
 
 def _sfm(inputs: Inputs, settings: SfmConfig, job: Job) -> Outputs:
@@ -53,6 +58,15 @@ def _poisson(inputs: Inputs, settings: SurfaceConfig, job: Job) -> Outputs:
 
 
 STAGES: tuple[Stage, ...] = (
+    *for_each_role(
+        "keyframes",
+        "the sharpest frames of a video, evenly along its way",
+        needs=("video",),
+        makes=("photos",),
+        run=_keyframes,
+        settings=KeyframesConfig,
+        uses=("opencv-python-headless",),
+    ),
     *for_each_role(
         "sfm",
         "camera poses of the photos, up to scale (structure from motion)",

@@ -28,7 +28,7 @@ def scan_command(
 ) -> None:
     """Reconstruct a garment, or the surface of a body or mannequin, from INPUT.
 
-    INPUT is a folder of photos, a folder of depth frames, a point cloud, or a mesh; its kind is detected.
+    INPUT is a folder of photos, a video, a folder of depth frames, a point cloud, or a mesh; its kind is detected.
 
     \b
     vto scan photos/ --role garment --mannequin form.ply -o runs/shirt

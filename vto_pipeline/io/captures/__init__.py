@@ -2,5 +2,7 @@
 
 images, exif: pictures, and what EXIF says of the lens
 photos, depth: folders of photos and of depth frames
+video: a video, from which photos are taken
+photo_archive: photos that a stage has made
 cameras: cameras.json, sparse reconstructions, depth maps
 """

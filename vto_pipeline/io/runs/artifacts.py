@@ -14,7 +14,10 @@ from vto_pipeline.io.bodies.makehuman import BASE
 from vto_pipeline.io.captures import cameras
 from vto_pipeline.io.captures.depth import read_depth_frames
 from vto_pipeline.io.captures.images import SUFFIXES
+from vto_pipeline.io.captures.photo_archive import read_photo_archive, write_photo_archive
 from vto_pipeline.io.captures.photos import read_photos
+from vto_pipeline.io.captures.video import SUFFIXES as VIDEO_SUFFIXES
+from vto_pipeline.io.captures.video import read_video
 from vto_pipeline.io.documents import read_json, write_json
 from vto_pipeline.io.fabrics import read_fabric
 from vto_pipeline.io.files import check_file, listed, replacing
@@ -87,9 +90,18 @@ def _role_kinds(role: str, prefix: str) -> tuple[ArtifactKind, ...]:
 
     return (
         _leaf(
-            f"{role}_photos",
-            f"{role}: photos from many sides",
-            read_photos,
+            f"{role}_video",
+            f"{role}: a video taken on a way round it",
+            read_video,
+            receive=_job_by_position(read_video),
+            in_folder=lambda folder: bool(listed(folder, VIDEO_SUFFIXES)),
+        ),
+        made(
+            "photos",
+            "photos.zip",
+            "photos from many sides",
+            read_photo_archive,
+            write_photo_archive,
             receive=_job_by_position(read_photos),
             in_folder=_holds_pictures,
         ),
