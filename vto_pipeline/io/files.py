@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import atexit
 import os
+import tempfile
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -68,6 +70,15 @@ def listed(folder: Path, suffixes: Collection[str]) -> tuple[Path, ...]:
     """The folder's visible files with one of the suffixes, sorted by name."""
     names = sorted(p.name for p in folder.iterdir() if p.suffix.lower() in suffixes and not p.name.startswith("."))
     return tuple(folder / name for name in names)
+
+
+_FOLDERS = ExitStack()
+atexit.register(_FOLDERS.close)
+
+
+def process_folder() -> Path:
+    """Return a new temporary folder that is removed when the process ends."""
+    return Path(_FOLDERS.enter_context(tempfile.TemporaryDirectory(prefix="vto-")))
 
 
 @contextmanager

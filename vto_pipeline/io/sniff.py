@@ -8,7 +8,7 @@ from pathlib import Path
 from vto_pipeline.errors import InputError
 from vto_pipeline.io import clouds, meshes
 from vto_pipeline.io.bodies import makehuman
-from vto_pipeline.io.captures import images, video
+from vto_pipeline.io.captures import images, photos, video
 from vto_pipeline.io.documents import load_yaml
 from vto_pipeline.io.files import listed
 from vto_pipeline.io.formats.ply_header import read_header
@@ -50,7 +50,7 @@ def _folder(path: Path) -> tuple[str, str] | None:
     pictures = listed(path, images.SUFFIXES)
     if {"front", "side"} <= {p.stem.lower() for p in pictures} and (path / "stature.yaml").is_file():
         return "silhouettes", "it holds front and side pictures and stature.yaml"
-    if pictures:
+    if pictures := listed(path, photos.PHOTO_SUFFIXES):
         return "photos", f"it holds {len(pictures)} pictures"
     if len(listed(path, video.SUFFIXES)) == 1:
         return "video", "it holds a video"

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-import atexit
 import json
-import tempfile
 import zipfile
-from contextlib import ExitStack
 from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 
 from vto_pipeline.errors import FormatError
 from vto_pipeline.io.captures.images import SUFFIXES
-from vto_pipeline.io.files import check_file, listed, replacing
+from vto_pipeline.io.files import check_file, listed, process_folder, replacing
 from vto_pipeline.model.frames import CharucoBoard, PhotoSet
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # a real date would change the bytes
 _BOARD = "board.json"
 _FILE_BYTES = 20_000_000_000
-
-_UNPACKED = ExitStack()
-atexit.register(_UNPACKED.close)
 
 
 def write_photo_archive(path: Path, photos: PhotoSet) -> None:
@@ -41,7 +35,7 @@ def read_photo_archive(path: Path) -> PhotoSet:
         InputError: no such file; FormatError: damaged since.
     """
     path = check_file(Path(path), {".zip"}, _FILE_BYTES)
-    folder = Path(_UNPACKED.enter_context(tempfile.TemporaryDirectory(prefix="vto-photos-")))
+    folder = process_folder()
     try:
         with zipfile.ZipFile(path) as archive:
             for name in archive.namelist():

@@ -8,13 +8,17 @@ from pathlib import Path
 from pydantic import Field
 
 from vto_pipeline.errors import ConfigError, InputError
+from vto_pipeline.io.captures import heic
 from vto_pipeline.io.captures.images import SUFFIXES, check_images
 from vto_pipeline.io.documents import check_schema, load_yaml
-from vto_pipeline.io.files import check_folder, listed
+from vto_pipeline.io.files import check_folder, listed, process_folder
 from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.frames import CharucoBoard, PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.settings import Config
+
+PHOTO_SUFFIXES = SUFFIXES | heic.SUFFIXES
+"""What photos may be; COLMAP and OpenCV read those in HEIC as JPEG."""
 
 BOARD = "board.yaml"
 """The file that describes the board in a scene."""
@@ -34,20 +38,23 @@ def read_photos(folder: Path, *, job: Job | None = None) -> PhotoSet:
     """Find the photos of a folder, decode each once in a child process, and read EXIF and board.yaml.
 
     Args:
-        folder: Holds PNG, JPEG or TIFF files, and maybe board.yaml.
+        folder: Holds PNG, JPEG, TIFF or HEIC files, and maybe board.yaml.
         job: Receives how many have a known focal length.
 
     Returns:
         The photos, sorted by name.
 
     Raises:
-        InputError: no folder, fewer than two photos, or a broken one; ConfigError: board.yaml is wrong.
+        InputError: no folder, fewer than two photos, or a broken one; ConfigError: board.yaml is wrong;
+        MissingDependencyError: no library for HEIC.
     """
     folder = check_folder(Path(folder))
-    paths = listed(folder, SUFFIXES)
+    paths = listed(folder, PHOTO_SUFFIXES)
     if len(paths) < 2:
-        problem = f"{len(paths)} photo(s) (PNG, JPEG, TIFF); at least 2 are needed"
-        raise InputError(problem, where=str(folder), hint="is the folder right? HEIC and raw are not supported")
+        problem = f"{len(paths)} photo(s) (PNG, JPEG, TIFF, HEIC); at least 2 are needed"
+        raise InputError(problem, where=str(folder), hint="is the folder right? raw files are not supported")
+    if any(path.suffix.lower() in heic.SUFFIXES for path in paths):
+        paths = heic.copy_as_jpeg(paths, process_folder())
     found = check_images(paths)
     intrinsics = tuple(
         _intrinsics(int(width), int(height), float(focal))

@@ -15,7 +15,7 @@ from vto_pipeline.io.captures import cameras
 from vto_pipeline.io.captures.depth import read_depth_frames
 from vto_pipeline.io.captures.images import SUFFIXES
 from vto_pipeline.io.captures.photo_archive import read_photo_archive, write_photo_archive
-from vto_pipeline.io.captures.photos import read_photos
+from vto_pipeline.io.captures.photos import PHOTO_SUFFIXES, read_photos
 from vto_pipeline.io.captures.video import SUFFIXES as VIDEO_SUFFIXES
 from vto_pipeline.io.captures.video import read_video
 from vto_pipeline.io.documents import read_json, write_json
@@ -52,6 +52,10 @@ def _with_unit(read: Callable[..., Any]) -> Callable[[Any], Any]:
 
 def _holds_pictures(folder: Path) -> bool:
     return bool(listed(folder, SUFFIXES))
+
+
+def _holds_photos(folder: Path) -> bool:
+    return bool(listed(folder, PHOTO_SUFFIXES))
 
 
 def _write_page(path: Path, page: str) -> None:
@@ -103,7 +107,7 @@ def _role_kinds(role: str, prefix: str) -> tuple[ArtifactKind, ...]:
             read_photo_archive,
             write_photo_archive,
             receive=_job_by_position(read_photos),
-            in_folder=_holds_pictures,
+            in_folder=_holds_photos,
         ),
         _leaf(
             f"{role}_depth",
