@@ -1,7 +1,9 @@
 """From photos, depth frames and clouds to a surface in metres.
 
 photos/, depth/: cameras and depth, from each kind of capture
-fuse: one surface from many depth maps
+fuse, level_set: one surface from many depth maps
+depth_views, in_order: maps that are read when they are needed
+object_sphere: what the cameras look at, without the room
 normals, surface: a surface through an unorganised cloud
 upright, similarity: which way is up; one set of points mapped on another
 library_message: what COLMAP, OpenCV and Open3D say when they fail
