@@ -14,7 +14,9 @@ from vto_pipeline.io.captures.depth import read_depth
 from vto_pipeline.io.captures.images import read_image
 from vto_pipeline.model.job import Job
 from vto_pipeline.scan.depth.odometry import OdometryConfig, estimate_trajectory
-from vto_pipeline.scan.depth.rgbd_alignment import align_frames, prepare_frame
+from vto_pipeline.scan.depth.rgbd_alignment import align_frames
+from vto_pipeline.scan.depth.rgbd_frame import prepare_frame
+from vto_pipeline.scan.photos.consistency import rays
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +59,7 @@ def test_alignment_recovers_a_small_motion_exactly_enough(walk):
     frame = prepare_frame(color, depth, frames.intrinsics)
     start = np.eye(4)
     start[:3, :3], start[:3, 3] = Rotation.from_rotvec([0.01, -0.01, 0.005]).as_matrix(), [0.004, -0.006, 0.008]
-    found = align_frames(frame, frame, frames.intrinsics, start, 0.03)
+    found = align_frames(frame, frame, start, 0.03)
     assert_allclose(
         found.target_from_source, np.eye(4), rtol=0, atol=3e-4
     )  # readings are noisier than the smooth normals
@@ -70,10 +72,10 @@ def test_information_is_that_of_the_points_positions(walk):
     frames = walk[0]
     depth = read_depth(frames.depth_paths[0], 1000.0)
     frame = prepare_frame(None, depth, frames.intrinsics)
-    found = align_frames(frame, frame, frames.intrinsics, np.eye(4), 1e-9)
-    inside = (frame.normals != 0).any(-1)
+    found = align_frames(frame, frame, np.eye(4), 1e-9)
+    inside = frame.depth > 0
     inside[-1], inside[:, -1] = False, False
-    points = frame.points[inside]
+    points = (rays(frame.camera.matrix, *frame.depth.shape) * frame.depth[..., None])[inside]
     skew = np.zeros((len(points), 3, 3))
     skew[:, [0, 1, 2], [1, 2, 0]], skew[:, [1, 2, 0], [0, 1, 2]] = -points[:, [2, 0, 1]], points[:, [2, 0, 1]]
     jacobian = np.concatenate([-skew, np.tile(np.eye(3), (len(points), 1, 1))], axis=2)
@@ -106,7 +108,7 @@ def test_jump_to_the_other_side_is_told(walk):
 def test_too_little_overlap_is_refused(walk):
     with pytest.raises(ScanError, match="lost track") as caught:
         estimate_trajectory(few(walk, 0, 5), OdometryConfig(min_overlap=0.95), Job())
-    assert "to 000005.png" in caught.value.where
+    assert caught.value.where == "000005.png to 000000.png"
 
 
 def test_short_path_without_colour_warns_of_drift(scene, walk, tmp_path):

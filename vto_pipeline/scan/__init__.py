@@ -2,7 +2,9 @@
 
 photos/, depth/: cameras and depth, from each kind of capture
 keyframes: photos from a video
-fuse: one surface from many depth maps
+fuse, level_set: one surface from many depth maps
+depth_views, in_order: maps that are read when they are needed
+object_sphere: what the cameras look at, without the room
 normals, surface: a surface through an unorganised cloud
 upright, similarity: which way is up; one set of points mapped on another
 library_message: what COLMAP, OpenCV and Open3D say when they fail

@@ -1,39 +1,48 @@
-"""The path of a depth camera: frame-to-frame tracking, loops closed by a pose graph."""
+"""The path of a depth camera: frames tracked to keyframes, loops closed, all keyframes refined together."""
 
 from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 from pydantic import Field
+from scipy.spatial.transform import Rotation
 
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.frames import DepthFrameSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.settings import Config
+from vto_pipeline.scan.depth.bundle import refine_together
 from vto_pipeline.scan.depth.pose_graph import Edge, disagreement, optimise_poses
-from vto_pipeline.scan.depth.tracker import Tracker
+from vto_pipeline.scan.depth.rgbd_frame import RgbdFrame
+from vto_pipeline.scan.depth.tracker import TrackedFrame, Tracker
+from vto_pipeline.scan.photos.consistency import rays
 from vto_pipeline.scan.upright import upright_from_scan
 
 
 class OdometryConfig(Config):
     """Settings of the tracking."""
 
-    skip: int = Field(3, ge=2, le=30, description="Each frame is also tracked to the one this many later")
-    loop_angle_deg: float = Field(16.0, gt=0, le=90, description="Largest angle between frames that close a loop")
-    loop_gap: int = Field(10, ge=3, le=10_000, description="Least number of frames between the ends of a loop")
+    keyframe_deg: float = Field(5.0, ge=0, le=45, description="A frame turned further than this is a keyframe")
+    keyframe_overlap: float = Field(0.7, ge=0, le=1, description="So is one that shares less with the last")
+    loop_angle_deg: float = Field(16.0, gt=0, le=90, description="Largest angle between keyframes that close a loop")
+    loop_gap: int = Field(10, ge=3, le=10_000, description="Least number of keyframes between the ends of a loop")
     max_loops: int = Field(60, ge=0, le=10_000, description="Loop edges tried, the most similar first")
-    min_overlap: float = Field(0.3, gt=0, le=1, description="Share of a frame's readings that must fit the other's")
-    max_jump_mm: float = Field(30.0, gt=1, le=500, description="Readings further apart than this do not match [mm]")
+    pair_deg: float = Field(45.0, gt=0, le=90, description="Keyframes at up to this angle are refined together")
+    min_overlap: float = Field(0.3, gt=0, le=1, description="Share of a frame's points that must fit the other's")
+    max_jump_mm: float = Field(30.0, gt=1, le=500, description="Points further apart than this do not match [mm]")
 
 
 def estimate_trajectory(frames: DepthFrameSet, config: OdometryConfig, job: Job) -> FloatArray:
     """Estimate the camera pose of each frame.
 
-    Frames are tracked one to the next, to one a few later, and where the path comes back; a robust pose graph (Choi et
-    al. 2015, in Open3D) weighs all of it.
+    Each frame is tracked to the last keyframe, and becomes one when it has moved on. Where the path comes back,
+    keyframes far apart in time are tracked to each other, and a robust pose graph (Choi et al. 2015, in Open3D) closes
+    the loop; then all pairs of keyframes that see the same surface are aligned together. The other frames follow
+    their keyframes. In memory are the keyframes, made smaller, and few frames more.
 
     Args:
         frames: Depth and registered colour, in the order they were taken.
@@ -52,41 +61,90 @@ def estimate_trajectory(frames: DepthFrameSet, config: OdometryConfig, job: Job)
     if not frames.color_paths:
         job.warn("no colour frames: tracking by shape alone drifts on round garments")
     tracker = Tracker(frames, config.min_overlap, config.max_jump_mm / 1000)
-    count = len(frames.depth_paths)
-    poses = np.tile(np.eye(4), (count, 1, 1))
-    edges: list[Edge] = []
-    for i in range(count - 1):
-        steady = np.eye(4) if i == 0 else np.linalg.inv(poses[i]) @ poses[i - 1]
-        edge = tracker.track(i, i + 1, steady)
-        edges.append(edge)
-        poses[i + 1] = poses[i] @ np.linalg.inv(edge.target_from_source)
-        job.progress(0.5 * (i + 1) / count, f"tracking frame {i + 2} of {count}")
-    skips = [(i, i + config.skip) for i in range(count - config.skip)]
-    wanted = skips + _loops(poses, config)
-    loops = 0
-    starts = [np.linalg.inv(poses[j]) @ poses[i] for i, j in wanted]
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        found = pool.map(tracker.try_track, *zip(*wanted, strict=True), starts) if wanted else iter(())
-        for done, extra in enumerate(found):
-            if extra is not None:
-                edges.append(extra)
-                loops += extra.target - extra.source > config.skip
-            job.progress(0.5 + 0.4 * (done + 1) / len(wanted), f"checking pair {done + 1} of {len(wanted)}")
-    poses = optimise_poses(poses, edges, config.max_jump_mm / 3000)
-    residual = np.array([disagreement(poses, edge) for edge in edges])
+    keyframes, edges, owner = _track(tracker, config, job)
+    path = _chained(keyframes, edges)
+    loop_edges = _close_loops(tracker, keyframes, path, config, job)
+    place = {key.index: k for k, key in enumerate(keyframes)}
+    between = [edge for edge in edges if edge.source in place] + loop_edges
+    local = [replace(edge, source=place[edge.source], target=place[edge.target]) for edge in between]
+    if loop_edges:
+        path = optimise_poses(path, local, config.max_jump_mm / 3000)
+    residual = np.array([disagreement(path, edge) for edge in local] or [0.0])
+    surfaces = [key.surface for key in keyframes]
+    bundle = refine_together(surfaces, path, np.radians(config.pair_deg), job)
+    path = bundle.world_from_cam
+    poses = np.stack([path[k] @ relative for k, relative in owner])
+    count = len(poses)
     job.measure(
         frames=count,
-        edges=len(edges),
-        loop_edges=loops,
+        keyframes=len(keyframes),
+        loop_edges=len(loop_edges),
         edge_residual_median_mm=round(1000 * float(np.median(residual)), 3),
         edge_residual_max_mm=round(1000 * float(residual.max()), 3),
+        pairs_refined=bundle.pairs,
+        last_step_mm=round(1000 * bundle.moved, 4),
     )
-    slid = sum(not edge.confirmed for edge in edges[: count - 1])
+    slid = sum(not edge.confirmed for edge in edges)
     if slid and frames.color_paths:
         job.warn(f"{slid} of {count - 1} steps have too few matched features: there, the path relies on shape alone")
-    if loops == 0:
+    if not loop_edges:
         job.warn("the path closes no loop: expect centimetres of drift; end the capture where it began")
-    return upright_from_scan(poses, tracker.sample_points(poses)) @ poses
+    return upright_from_scan(poses, _sample_points(surfaces, path)) @ poses
+
+
+def _track(
+    tracker: Tracker, config: OdometryConfig, job: Job
+) -> tuple[list[TrackedFrame], list[Edge], list[tuple[int, FloatArray]]]:
+    """Keyframes; an edge from each frame but the first to the keyframe before it; of each frame, which keyframe it
+    follows and its pose in that keyframe's camera."""
+    keyframes: list[TrackedFrame] = []
+    edges: list[Edge] = []
+    owner: list[tuple[int, FloatArray]] = []
+    step = np.eye(4)  # of the last frame, in its own camera
+    count = len(tracker.frames.depth_paths)
+    for frame in tracker.read():
+        if not keyframes:
+            keyframes.append(frame)
+            owner.append((0, np.eye(4)))
+            continue
+        before = owner[-1][1]
+        edge = tracker.track(frame, keyframes[-1], before @ step)
+        edges.append(edge)
+        pose = edge.target_from_source
+        step = np.linalg.inv(before) @ pose
+        turned = np.degrees(np.linalg.norm(Rotation.from_matrix(pose[:3, :3]).as_rotvec()))
+        if turned > config.keyframe_deg or edge.overlap < config.keyframe_overlap:
+            keyframes.append(frame)
+            owner.append((len(keyframes) - 1, np.eye(4)))
+        else:
+            owner.append((len(keyframes) - 1, pose))
+        job.progress(0.6 * len(owner) / count, f"tracked frame {len(owner)} of {count}")
+    return keyframes, edges, owner
+
+
+def _chained(keyframes: list[TrackedFrame], edges: list[Edge]) -> FloatArray:
+    """Poses of the keyframes along the path, shape (K, 4, 4)."""
+    motion = {edge.source: edge.target_from_source for edge in edges}
+    poses = [np.eye(4)]
+    for key in keyframes[1:]:
+        poses.append(poses[-1] @ motion[key.index])
+    return np.stack(poses)
+
+
+def _close_loops(
+    tracker: Tracker, keyframes: list[TrackedFrame], path: FloatArray, config: OdometryConfig, job: Job
+) -> list[Edge]:
+    """Edges between keyframes far apart in time with similar views."""
+    wanted = _loops(path, config)
+    starts = [np.linalg.inv(path[j]) @ path[i] for i, j in wanted]
+    found = []
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        ends = [[keyframes[pair[side]] for pair in wanted] for side in (0, 1)]
+        for done, edge in enumerate(pool.map(tracker.try_track, *ends, starts)):
+            if edge is not None:
+                found.append(edge)
+            job.progress(0.6 + 0.1 * (done + 1) / len(wanted), f"checking pair {done + 1} of {len(wanted)}")
+    return found
 
 
 def _loops(poses: FloatArray, config: OdometryConfig) -> list[tuple[int, int]]:
@@ -96,3 +154,12 @@ def _loops(poses: FloatArray, config: OdometryConfig) -> list[tuple[int, int]]:
     limit = np.cos(np.radians(config.loop_angle_deg))
     pairs = [(i, j) for i, j in combinations(range(len(poses)), 2) if j - i >= config.loop_gap and cosine[i, j] > limit]
     return sorted(sorted(pairs, key=lambda pair: -cosine[pair])[: config.max_loops])
+
+
+def _sample_points(surfaces: list[RgbdFrame], poses: FloatArray) -> FloatArray:
+    """A few points of every keyframe in the world, shape (P, 3)."""
+    points = []
+    for frame, pose in zip(surfaces, poses, strict=True):
+        part = (rays(frame.camera.matrix, *frame.depth.shape) * frame.depth[..., None])[::4, ::4]
+        points.append(part[part[..., 2] > 0] @ pose[:3, :3].T + pose[:3, 3])
+    return np.concatenate(points)

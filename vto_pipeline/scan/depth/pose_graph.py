@@ -11,12 +11,21 @@ from vto_pipeline.model.arrays import FloatArray
 
 @dataclass(frozen=True)
 class Edge:
-    """Frame `source` tracked to frame `target`; confirmed when matched features agree on the motion."""
+    """Frame `source` tracked to frame `target`.
+
+    Args:
+        source, target: Which frames.
+        target_from_source: The motion, shape (4, 4).
+        information: Inverse covariance of it up to a common factor, shape (6, 6).
+        overlap: Share of the source's points that fit the target's surface.
+        confirmed: Whether matched features agree on the motion.
+    """
 
     source: int
     target: int
     target_from_source: FloatArray
     information: FloatArray
+    overlap: float
     confirmed: bool
 
 
@@ -38,7 +47,7 @@ def optimise_poses(poses: FloatArray, edges: list[Edge], reach: float) -> FloatA
         graph.nodes.append(registration.PoseGraphNode(pose))
     for e in edges:
         edge = registration.PoseGraphEdge(
-            e.source, e.target, e.target_from_source, e.information, uncertain=e.target - e.source != 1
+            e.source, e.target, e.target_from_source, e.information, uncertain=abs(e.target - e.source) != 1
         )
         graph.edges.append(edge)
     option = registration.GlobalOptimizationOption(

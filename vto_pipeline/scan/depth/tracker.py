@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+
 import numpy as np
 
 from vto_pipeline.errors import ScanError
@@ -12,61 +15,85 @@ from vto_pipeline.model.frames import DepthFrameSet
 from vto_pipeline.scan.depth.depth_mask import clean_depth
 from vto_pipeline.scan.depth.pose_graph import Edge
 from vto_pipeline.scan.depth.pose_guess import ImageFeatures, find_features, guess_motion
-from vto_pipeline.scan.depth.rgbd_alignment import RgbdFrame, align_frames, prepare_frame
+from vto_pipeline.scan.depth.rgbd_alignment import RgbdAlignment, align_frames
+from vto_pipeline.scan.depth.rgbd_frame import RgbdFrame, prepare_frame
+from vto_pipeline.scan.in_order import in_order
 
 MIN_READINGS = 1000
 """Of a frame; with fewer there is nothing to hold on to."""
 
 
+@dataclass(frozen=True)
+class TrackedFrame:
+    """A frame ready to be tracked.
+
+    Args:
+        index: Among the frames.
+        surface: For alignment.
+        features: For a first guess.
+    """
+
+    index: int
+    surface: RgbdFrame
+    features: ImageFeatures
+
+
 class Tracker:
-    """Frames ready to align, and tracking between any two of them."""
+    """Reads frames and tracks one to another.
+
+    Args:
+        frames: Depth and, if there is any, colour.
+        min_overlap: Share of a frame's points that must fit the other's.
+        max_jump: Points further apart than this do not match [m].
+    """
 
     def __init__(self, frames: DepthFrameSet, min_overlap: float, max_jump: float) -> None:
-        """Read and prepare all frames.
+        self.frames, self.min_overlap, self.max_jump = frames, min_overlap, max_jump
 
-        Args:
-            frames: Depth and, if there is any, colour.
-            min_overlap: Share of a frame's readings that must fit the other's.
-            max_jump: Readings further apart than this do not match [m].
+    def read(self) -> Iterator[TrackedFrame]:
+        """Give the frames in order; only a few are in memory at a time.
 
         Raises:
             ScanError: a frame holds next to no readings.
         """
-        self.frames, self.min_overlap, self.max_jump = frames, min_overlap, max_jump
-        self.ready: list[RgbdFrame] = []
-        self.features: list[ImageFeatures] = []
-        for index, path in enumerate(frames.depth_paths):
-            depth = clean_depth(read_depth(path, frames.depth_scale), frames.intrinsics)
-            if np.count_nonzero(depth) < MIN_READINGS:
-                problem = f"{np.count_nonzero(depth)} usable depth readings; at least {MIN_READINGS} are needed"
-                raise ScanError(problem, where=str(path))
-            color = read_image(frames.color_paths[index]) if frames.color_paths else None
-            self.ready.append(prepare_frame(color, depth, frames.intrinsics))
-            self.features.append(find_features(color, depth, frames.intrinsics))
+        return in_order(self.prepare, len(self.frames.depth_paths))
 
-    def track(self, source: int, target: int, steady: FloatArray) -> Edge:
+    def prepare(self, index: int) -> TrackedFrame:
+        """Read one frame.
+
+        Raises:
+            ScanError: it holds next to no readings.
+        """
+        frames = self.frames
+        path, camera = frames.depth_paths[index], frames.intrinsics
+        depth = clean_depth(read_depth(path, frames.depth_scale), camera)
+        if np.count_nonzero(depth) < MIN_READINGS:
+            problem = f"{np.count_nonzero(depth)} usable depth readings; at least {MIN_READINGS} are needed"
+            raise ScanError(problem, where=str(path))
+        color = read_image(frames.color_paths[index]) if frames.color_paths else None
+        return TrackedFrame(index, prepare_frame(color, depth, camera), find_features(color, depth, camera))
+
+    def track(self, source: TrackedFrame, target: TrackedFrame, steady: FloatArray) -> Edge:
         """Track one frame to another: from matched features, or where these are too few from a steady motion.
 
         Raises:
             ScanError: too little of the two frames fits together.
         """
-        camera = self.frames.intrinsics
-        where = f"{self.frames.depth_paths[source].name} to {self.frames.depth_paths[target].name}"
+        paths = self.frames.depth_paths
+        where = f"{paths[source.index].name} to {paths[target.index].name}"
         hint = "move more slowly, keep the object filling the frame, and use textured fabric"
-        guess = guess_motion(self.features[source], self.features[target], camera)
+        guess = guess_motion(source.features, target.features, self.frames.intrinsics)
         try:
-            found = align_frames(
-                self.ready[source], self.ready[target], camera, steady if guess is None else guess, self.max_jump
-            )
+            found = align_frames(source.surface, target.surface, steady if guess is None else guess, self.max_jump)
         except ScanError as e:
             raise ScanError(e.problem, where=where, hint=hint) from None
         if found.overlap < self.min_overlap:
             wanted = f"{100 * self.min_overlap:.0f} % needed"
-            problem = f"lost track: {100 * found.overlap:.0f} % of the readings fit; {wanted}"
+            problem = f"lost track: {100 * found.overlap:.0f} % of the points fit; {wanted}"
             raise ScanError(problem, where=where, hint=hint)
-        return Edge(source, target, found.target_from_source, found.information, guess is not None)
+        return _edge(source, target, found, guess is not None)
 
-    def try_track(self, source: int, target: int, steady: FloatArray) -> Edge | None:
+    def try_track(self, source: TrackedFrame, target: TrackedFrame, steady: FloatArray) -> Edge | None:
         """As `track`, for an edge that may not exist: shape alone would confirm any turn of a round garment."""
         try:
             edge = self.track(source, target, steady)
@@ -74,11 +101,6 @@ class Tracker:
             return None
         return edge if edge.confirmed or not self.frames.color_paths else None
 
-    def sample_points(self, poses: FloatArray) -> FloatArray:
-        """A few points of every frame in the world, shape (P, 3)."""
-        points = []
-        for frame, pose in zip(self.ready, poses, strict=True):
-            part = frame.points[::8, ::8]
-            local = part[part[..., 2] > 0]
-            points.append(local @ pose[:3, :3].T + pose[:3, 3])
-        return np.concatenate(points)
+
+def _edge(source: TrackedFrame, target: TrackedFrame, found: RgbdAlignment, confirmed: bool) -> Edge:
+    return Edge(source.index, target.index, found.target_from_source, found.information, found.overlap, confirmed)

@@ -7,6 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.frames import DepthMaps
 
 
@@ -72,9 +73,12 @@ def agreeing_views(maps: DepthMaps, index: int, others: list[int], tolerance: fl
     return np.asarray(np.where(depth > 0, votes, 0))
 
 
-def views_on_surface(points: FloatArray, maps: DepthMaps, distance: float) -> NDArray[np.int32]:
-    """Count the depth maps that lie within a distance [m] of each point (P, 3), along the line of sight."""
-    return np.asarray(_count(points, *_stacked(maps, list(range(len(maps.names)))), distance, 0.0))
+def views_on_surface(
+    points: FloatArray, depth: NDArray[np.float32], camera: Intrinsics, world_from_cam: FloatArray, distance: float
+) -> NDArray[np.int32]:
+    """1 for each point (P, 3) that a depth map (H, W) lies within a distance [m] of, along the line of sight, or 0."""
+    inverse = np.linalg.inv(world_from_cam)[None]
+    return np.asarray(_count(points, depth[None], camera.matrix[None], inverse, distance, 0.0))
 
 
 def _stacked(maps: DepthMaps, chosen: list[int]) -> tuple[NDArray[np.float32], FloatArray, FloatArray]:
