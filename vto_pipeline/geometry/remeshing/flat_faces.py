@@ -27,6 +27,7 @@ _FLAT = 1e-9  # of the mean area: faces of less have no directions
 _ALIKE = 1e-6  # m: corners no farther apart are one
 _GAP = 0.02  # of an edge, outside its panel: it reaches across a dart
 _LONGER, _LONGEST = 1.5, 4.0  # times as in space: a side asks for a seam; even folds that are cut short are no more
+_LOOKS = 7  # along a side
 _FAR = 100.0  # m between panels that are looked at side by side
 
 
@@ -72,15 +73,15 @@ def carry_flat_faces(source: TriangleMesh, laid: FloatArray, mesh: TriangleMesh)
     panel = panel_of_faces(source, laid)
     own = panel[below.face].reshape(-1, 3)
     into = np.where(own[:, 1] == own[:, 2], own[:, 1], own[:, 0])
-    found, whole = place.reshape(-1, 3, 2), (own == into[:, None]).all(axis=1)
-    beyond = own != into[:, None]
-    beyond[whole] = _across_own_seam(found[whole], corners[whole])
-    found, known = _unfolded(found, beyond, own, into, middle[:, 0], _seams(source, laid, panel))
+    place, beyond = place.reshape(-1, 3, 2), own != into[:, None]
+    whole, leaves = ~beyond.any(axis=1), np.zeros(len(own), np.bool_)
+    leaves[whole] = _leaves_panel(place[whole], into[whole], laid, panel)
+    beyond[whole] = _across_own_seam(place[whole], corners[whole], leaves[whole])
+    found, known = _unfolded(place, beyond, own, into, middle[:, 0], _seams(source, laid, panel))
+    known &= ~leaves | (found != place).any(axis=(1, 2))
     centre = found.mean(axis=1, keepdims=True)
     found = centre + (found - centre) / (1.0 - _INSET)
     lost = ~known | (_sides(found) > _LONGEST * _sides(corners)).any(axis=1)
-    within = ~beyond.any(axis=1)
-    lost[within] |= _leaves_panel(found[within], into[within], laid, panel)
     found[lost] = _measured(surface, to_plane, laid, base, corners[lost])
     return found
 
@@ -135,17 +136,18 @@ def _seams(mesh: TriangleMesh, laid: FloatArray, panel: NDArray[np.int64]) -> _S
     return _Seams(np.column_stack([panel[one // 3], panel[two // 3]]), middle, flat[one], flat[two])
 
 
-def _across_own_seam(place: FloatArray, corners: FloatArray) -> NDArray[np.bool_]:
-    """Return which corners of faces of one panel lie beyond a seam with that panel itself, as a sleeve's, shape (G, 3).
+def _across_own_seam(place: FloatArray, corners: FloatArray, leaves: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which corners of faces of one panel may lie beyond a seam with that panel itself, as a sleeve's, (G, 3).
 
     Args:
         place: In the plane [m], shape (G, 3, 2).
         corners: In space [m], shape (G, 3, 3).
+        leaves: Which faces have a side outside their panel, shape (G,).
     """
     longer = _sides(place) / np.maximum(_sides(corners), _ALIKE)
     alone = (longer.argmin(axis=1) + 2) % 3  # opposite the side that is like itself
     found = np.zeros(longer.shape, np.bool_)
-    found[np.arange(len(found)), alone] = longer.max(axis=1, initial=0.0) > _LONGER
+    found[np.arange(len(found)), alone] = leaves | (longer.max(axis=1, initial=0.0) > _LONGER)
     return found
 
 
@@ -207,9 +209,10 @@ def _leaves_panel(
 
     corners = apart(laid, panel).reshape(-1, 3)
     flat = SurfaceDistance(TriangleMesh(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3)))
-    sides = 0.5 * (found + np.roll(found, -1, axis=1))
-    off = flat.nearest(apart(sides, into).reshape(-1, 3)).distance.reshape(-1, 3)
-    return np.asarray((off > _GAP * _sides(found)).any(axis=1))
+    shares = np.linspace(0.0, 1.0, _LOOKS + 2)[1:-1, None]
+    sides = (found[:, :, None] + shares * (np.roll(found, -1, axis=1) - found)[:, :, None]).reshape(len(found), -1, 2)
+    off = flat.nearest(apart(sides, into).reshape(-1, 3)).distance.reshape(-1, 3, _LOOKS)
+    return np.asarray((off.max(axis=2, initial=0.0) > _GAP * _sides(found)).any(axis=1))
 
 
 def _measured(
