@@ -37,11 +37,12 @@ def rolled(curvature):
 
 def strip(moment=MOMENT):
     """A strip with elastic bending and friction."""
-    found, _ = solid_hinges(hinges(STRIP), STRIP.vertices)
+    rest = RestShape(STRIP.vertices)
+    found = solid_hinges(STRIP, rest)
     fabric = Fabric("strip", 0.2, 3e-4, 1e3, 1e3, 100, 0, RIGIDITY, RIGIDITY, 2 * moment, 0.3)
-    elastic = bend(hinges(STRIP), STRIP.vertices, None, fabric)
+    elastic = bend(STRIP, rest, fabric)
     stiffness = moment / SLIP * found.length**2 / found.area
-    friction = bend_friction(found.vertices, STRIP.vertices, None, stiffness, moment * found.length)
+    friction = bend_friction(found, rest, stiffness, moment * found.length)
     return with_own_sliders(model_of((elastic, friction), np.ones(len(STRIP.vertices))))
 
 
@@ -121,8 +122,8 @@ def test_a_slip_moves_no_force():
 def test_shear_runs_through_its_loop():
     mesh, shear, loss, slipped = sheet(2, 2, 0.1, 0.1), 100.0, 4.0, 0.01
     fabric = Fabric("square", 0.2, 3e-4, 1e3, 1e3, shear, 0, 0, 0, 0, 0.3)
-    friction = strain_friction(mesh.faces, mesh.vertices, slipped, (0.0, 0.0, 0.5 * loss))
-    model = with_own_sliders(model_of((stretch(mesh.faces, mesh.vertices, fabric), friction), np.ones(4)))
+    friction = strain_friction(mesh.faces, RestShape(mesh.vertices), slipped, (0.0, 0.0, 0.5 * loss))
+    model = with_own_sliders(model_of((stretch(mesh.faces, RestShape(mesh.vertices), fabric), friction), np.ones(4)))
 
     def sheared(angle):
         return mesh.vertices @ np.array([[np.cos(angle), np.sin(angle), 0], [0, 1, 0], [0, 0, 1]])

@@ -265,10 +265,10 @@ def test_losses_of_a_fabric_become_sliders():
 def test_slivers_are_left_out():
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.5, 0, 0.0]])
     mesh = TriangleMesh(points, [[0, 1, 2], [0, 3, 1]])
-    assert len(stretch(mesh.faces, points, fabric()).vertices) == 1
+    assert len(stretch(mesh.faces, RestShape(points), fabric()).vertices) == 1
 
 
 def test_an_impossible_fabric_is_refused():
     mesh = sheet(3, 3, 1, 1)
     with pytest.raises(InputError, match="not a stable material"):
-        stretch(mesh.faces, mesh.vertices, fabric(stretch=100, weft=2000, poisson=0.5))
+        stretch(mesh.faces, RestShape(mesh.vertices), fabric(stretch=100, weft=2000, poisson=0.5))

@@ -11,6 +11,7 @@ from vto_pipeline.cloth.constraints.bending.shape_operator import shape_operator
 from vto_pipeline.cloth.constraints.sweep import add_forces, linearised
 from vto_pipeline.errors import InputError
 from vto_pipeline.model.fabric import Fabric
+from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.mesh import TriangleMesh
 
 ORTHOTROPIC = Fabric("f", 0.2, 3e-4, 900, 500, 100, 0.3, 1e-3, 5e-4, 0, 0.3)
@@ -31,7 +32,7 @@ def inner(data):
 )
 def test_curvature_of_a_quadratic_surface_is_exact(warp, weft, twist):
     mesh = flat()
-    data = shape_operator(mesh, mesh.vertices, False, ORTHOTROPIC)
+    data = shape_operator(mesh, RestShape(mesh.vertices), ORTHOTROPIC)
     x, y, _ = mesh.vertices.T
     small = 1e-6
     bent = mesh.vertices.copy()
@@ -44,7 +45,7 @@ def test_curvature_of_a_quadratic_surface_is_exact(warp, weft, twist):
 
 def test_a_uniform_moment_pulls_on_no_inner_vertex():
     mesh = flat()
-    data = shape_operator(mesh, mesh.vertices, False, fabric(bending=1e-3))
+    data = shape_operator(mesh, RestShape(mesh.vertices), fabric(bending=1e-3))
     x, y, _ = mesh.vertices.T
     bent = mesh.vertices.copy()
     bent[:, 2] = 1e-6 * (0.5 * x**2 - 0.2 * y**2 + 0.3 * x * y)
@@ -59,7 +60,7 @@ def test_a_uniform_moment_pulls_on_no_inner_vertex():
 def test_energy_of_a_cylinder(around, along):
     radius, height = 0.3, 1.2
     mesh = tube(radius, height, around, along)
-    data = shape_operator(mesh, mesh.vertices, False, fabric(bending=2e-3))
+    data = shape_operator(mesh, RestShape(mesh.vertices), fabric(bending=2e-3))
     whole = 0.5 * 2e-3 / radius**2 * 2 * np.pi * radius * height
     energy = add_forces(mesh.vertices, (data,), np.zeros_like(mesh.vertices))
     assert_allclose(energy / whole, 1.0, rtol=0, atol=10.0 / around**2)  # chord against arc
@@ -67,7 +68,7 @@ def test_energy_of_a_cylinder(around, along):
 
 def test_force_is_minus_the_slope_of_the_energy():
     mesh = flat(0.1)
-    data = shape_operator(mesh, mesh.vertices, False, ORTHOTROPIC, poisson=0.2)
+    data = shape_operator(mesh, RestShape(mesh.vertices), ORTHOTROPIC, poisson=0.2)
     x = mesh.vertices + np.random.default_rng(0).normal(0, 0.02, mesh.vertices.shape)
 
     def energy(at):
@@ -87,8 +88,8 @@ def test_force_is_minus_the_slope_of_the_energy():
 def test_rigid_motion_costs_nothing_and_rest_curvature_is_kept():
     mesh = tube(0.2, 0.4, 20, 12)
     turn = Rotation.from_rotvec([0.3, -1.1, 2.0]).as_matrix()
-    kept = shape_operator(mesh, mesh.vertices, True, fabric(bending=1e-3))
-    plain = shape_operator(mesh, mesh.vertices, False, fabric(bending=1e-3))
+    kept = shape_operator(mesh, RestShape(mesh.vertices, rest_angles=True), fabric(bending=1e-3))
+    plain = shape_operator(mesh, RestShape(mesh.vertices), fabric(bending=1e-3))
     moved = mesh.vertices @ turn.T + 0.5
     nothing = np.zeros_like(moved)
     assert_allclose(add_forces(moved, (kept,), nothing.copy()), 0.0, rtol=0, atol=1e-20)  # rounding
@@ -98,11 +99,11 @@ def test_rigid_motion_costs_nothing_and_rest_curvature_is_kept():
 def test_held_triangles_do_not_bend():
     mesh = flat()
     held = np.flatnonzero(mesh.vertices[:, 0] < 0.2)
-    some = shape_operator(mesh, mesh.vertices, False, fabric(bending=1e-3), held=held)
+    some = shape_operator(mesh, RestShape(mesh.vertices), fabric(bending=1e-3), held=held)
     assert len(some.vertices) == (~np.isin(mesh.faces, held).all(axis=1)).sum()
 
 
 def test_an_impossible_material_is_refused():
     mesh = flat(0.1)
     with pytest.raises(InputError, match="Poisson's ratio of bending is 1.0"):
-        shape_operator(mesh, mesh.vertices, False, fabric(bending=1e-3), poisson=1.0)
+        shape_operator(mesh, RestShape(mesh.vertices), fabric(bending=1e-3), poisson=1.0)

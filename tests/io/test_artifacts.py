@@ -50,7 +50,7 @@ VALUES: dict[str, Any] = {
         Opening(np.array([5, 6, 7, 4], np.int32), 1 / 3, POINTS[2], POINTS[3]),
     ),
     "sim_mesh": MESH,
-    "rest_shape": RestShape(POINTS, True, "gravity_removed"),
+    "rest_shape": RestShape(POINTS, True, "gravity_removed", panels=np.random.default_rng(5).normal(size=(7, 3, 2))),
     "measurements": Measurements({"stature": 1.7, "hip_girth": 2 / 3}, {}, "female"),
     "landmarks": {"crown": POINTS[0], "crotch": POINTS[1]},
     "collider": MovingBody(np.stack([POINTS, POINTS + 0.1]), FACES),

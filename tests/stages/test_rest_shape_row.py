@@ -9,7 +9,12 @@ ROW = next(stage for stage in CATALOGUE.stages if stage.name == "rest_shape")
 
 
 def test_as_scanned_another_fabric_re_uses_it():
-    assert ROW.extras(RestShapeConfig()) == ()
+    assert ROW.extras(RestShapeConfig(mode="as_scanned")) == ()
+
+
+@pytest.mark.parametrize("mode", ["auto", "panels"])
+def test_panels_come_from_the_file_whatever_the_fabric(mode):
+    assert ROW.extras(RestShapeConfig(mode=mode)) == ("garment_mesh",)
 
 
 @pytest.mark.parametrize("mode", ["gravity_removed", "inverse"])

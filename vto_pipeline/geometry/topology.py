@@ -34,6 +34,19 @@ def edge_face_counts(mesh: TriangleMesh) -> tuple[IntArray, IntArray]:
     return found, np.bincount(edge_of_half, minlength=len(found)).astype(np.int32)
 
 
+def laid_edge_lengths(mesh: TriangleMesh, corners: FloatArray) -> FloatArray:
+    """Return the length of each of `edges(mesh)` where its faces have these corners, shape (E,).
+
+    Args:
+        mesh: Its triangles.
+        corners: Of each face for itself [m], shape (F, 3, D); an edge is as long as its faces have it on average.
+    """
+    found, edge_of_half = _unique_edges(mesh)
+    sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).reshape(-1)
+    total = np.bincount(edge_of_half, sides, len(found))
+    return np.asarray(total / np.bincount(edge_of_half, minlength=len(found)))
+
+
 def edge_faces(mesh: TriangleMesh) -> IntArray:
     """Return the faces beside each of `edges(mesh)`, shape (E, 2); -1 beyond a boundary.
 
@@ -99,15 +112,26 @@ def hinges(mesh: TriangleMesh) -> IntArray:
     Raises:
         InputError: an edge with more than two faces, or badly oriented neighbours.
     """
+    corner = mesh.faces.reshape(-1)
+    one, other = corners_from(hinge_halves(mesh)).transpose(1, 2, 0)
+    return np.stack([corner[one[0]], corner[one[1]], corner[one[2]], corner[other[2]]], axis=1).astype(np.int32)
+
+
+def hinge_halves(mesh: TriangleMesh) -> IntArray:
+    """Return the two half-edges of each of `hinges(mesh)`, shape (H, 2).
+
+    Raises:
+        InputError: an edge with more than two faces, or badly oriented neighbours.
+    """
     opposite = opposite_half_edges(mesh)
     half = np.flatnonzero(opposite > np.arange(len(opposite)))
-    corner = mesh.faces.reshape(-1)
+    return np.column_stack([half, opposite[half]]).astype(np.int32)
 
-    def apex(h: NDArray[np.int64]) -> IntArray:
-        return corner[3 * (h // 3) + (h + 2) % 3]
 
-    start_end = half_edges(mesh)[half]
-    return np.column_stack([start_end, apex(half), apex(opposite[half].astype(np.int64))]).astype(np.int32)
+def corners_from(half: IntArray) -> IntArray:
+    """Return the corners (0 to 3F) of the faces of half-edges, from its start on: start, end, apex, shape (..., 3)."""
+    first = 3 * (half // 3)
+    return np.stack([half, first + (half + 1) % 3, first + (half + 2) % 3], axis=-1)
 
 
 def face_components(mesh: TriangleMesh) -> tuple[int, IntArray]:

@@ -79,7 +79,7 @@ def read_mesh(path: Path, *, unit: str | None = None, job: Job | None = None) ->
         ):  # OBJ counts nothing, so that a cut between two lines leaves no trace
             job.warn(f"{path.name}: {count - len(vertices)} vertices belong to no face: is the file truncated?")
     try:
-        return TriangleMesh(vertices, arrays["faces"], arrays.get("colors"))
+        return TriangleMesh(vertices, arrays["faces"], arrays.get("colors"), arrays.get("texture"))
     except InputError as e:
         raise FormatError(e.problem, where=str(path), hint=e.hint) from None
 

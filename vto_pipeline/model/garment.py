@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vto_pipeline.errors import InputError
 from vto_pipeline.model.arrays import FloatArray, IntArray, freeze
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -51,17 +52,21 @@ class RestShape:
     """The shape of the cloth without forces.
 
     Args:
-        positions: Rest positions of the simulation mesh [m], shape (V, 3). Edge lengths and areas are taken from them.
+        positions: Positions of the simulation mesh [m], shape (V, 3). Edge lengths and areas are taken from them unless
+            there are panels; then they only say where the garment lay when it was given, smooth and clear of itself.
         rest_angles: Dihedral rest angles are those of `positions` where True, else flat.
-        mode: How it was found: "as_scanned", "gravity_removed", "inverse".
+        mode: How it was found: "as_scanned", "gravity_removed", "inverse", "panels".
         regraded: Whether it was made anew in proportion to another body, so that a drape tells how the garment would
             look in that size, not whether it fits.
+        panels: Corners of each face in the plane [m], v along the warp, shape (F, 3, 2); each face for itself, so that
+            a vertex on a seam lies in two panels. None: `positions` are the shape.
     """
 
     positions: FloatArray
     rest_angles: bool = False
     mode: str = "as_scanned"
     regraded: bool = False
+    panels: FloatArray | None = None
 
     @property
     def worn_as(self) -> str:
@@ -70,6 +75,23 @@ class RestShape:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "positions", freeze("rest positions", self.positions, (None, 3), "f8"))
+        if self.panels is not None:
+            object.__setattr__(self, "panels", freeze("panels", self.panels, (None, 3, 2), "f8"))
+
+    def corners(self, faces: IntArray) -> FloatArray:
+        """Return the corners of each face at rest [m], shape (F, 3, 3): lengths, areas and yarns are taken from them.
+
+        Args:
+            faces: Those of the garment's mesh, all of them and in their order, shape (F, 3).
+
+        Raises:
+            InputError: as many panels as faces are needed.
+        """
+        if self.panels is None:
+            return np.asarray(self.positions[faces])
+        if len(self.panels) != len(faces):
+            raise InputError(f"rest shape has panels of {len(self.panels)} faces, the mesh {len(faces)}")
+        return np.concatenate([self.panels, np.zeros((len(faces), 3, 1))], axis=2)
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,8 @@ class TriangleMesh:
         vertices: Positions [m], shape (V, 3).
         faces: Vertex indices, counter-clockwise seen from outside, shape (F, 3); at least one.
         colors: sRGB, shape (V, 3), or None.
+        texture: Texture coordinates of each face's corners, v up, in whatever unit, shape (F, 3, 2), or None. What
+            makes another mesh of this one does without them.
 
     Raises:
         InputError: wrong shape, not finite, no face, or an index out of range.
@@ -24,6 +26,7 @@ class TriangleMesh:
     vertices: FloatArray
     faces: IntArray
     colors: ByteArray | None = None
+    texture: FloatArray | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vertices", freeze("vertices", self.vertices, (None, 3), "f8"))
@@ -36,6 +39,9 @@ class TriangleMesh:
             raise InputError(f"face index {low if low < 0 else high} is outside 0..{count - 1}")
         if self.colors is not None:
             object.__setattr__(self, "colors", freeze("colors", self.colors, (count, 3), "u1"))
+        if self.texture is not None:
+            shape = (len(self.faces), 3, 2)
+            object.__setattr__(self, "texture", freeze("texture coordinates", self.texture, shape, "f8"))
 
 
 @dataclass(frozen=True)

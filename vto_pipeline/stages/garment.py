@@ -61,12 +61,14 @@ def _simulation_mesh(inputs: Inputs, settings: SimulationMeshConfig, job: Job) -
 
 def _rest_shape(inputs: Inputs, settings: RestShapeConfig, job: Job) -> Outputs:
     body, fabric = inputs.get("mannequin_surface"), inputs.get("fabric")
-    return {"rest_shape": rest_shape(inputs["sim_mesh"], settings, job, body, fabric)}
+    given = inputs.get("garment_mesh")
+    return {"rest_shape": rest_shape(inputs["sim_mesh"], settings, job, body, fabric, given)}
 
 
-def _without_body(settings: RestShapeConfig) -> tuple[str, ...]:
-    """Inputs that the rest shape ignores when taken as scanned, so that another fabric reuses it."""
-    return ("mannequin_surface", "fabric") if settings.mode == "as_scanned" else ()
+def _idle(settings: RestShapeConfig) -> tuple[str, ...]:
+    """Inputs that the rest shape ignores in a mode, so that another fabric reuses it."""
+    idle = () if settings.mode in ("gravity_removed", "inverse") else ("mannequin_surface", "fabric")
+    return idle if settings.mode in ("auto", "panels") else (*idle, "garment_mesh")
 
 
 STAGES: tuple[Stage, ...] = (
@@ -121,8 +123,8 @@ STAGES: tuple[Stage, ...] = (
         name="rest_shape",
         about="the shape of the cloth without forces",
         needs=("sim_mesh",),
-        optional=("mannequin_surface", "fabric"),
-        idle=_without_body,
+        optional=("garment_mesh", "mannequin_surface", "fabric"),
+        idle=_idle,
         makes=("rest_shape",),
         run=_rest_shape,
         settings=RestShapeConfig,

@@ -11,6 +11,7 @@ from vto_pipeline.assess.fit import FitConfig, assess_fit
 from vto_pipeline.avatar.measuring.avatar_measurements import fit_levels
 from vto_pipeline.avatar.template.regions import trunk_vertices
 from vto_pipeline.cloth.judge.worn import vertex_maps
+from vto_pipeline.cloth.rest_shape.edge_length_embedding import lengths_in_space
 from vto_pipeline.geometry.topology import face_area_vectors
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -35,7 +36,7 @@ def _assess(inputs: Inputs, settings: FitConfig, job: Job) -> Outputs:
         job.leave_out("ease at chest, waist and hip", "a plain mesh has no landmarks; fit an avatar to it")
     report, maps = assess_fit(
         inputs["draped"],
-        inputs["worn_rest"].positions,
+        lengths_in_space(inputs["worn_rest"], inputs["draped"]),
         body,
         {} if avatar is None else fit_levels(avatar),
         inputs["fabric"],

@@ -16,7 +16,7 @@ from vto_pipeline.cloth.judge.gap import gaps_within
 from vto_pipeline.cloth.judge.residual import ElasticEnergies, judged_residual
 from vto_pipeline.cloth.judge.strain import gradients, principal_strains, rest_triangles, warp_weft_strains
 from vto_pipeline.geometry.signed_distance import SurfaceDistance, SurfacePoints
-from vto_pipeline.geometry.topology import edges
+from vto_pipeline.geometry.topology import laid_edge_lengths
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import RestShape
@@ -67,8 +67,8 @@ def audit(
         judged_residual, over vertices that the cloth itself cannot bear, and judged_residual_left_out, how many it
         left out: held, without mass, or so near to other cloth that this may bear them.
     """
-    pairs = edges(mesh)
-    length, natural = _lengths(mesh.vertices, pairs), _lengths(rest.positions, pairs)
+    laid = rest.corners(mesh.faces)
+    length, natural = laid_edge_lengths(mesh, mesh.vertices[mesh.faces]), laid_edge_lengths(mesh, laid)
     stretch = np.abs(length[natural > 0] / natural[natural > 0] - 1.0)
     nearest = None if body is None else SurfaceDistance(body).signed(mesh.vertices)
     crossing = self_crossings(mesh)
@@ -86,7 +86,7 @@ def audit(
         "rms_stretch": float(np.sqrt(np.mean(stretch**2))),
         "max_stretch": float(stretch.max()),
         **_strains(mesh, rest),
-        "area_change": float(_area(mesh.vertices, mesh) / _area(rest.positions, mesh) - 1.0),
+        "area_change": float(_area(mesh.vertices[mesh.faces]) / _area(laid) - 1.0),
         "energy_j": energy,
         "residual": residual,
     }
@@ -126,7 +126,7 @@ def _against_body(mesh: TriangleMesh, body: TriangleMesh | None, nearest: Surfac
 
 
 def _strains(mesh: TriangleMesh, rest: RestShape) -> dict[str, object]:
-    laid = rest_triangles(rest.positions, mesh.faces)
+    laid = rest_triangles(rest.corners(mesh.faces))
     gradient = gradients(mesh.vertices, mesh.faces, laid)
     share = laid.area / laid.area.sum()
     found: dict[str, object] = {}
@@ -144,11 +144,6 @@ def spread_places(mesh: TriangleMesh, faces: NDArray[np.int32]) -> list[list[flo
     return [[float(x) for x in middle] for middle in mesh.vertices[mesh.faces[chosen]].mean(axis=1)]
 
 
-def _lengths(positions: FloatArray, pairs: np.ndarray) -> FloatArray:
-    return np.linalg.norm(positions[pairs[:, 1]] - positions[pairs[:, 0]], axis=1)
-
-
-def _area(positions: FloatArray, mesh: TriangleMesh) -> float:
-    corners = positions[mesh.faces]
+def _area(corners: FloatArray) -> float:
     double = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     return float(0.5 * np.linalg.norm(double, axis=1).sum())

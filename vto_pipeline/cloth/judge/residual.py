@@ -14,7 +14,7 @@ from vto_pipeline.cloth.judge.flanks import flanks
 from vto_pipeline.cloth.judge.strain import RestTriangles, gradients, rest_triangles, warp_weft_strains
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.geometry.signed_distance import SurfacePoints
-from vto_pipeline.geometry.topology import hinges
+from vto_pipeline.geometry.topology import hinge_halves, hinges
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import RestShape
@@ -44,16 +44,16 @@ class ElasticEnergies:
     """
 
     def __init__(self, mesh: TriangleMesh, rest: RestShape, fabric: Fabric) -> None:
-        x = rest.positions
-        self._rest: RestTriangles = rest_triangles(x, mesh.faces)
+        laid = rest.corners(mesh.faces)
+        self._rest: RestTriangles = rest_triangles(laid)
         self._faces = mesh.faces[self._rest.solid]
-        self._weight = self._rest.area * np.minimum(1.0, _slenderness(x, self._faces) / _SLIVER)
+        self._weight = self._rest.area * np.minimum(1.0, _slenderness(laid[self._rest.solid]) / _SLIVER)
         self._stiffness = _plane_stiffness(fabric)
-        self._hinges, self._rigidity = _bending(x, hinges(mesh), fabric)
-        self._angles = _angles(x[self._hinges]) if rest.rest_angles else np.zeros(len(self._hinges))
+        self._hinges, self._rigidity = _bending(mesh, laid, fabric)
+        self._angles = _angles(rest.positions[self._hinges]) if rest.rest_angles else np.zeros(len(self._hinges))
         area = np.zeros(len(mesh.faces))
         area[self._rest.solid] = self._rest.area
-        self.mass = np.bincount(mesh.faces.ravel(), np.repeat(fabric.areal_density * area / 3.0, 3), len(x))
+        self.mass = np.bincount(mesh.faces.ravel(), np.repeat(fabric.areal_density * area / 3.0, 3), len(mesh.vertices))
         self._step = _STEP * float(np.median(np.sqrt(2.0 * self._rest.area)))
 
     def energy(self, positions: FloatArray) -> float:
@@ -141,18 +141,25 @@ def _plane_stiffness(fabric: Fabric) -> FloatArray:
     return stiffness
 
 
-def _bending(rest: FloatArray, found: NDArray[np.int32], fabric: Fabric) -> tuple[NDArray[np.int32], FloatArray]:
-    """Return the hinges that bend, shape (H, 4), and B l²/A of each [N·m], shape (H,)."""
-    one, two = found[:, [0, 1, 2]], found[:, [1, 0, 3]]
-    solid = np.minimum(_slenderness(rest, one), _slenderness(rest, two)) > _SLIVER
+def _bending(mesh: TriangleMesh, laid: FloatArray, fabric: Fabric) -> tuple[NDArray[np.int32], FloatArray]:
+    """Return the hinges that bend, shape (H, 4), and B l²/A of each [N·m], shape (H,); laid flat, shape (F, 3, 3)."""
+    found, half = hinges(mesh), hinge_halves(mesh)
+    one, two = (_turned(laid, half[:, k]) for k in (0, 1))
+    solid = np.minimum(_slenderness(one), _slenderness(two)) > _SLIVER
     found, one, two = found[solid], one[solid], two[solid]
-    edge = rest[found[:, 1]] - rest[found[:, 0]]
-    laid = rest_triangles(rest, one)
-    warp = np.linalg.inv(laid.inverse)[:, 0]  # of the two edges that meet in the third corner
-    along = (warp[:, 1] - warp[:, 0]) ** 2 / np.sum(edge**2, axis=1)
-    area = laid.area + rest_triangles(rest, two).area
+    first = rest_triangles(one)
+    warp = np.linalg.inv(first.inverse)[:, 0]  # of the two edges that meet in the third corner
+    along = (warp[:, 1] - warp[:, 0]) ** 2 / np.sum((one[:, 1] - one[:, 0]) ** 2, axis=1)
+    area = first.area + rest_triangles(two).area
     rigidity = fabric.bending_warp * (1.0 - along) + fabric.bending_weft * along
-    return found, rigidity * np.sum(edge**2, axis=1) / area
+    length_sq = 0.5 * sum(np.sum((corners[:, 1] - corners[:, 0]) ** 2, axis=1) for corners in (one, two))
+    return found, rigidity * length_sq / area
+
+
+def _turned(corners: FloatArray, half: NDArray[np.int32]) -> FloatArray:
+    """Return the faces of these half-edges (N,) from that edge on, shape (N, 3, 3)."""
+    face, first = np.divmod(half, 3)
+    return np.asarray(corners[face[:, None], (first[:, None] + np.arange(3)) % 3])
 
 
 def _angles(corners: FloatArray) -> FloatArray:
@@ -164,9 +171,8 @@ def _angles(corners: FloatArray) -> FloatArray:
     return np.arctan2(np.sum(np.cross(one, two) * edge, axis=1), np.sum(one * two, axis=1))
 
 
-def _slenderness(rest: FloatArray, faces: NDArray[np.int32]) -> FloatArray:
-    corners = rest[faces]
+def _slenderness(corners: FloatArray) -> FloatArray:
     sides = np.roll(corners, -1, axis=1) - corners
     longest_sq = np.sum(sides**2, axis=2).max(axis=1, initial=0.0)
     double_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    return np.divide(double_area, longest_sq, out=np.zeros(len(faces)), where=longest_sq > 0.0)
+    return np.divide(double_area, longest_sq, out=np.zeros(len(corners)), where=longest_sq > 0.0)

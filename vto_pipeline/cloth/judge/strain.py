@@ -13,7 +13,7 @@ _FLAT = 1e-12  # of the largest: a triangle of less area at rest carries nothing
 
 
 class RestTriangles(NamedTuple):
-    """Triangles laid flat along their threads: warp is the vertical of the rest shape, or the front where it lies flat.
+    """Triangles laid flat along their threads: warp is the vertical at rest, or the front where a triangle lies flat.
 
     Args:
         solid: Which triangles have an area at rest, shape (F,), bool.
@@ -26,9 +26,9 @@ class RestTriangles(NamedTuple):
     inverse: FloatArray
 
 
-def rest_triangles(rest: FloatArray, faces: IntArray) -> RestTriangles:
-    """Return the triangles of a rest shape, positions [m] of shape (V, 3), faces of shape (F, 3)."""
-    one, two = _edges(rest, faces)
+def rest_triangles(corners: FloatArray) -> RestTriangles:
+    """Return the triangles of a rest shape, from their corners at rest [m], shape (F, 3, 3)."""
+    one, two = _edges(corners)
     normal = np.cross(one, two)
     double_area = np.linalg.norm(normal, axis=1)
     solid = double_area > _FLAT * double_area.max(initial=0.0)
@@ -45,7 +45,7 @@ def rest_triangles(rest: FloatArray, faces: IntArray) -> RestTriangles:
 
 def gradients(positions: FloatArray, faces: IntArray, rest: RestTriangles) -> FloatArray:
     """Return the deformation gradient of each solid triangle, columns warp and weft, shape (T, 3, 2)."""
-    one, two = _edges(positions, faces[rest.solid])
+    one, two = _edges(positions[faces[rest.solid]])
     return np.asarray(np.stack([one, two], axis=2) @ rest.inverse)
 
 
@@ -61,6 +61,5 @@ def principal_strains(gradient: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.svd(gradient, compute_uv=False)) - 1.0
 
 
-def _edges(positions: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArray]:
-    last = positions[faces[:, 2]]
-    return positions[faces[:, 0]] - last, positions[faces[:, 1]] - last
+def _edges(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
+    return corners[:, 0] - corners[:, 2], corners[:, 1] - corners[:, 2]

@@ -22,7 +22,7 @@ def warn_if_too_small(draped: TriangleMesh, rest: RestShape, limit: float, job: 
     Returns:
         stretch_limit, over_limit_share (of the area), too_small.
     """
-    laid = rest_triangles(rest.positions, draped.faces)
+    laid = rest_triangles(rest.corners(draped.faces))
     strain = principal_strains(gradients(draped.vertices, draped.faces, laid)).max(axis=1)
     over = strain > limit
     share = float(laid.area[over].sum() / laid.area.sum())

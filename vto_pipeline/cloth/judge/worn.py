@@ -33,7 +33,7 @@ def vertex_maps(mesh: TriangleMesh, rest: RestShape, body: TriangleMesh, fabric:
         (V,); strains are means over a vertex's triangles by their area at rest.
     """
     count = len(mesh.vertices)
-    laid = rest_triangles(rest.positions, mesh.faces)
+    laid = rest_triangles(rest.corners(mesh.faces))
     corners = mesh.faces[laid.solid]
     strains = warp_weft_strains(gradients(mesh.vertices, mesh.faces, laid))
     area = np.bincount(corners.ravel(), np.repeat(laid.area, 3), count)

@@ -98,14 +98,13 @@ def build_cloth(
         InputError: rest shape and mesh differ in size, a pinned vertex does not exist, no triangle has an area, an
             edge has more than two faces, or the fabric is not a stable material.
     """
-    positions = rest.positions
     count = len(mesh.vertices)
-    if len(positions) != count:
-        raise InputError(f"rest shape has {len(positions)} vertices, the mesh {count}")
+    if len(rest.positions) != count:
+        raise InputError(f"rest shape has {len(rest.positions)} vertices, the mesh {count}")
     held = np.asarray(pinned, dtype=np.int64)
     if held.size and not (held.min() >= 0 and held.max() < count):
         raise InputError(f"pinned vertex {held.min() if held.min() < 0 else held.max()} is outside 0..{count - 1}")
-    corners = positions[mesh.faces]
+    corners = rest.corners(mesh.faces)
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     if not area.sum() > 0.0:
         raise InputError("no triangle of the rest shape has an area", hint="is the garment collapsed to a line?")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from vto_pipeline.cloth.constraints.bending.bend_friction import bend_friction
-from vto_pipeline.cloth.constraints.bending.hinge import bend, hinge_angles, solid_hinges
+from vto_pipeline.cloth.constraints.bending.hinge import bend, solid_hinges
 from vto_pipeline.cloth.constraints.bending.isometric import isometric_bend
 from vto_pipeline.cloth.constraints.bending.shape_operator import shape_operator
 from vto_pipeline.cloth.constraints.mass_spring import bending_springs, membrane_springs
@@ -21,7 +21,6 @@ from vto_pipeline.cloth.constraints.membrane.strain_friction import strain_frict
 from vto_pipeline.cloth.constraints.membrane.strain_limit import strain_limit
 from vto_pipeline.cloth.constraints.membrane.stretch import stretch
 from vto_pipeline.errors import ConfigError
-from vto_pipeline.geometry.topology import hinges
 from vto_pipeline.model.fabric import Fabric, StretchCurve
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.job import Job
@@ -112,8 +111,6 @@ def _bending(
         return
     if materials.bending == "isometric" and rest.rest_angles:
         raise ConfigError("isometric bending needs a flat rest shape", hint="set bending: hinge, or rest_angles: false")
-    found, positions = hinges(mesh), rest.positions
-    angles = hinge_angles(positions, found) if rest.rest_angles else None
     plastic = 0.0 if materials.yield_curvature is None else 1.0 - materials.hardening
     lasting = replace(
         fabric,
@@ -121,23 +118,22 @@ def _bending(
         bending_weft=(1.0 - plastic) * fabric.bending_weft,
     )
     if materials.bending == "hinge":
-        yield bend(found, positions, angles, lasting, damping)
+        yield bend(mesh, rest, lasting, damping)
     elif materials.bending == "shape_operator":
-        yield shape_operator(mesh, positions, rest.rest_angles, lasting, held=held, damping=damping)
+        yield shape_operator(mesh, rest, lasting, held=held, damping=damping)
     elif materials.bending == "isometric":
-        yield isometric_bend(found, positions, lasting, damping)
+        yield isometric_bend(mesh, rest, lasting, damping)
     else:
-        yield bending_springs(found, positions, angles, lasting, damping)
-    solid, kept = solid_hinges(found, positions)
-    angles = None if angles is None else angles[kept]
+        yield bending_springs(mesh, rest, lasting, damping)
+    solid = solid_hinges(mesh, rest)
     if materials.yield_curvature is not None:
         stiffness = plastic * solid.stiffness(fabric)
         limit = stiffness * materials.yield_curvature * solid.area / solid.length
-        yield bend_friction(solid.vertices, positions, angles, stiffness, limit)
+        yield bend_friction(solid, rest, stiffness, limit)
     if materials.hysteresis and fabric.bending_hysteresis > 0.0:
         moment = 0.5 * fabric.bending_hysteresis  # per width, to either side
         stiffness = moment / materials.slip_curvature * solid.length**2 / solid.area
-        yield bend_friction(solid.vertices, positions, angles, stiffness, moment * solid.length)
+        yield bend_friction(solid, rest, stiffness, moment * solid.length)
     elif materials.hysteresis:
         job.leave_out("friction of bending", "the fabric has no bending hysteresis")
 
@@ -145,27 +141,27 @@ def _bending(
 def _membrane(
     mesh: TriangleMesh, rest: RestShape, fabric: Fabric, materials: Materials, damping: float, job: Job
 ) -> Iterator[Any]:
-    faces, positions = mesh.faces, rest.positions
+    faces = mesh.faces
     if materials.membrane == "threads":
-        yield stretch(faces, positions, fabric, damping)
+        yield stretch(faces, rest, fabric, damping)
     elif materials.membrane == "green":
-        yield green(faces, positions, fabric, damping)
+        yield green(faces, rest, fabric, damping)
     elif materials.membrane == "springs":
-        yield membrane_springs(faces, hinges(mesh), positions, fabric, damping)
+        yield membrane_springs(mesh, rest, fabric, damping)
     else:
         warp = _curve(fabric.curve_warp, fabric.stretch_warp, "warp", job)
         weft = _curve(fabric.curve_weft, fabric.stretch_weft, "weft", job)
-        yield curve(faces, positions, warp, weft, fabric.shear, damping)
+        yield curve(faces, rest, warp, weft, fabric.shear, damping)
     if materials.strain_limit is None:
         job.leave_out("strain limits", "none is set")
     else:
         limits = (materials.strain_limit, materials.strain_limit, np.inf)
         stiffness = materials.beyond_limit * np.array([fabric.stretch_warp, fabric.stretch_weft, fabric.shear])
-        yield strain_limit(faces, positions, limits, 1.0 / stiffness, damping)
+        yield strain_limit(faces, rest, limits, 1.0 / stiffness, damping)
     if materials.hysteresis and max(fabric.stretch_hysteresis, fabric.shear_hysteresis) > 0.0:
         # a loop as wide as the loss has the slider's force to either side
         forces = 0.5 * np.array([fabric.stretch_hysteresis, fabric.stretch_hysteresis, fabric.shear_hysteresis])
-        yield strain_friction(faces, positions, materials.slip_strain, forces)
+        yield strain_friction(faces, rest, materials.slip_strain, forces)
     elif materials.hysteresis:
         job.leave_out("friction of stretch and shear", "the fabric has no hysteresis in its plane")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -54,7 +55,7 @@ def combine_garments(layers: Sequence[Layer], materials: Materials) -> CombinedC
     models = []
     for layer, span in zip(layers, own, strict=True):
         mesh = TriangleMesh(positions, layer.garment.mesh.faces + np.int32(span.start))
-        shape = RestShape(rest, layer.garment.rest.rest_angles)
+        shape = replace(layer.garment.rest, positions=rest)
         models.append(build_cloth(mesh, shape, layer.fabric, materials=materials, job=Job()))
     faces = np.vstack([model.faces for model in models])
 

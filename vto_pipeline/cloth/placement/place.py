@@ -139,7 +139,9 @@ def place_garment(garment: Garment, body: TriangleMesh, config: PlaceConfig, job
     """
     placed = find_placement(garment.mesh, body, config, job)
     mesh = TriangleMesh(placed.start_positions(garment.mesh.vertices), garment.mesh.faces, garment.mesh.colors)
-    return Garment(mesh, replace(garment.rest, positions=placed.rest_positions(garment.rest.positions)))
+    rest = garment.rest
+    panels = None if rest.panels is None else placed.scale * rest.panels
+    return Garment(mesh, replace(rest, positions=placed.rest_positions(rest.positions), panels=panels))
 
 
 def _best_orientation(

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from vto_pipeline.cloth.placement.transfer import transfer_deformation
 from vto_pipeline.errors import ConfigError
+from vto_pipeline.geometry.remeshing.flat_faces import stretch_flat_faces
 from vto_pipeline.geometry.topology import edges
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.garment import Garment, RestShape
@@ -56,4 +57,5 @@ def worn_rest(garment: Garment, body: MovingBody, config: GradeConfig, job: Job)
         f"regraded: rest lengths changed by {change[1]:+.1%} (median), most by {change[0]:+.1%} to {change[2]:+.1%}"
     )
     job.measure(mode=config.mode, length_change_median_share=float(change[1]))
-    return RestShape(positions, garment.rest.rest_angles, garment.rest.mode, regraded=True)
+    panels = None if garment.rest.panels is None else stretch_flat_faces(garment.rest.panels, rest, positions)
+    return RestShape(positions, garment.rest.rest_angles, garment.rest.mode, regraded=True, panels=panels)

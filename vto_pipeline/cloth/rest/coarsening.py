@@ -9,6 +9,7 @@ import numpy as np
 
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.binding import Binding, apply, bind
+from vto_pipeline.geometry.remeshing.flat_faces import carry_flat_faces
 from vto_pipeline.geometry.remeshing.remesh import RemeshConfig, remesh
 from vto_pipeline.geometry.topology import face_area_vectors
 from vto_pipeline.model.arrays import FloatArray
@@ -40,7 +41,8 @@ def coarsen(fine: Garment, vertices: int) -> CoarseGarment:
     """Return a garment with about this many vertices.
 
     It is remeshed at rest, where it is smooth and clear of itself, onto the rest surface of the fine one; so both have
-    the same lengths, but for chords across bends. Where the fine one is now is read off at the same places of it.
+    the same lengths, but for chords across bends, and the same panels. Where the fine one is now is read off at the
+    same places of it.
 
     Args:
         fine: The garment.
@@ -56,5 +58,7 @@ def coarsen(fine: Garment, vertices: int) -> CoarseGarment:
         raise InputError(f"edges would be {1e3 * edge:.3g} mm")
     coarse = remesh(laid, RemeshConfig(edge_mm=1e3 * edge, iterations=_ROUNDS), Job())
     now = apply(bind(coarse, laid), fine.mesh.vertices)
-    garment = Garment(TriangleMesh(now, coarse.faces), replace(fine.rest, positions=coarse.vertices))
+    panels = None if fine.rest.panels is None else carry_flat_faces(laid, fine.rest.panels, coarse)
+    rest = replace(fine.rest, positions=coarse.vertices, panels=panels)
+    garment = Garment(TriangleMesh(now, coarse.faces), rest)
     return CoarseGarment(garment, bind(laid, coarse))

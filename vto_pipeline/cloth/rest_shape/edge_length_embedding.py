@@ -8,13 +8,29 @@ from __future__ import annotations
 
 import numpy as np
 
+from vto_pipeline.geometry.topology import edges, laid_edge_lengths
 from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.garment import RestShape
+from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.numerics.linear.block_matrix import pattern
 from vto_pipeline.numerics.linear.direct import DirectSolver
 
 _ROUNDS = 12
 _HOLD = 1e-4  # weight of staying in place against the lengths: what the lengths leave open does not drift
 _MET = 1e-5  # rms of relative errors that is not worth another round
+
+
+def lengths_in_space(rest: RestShape, mesh: TriangleMesh) -> FloatArray:
+    """Return positions near a garment's whose edges are as long as at rest [m], shape (V, 3).
+
+    Args:
+        rest: Its shape without forces. Without panels, its positions are those.
+        mesh: Where it is now [m].
+    """
+    if rest.panels is None:
+        return rest.positions
+    lengths = laid_edge_lengths(mesh, rest.corners(mesh.faces))
+    return embed_edge_lengths(mesh.vertices, edges(mesh), lengths)
 
 
 def embed_edge_lengths(positions: FloatArray, pairs: IntArray, lengths: FloatArray) -> FloatArray:

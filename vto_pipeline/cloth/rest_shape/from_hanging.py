@@ -17,6 +17,7 @@ from pydantic import Field
 
 from vto_pipeline.cloth.drape import drape
 from vto_pipeline.cloth.rest_shape.edge_length_embedding import embed_edge_lengths
+from vto_pipeline.cloth.rest_shape.from_panels import panels_of, panels_on
 from vto_pipeline.errors import ConfigError
 from vto_pipeline.geometry.topology import edges
 from vto_pipeline.model.arrays import FloatArray, IntArray
@@ -32,10 +33,12 @@ _LEAST_GAIN = 0.95  # a round that leaves more than this of the distance is the 
 class RestShapeConfig(Config):
     """How the rest shape is found."""
 
-    mode: Literal["as_scanned", "gravity_removed", "inverse"] = Field(
-        default="as_scanned",
-        description="as_scanned keeps lengths and areas; gravity_removed takes off the stretch by weight on the source "
-        "body; inverse repeats that until the result matches the scan",
+    mode: Literal["auto", "panels", "as_scanned", "gravity_removed", "inverse"] = Field(
+        default="auto",
+        description="With auto, panels are taken where the file has them, else the shape as scanned. With panels, "
+        "texture coordinates are the cut, scaled if they must be. With as_scanned, lengths and areas are kept. "
+        "With gravity_removed, the stretch by weight on the source body is taken off; inverse repeats that until the "
+        "result matches the scan",
     )
     rest_angles: bool = Field(
         default=False, description="Whether the scan's folds are kept as creases; else the cloth is flat at rest"
@@ -67,6 +70,7 @@ def rest_shape(
     job: Job,
     body: TriangleMesh | None = None,
     fabric: Fabric | None = None,
+    given: TriangleMesh | None = None,
 ) -> RestShape:
     """Return the rest shape of a garment.
 
@@ -74,16 +78,26 @@ def rest_shape(
         mesh: Simulation mesh, where it was scanned [m].
         config: The mode, and how far to go.
         job: Receives what was assumed; measures scan_distance_mm and its 95th percentile before and after.
-        body: What it was on then [m]; without effect as_scanned.
-        fabric: What it is made of; without effect as_scanned.
+        body: What it was on then [m], for modes that simulate.
+        fabric: What it is made of, for the same.
+        given: The file that the mesh was made of, in the same place [m]; panels are its texture coordinates.
 
     Raises:
-        ConfigError: a mode that needs body and fabric, and one is not known.
+        ConfigError: a mode that needs what is not known: body and fabric, or texture coordinates.
         ComputationError: the garment cannot be simulated on that body.
     """
-    if config.mode == "as_scanned":
+    if config.mode in ("auto", "panels") and given is not None and given.texture is not None:
+        panels = panels_of(given, config.mode == "panels", job)
+        if panels is not None:
+            return RestShape(mesh.vertices, config.rest_angles, "panels", panels=panels_on(mesh, given, panels, job))
+    elif config.mode == "panels":
+        raise ConfigError(
+            "rest_shape.mode: panels takes the texture coordinates of a garment file for its cut, and there are none",
+            hint="give an OBJ or glTF file with texture coordinates for every face, or set mode: as_scanned",
+        )
+    if config.mode in ("auto", "as_scanned"):
         job.note("rest shape taken as scanned; it includes the stretch under its own weight")
-        return RestShape(mesh.vertices, config.rest_angles, config.mode)
+        return RestShape(mesh.vertices, config.rest_angles, "as_scanned")
     if body is None or fabric is None:
         raise ConfigError(
             f"rest_shape.mode: {config.mode} simulates the garment on the body it was scanned on, and "

@@ -1,7 +1,8 @@
-"""Wavefront OBJ: vertices, their colours, and faces. Materials and normals are ignored; `mtllib` is never followed.
+"""Wavefront OBJ: vertices, their colours, faces, and the texture coordinates of their corners.
 
-Programs add keywords of their own (a simulator its velocities): these lines are skipped, and counted.
-Vertices keep the numbering of the file, so that texture seams do not cut the surface.
+Materials and normals are ignored; `mtllib` is never followed. Programs add keywords of their own (a simulator its
+velocities): these lines are skipped, and counted. Vertices keep the numbering of the file, so that texture seams do not
+cut the surface.
 """
 
 from __future__ import annotations
@@ -12,11 +13,12 @@ import numpy as np
 
 from vto_pipeline.errors import FormatError
 from vto_pipeline.io.arrays import Arrays
-from vto_pipeline.io.formats.polygons import CUT_OFF, triangulate_polygons
+from vto_pipeline.io.formats.polygons import CUT_OFF, fan_triangulation, triangulate_polygons
 from vto_pipeline.io.text_numbers import parse_numbers, parse_rows, read_lines
+from vto_pipeline.model.arrays import FloatArray
 
 _NAMES = """
-vt vn vp o g s mg l p usemtl mtllib usemap maplib bevel c_interp d_interp lod shadow_obj
+vn vp o g s mg l p usemtl mtllib usemap maplib bevel c_interp d_interp lod shadow_obj
 """
 _IGNORED = frozenset(_NAMES.split())
 
@@ -28,7 +30,7 @@ def parse_obj(name: str) -> Arrays:
         name: Path of the file.
 
     Returns:
-        vertices (V, 3); faces (F, 3); colors (V, 3) uint8, where given; notes.
+        vertices (V, 3); faces (F, 3); colors (V, 3) uint8 and texture (F, 3, 2), where given; notes.
 
     Raises:
         FormatError: the file breaks the format.
@@ -37,7 +39,7 @@ def parse_obj(name: str) -> Arrays:
     lines = _join_continued(read_lines(path))
     words = [line.split("#", 1)[0].split(None, 1) for line in lines]
     keys = np.array([w[0] if w else "" for w in words])
-    unknown = ~np.isin(keys, [*_IGNORED, "v", "f", ""])
+    unknown = ~np.isin(keys, [*_IGNORED, "v", "vt", "f", ""])
     if unknown[-1:].any() and not path.read_bytes().endswith(b"\n"):
         raise FormatError(f"{str(keys[-1])!r} is not an OBJ keyword", where=f"{path}, line {len(keys)}", hint=CUT_OFF)
     is_vertex, is_face = keys == "v", keys == "f"
@@ -55,8 +57,16 @@ def parse_obj(name: str) -> Arrays:
     arrays: Arrays = {"vertices": values[:, :3]}
     if values.shape[1] >= 6:
         arrays["colors"] = np.clip(np.nan_to_num(values[:, 3:6]) * 255, 0, 255).round().astype(np.uint8)
+    is_texture = keys == "vt"
+    face_rows = rest(is_face)
+    corners = [row.split() for row in face_rows[0]]
     seen = np.cumsum(is_vertex)[is_face]
-    triangles, notes = triangulate_polygons(_polygons(*rest(is_face), seen, path), path)
+    triangles, notes = triangulate_polygons(_polygons(corners, *face_rows, seen, path), path)
+    if is_texture.any():
+        try:
+            arrays["texture"] = _texture(corners, face_rows[1], np.cumsum(is_texture)[is_face], rest(is_texture), path)
+        except FormatError as e:  # the shape is whole without them
+            notes.append(f"texture coordinates are ignored: {e.problem} ({e.where})")
     if unknown.any():
         some = ", ".join(repr(str(key)[:20]) for key in np.unique(keys[unknown])[:8])
         notes.append(f"skipped {unknown.sum()} lines whose keywords OBJ does not define: {some}")
@@ -74,23 +84,26 @@ def _join_continued(lines: list[str]) -> list[str]:
     return joined
 
 
-def _polygons(rows: list[str], at: list[int], seen: np.ndarray, path: Path) -> list[np.ndarray]:
+def _polygons(
+    corners: list[list[str]], rows: list[str], at: list[int], seen: np.ndarray, path: Path
+) -> list[np.ndarray]:
     """Polygons as vertex indices from 0, grouped by their number of corners.
 
     Args:
+        corners: Of each face, as written.
         rows: What follows each `f`.
         at: Line of each.
         seen: Vertices given before each; negative indices count back from there.
         path: The file.
     """
-    corners = [[corner.split("/", 1)[0] for corner in row.split()] for row in rows]
     sides = np.array([len(c) for c in corners])
     for i in np.flatnonzero(sides < 3):
         raise FormatError(f"a face with {sides[i]} corners", where=f"{path}, line {at[i]}", hint=CUT_OFF)
     groups = []
     for n in np.unique(sides):
         chosen = np.flatnonzero(sides == n)
-        numbers = parse_numbers([" ".join(corners[i]) for i in chosen], [at[i] for i in chosen], path).reshape(-1, n)
+        named = [" ".join(corner.split("/", 1)[0] for corner in corners[i]) for i in chosen]
+        numbers = parse_numbers(named, [at[i] for i in chosen], path).reshape(-1, n)
         backward = numbers < 0
         indices = np.where(backward, numbers + seen[chosen, None], numbers - 1)
         wrong = ((numbers == 0) | (indices < 0)).any(axis=1)
@@ -99,3 +112,35 @@ def _polygons(rows: list[str], at: list[int], seen: np.ndarray, path: Path) -> l
             raise FormatError(problem, where=f"{path}, line {at[chosen[i]]}")
         groups.append(indices)
     return groups
+
+
+def _texture(
+    corners: list[list[str]], at: list[int], seen: np.ndarray, given: tuple[list[str], list[int]], path: Path
+) -> FloatArray:
+    """Return the texture coordinates of the triangles that `_polygons` become, shape (F, 3, 2).
+
+    Args:
+        corners: Of each face, as written: vertex/texture/normal.
+        at: Line of each.
+        seen: Texture coordinates given before each; negative indices count back from there.
+        given: What follows each `vt`, and its line.
+        path: The file.
+
+    Raises:
+        FormatError: a corner has none, or none of that number exists.
+    """
+    values = parse_rows(*given, path)
+    if values.shape[1] < 2 or not np.isfinite(values).all():
+        raise FormatError("expected two finite numbers in each", where=str(path))
+    sides = np.array([len(c) for c in corners])
+    found = []
+    for n in np.unique(sides):
+        chosen = np.flatnonzero(sides == n)
+        named = [" ".join("".join(corner.split("/")[1:2]) or "0" for corner in corners[i]) for i in chosen]
+        numbers = parse_numbers(named, [at[i] for i in chosen], path).reshape(-1, n)
+        indices = np.where(numbers < 0, numbers + seen[chosen, None], numbers - 1)
+        wrong = (numbers == 0) | ~((indices >= 0) & (indices < len(values)) & (indices == np.trunc(indices)))
+        for i in np.flatnonzero(wrong.any(axis=1)):
+            raise FormatError("a corner has none of those given", where=f"{path}, line {at[chosen[i]]}")
+        found.append(values[fan_triangulation(indices), :2])
+    return np.concatenate(found)

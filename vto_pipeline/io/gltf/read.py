@@ -21,7 +21,7 @@ _NODES = 10_000  # visits: a node may be reached by many parents in a broken fil
 
 
 def parse_gltf(name: str) -> Arrays:
-    """Read the triangles of the default scene; morph targets, textures and animations are ignored.
+    """Read the triangles of the default scene; morph targets, images and animations are ignored.
 
     A skinned part stands as its skeleton at rest holds it.
 
@@ -29,7 +29,8 @@ def parse_gltf(name: str) -> Arrays:
         name: Path of a .gltf or .glb file.
 
     Returns:
-        vertices (V, 3), placed by their nodes; faces (F, 3); colors (V, 3) uint8, where every part has them; notes.
+        vertices (V, 3), placed by their nodes; faces (F, 3); colors (V, 3) uint8 and texture (F, 3, 2), where every
+        part has them; notes.
         Where every part hangs on one skin also joint_names, joints (J, 3), parents (J,), weights (V, J).
 
     Raises:
@@ -38,6 +39,7 @@ def parse_gltf(name: str) -> Arrays:
     document = unpack_draco(open_gltf(Path(name)))
     vertices, faces, notes = [], [], []
     colors: list[np.ndarray] = []
+    textures: list[np.ndarray] = []
     count = 0
     worlds = dict(_placed_nodes(document))
     skins: dict[int, Skin] = {}
@@ -51,7 +53,7 @@ def parse_gltf(name: str) -> Arrays:
             if primitive.get("mode", _TRIANGLES) != _TRIANGLES:
                 notes.append("ignored a part that is not a list of triangles")
                 continue
-            points, triangles, color = _primitive(document, primitive)
+            points, triangles, color, texture = _primitive(document, primitive)
             if skin is None:
                 if np.linalg.det(transform[:3, :3]) < 0:  # a mirror turns the triangles inside out
                     triangles = triangles[:, ::-1]
@@ -63,6 +65,7 @@ def parse_gltf(name: str) -> Arrays:
             vertices.append(points)
             faces.append(triangles + count)
             colors += [] if color is None else [color]
+            textures += [] if texture is None else [texture[triangles]]
             count += len(points)
     if not faces:
         raise FormatError("the scene has no triangles", where=name)
@@ -71,6 +74,8 @@ def parse_gltf(name: str) -> Arrays:
     arrays: Arrays = {"vertices": np.concatenate(vertices), "faces": np.concatenate(faces)}
     if len(colors) == len(faces):
         arrays["colors"] = np.concatenate(colors)
+    if len(textures) == len(faces):
+        arrays["texture"] = np.concatenate(textures)
     if len(skins) == 1 and len(weights) == len(faces):
         (skin,) = skins.values()
         arrays |= {
@@ -84,8 +89,8 @@ def parse_gltf(name: str) -> Arrays:
 
 def _primitive(
     document: GltfDocument, primitive: Mapping[str, Any]
-) -> tuple[FloatArray, np.ndarray, np.ndarray | None]:
-    """Points (V, 3), triangles (F, 3) and colours (V, 3) or None, of one primitive."""
+) -> tuple[FloatArray, np.ndarray, np.ndarray | None, np.ndarray | None]:
+    """Points (V, 3), triangles (F, 3), and colours (V, 3) and texture coordinates (V, 2) or None, of one primitive."""
     where = str(document.path)
     attributes = primitive.get("attributes", {})
     points = document.accessor(attributes.get("POSITION")).astype(np.float64)
@@ -105,7 +110,12 @@ def _primitive(
         if values.shape != points.shape:
             raise FormatError(f"{len(values)} colours for {len(points)} vertices", where=where)
         color = encode_srgb(values)  # glTF keeps vertex colours linear
-    return points, indices.reshape(-1, 3), color
+    texture = None
+    if "TEXCOORD_0" in attributes:
+        values = document.accessor(attributes["TEXCOORD_0"]).astype(np.float64)
+        if values.shape == (len(points), 2) and np.isfinite(values).all():
+            texture = values * (1.0, -1.0) + (0.0, 1.0)  # glTF counts v downward
+    return points, indices.reshape(-1, 3), color, texture
 
 
 def _placed_nodes(document: GltfDocument) -> Iterator[tuple[int, FloatArray]]:

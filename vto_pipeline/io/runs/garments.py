@@ -93,7 +93,8 @@ def read_fit_maps(path: Path) -> dict[str, FloatArray]:
 def write_rest_shape(path: Path, rest: RestShape) -> None:
     """Write rest_shape.npz."""
     flags = {"rest_angles": np.bool_(rest.rest_angles), "regraded": np.bool_(rest.regraded)}
-    write_arrays(path, {"positions": rest.positions, "mode": rest.mode, **flags})
+    panels = {} if rest.panels is None else {"panels": rest.panels}
+    write_arrays(path, {"positions": rest.positions, "mode": rest.mode, **flags, **panels})
 
 
 def read_rest_shape(path: Path) -> RestShape:
@@ -103,7 +104,8 @@ def read_rest_shape(path: Path) -> RestShape:
         FormatError: an array is missing.
     """
     arrays = read_arrays(path, required=("positions", "rest_angles", "mode", "regraded"))
-    return RestShape(arrays["positions"], bool(arrays["rest_angles"]), str(arrays["mode"]), bool(arrays["regraded"]))
+    flags = bool(arrays["rest_angles"]), str(arrays["mode"]), bool(arrays["regraded"])
+    return RestShape(arrays["positions"], *flags, arrays.get("panels"))
 
 
 def write_collider(path: Path, body: MovingBody) -> None:

@@ -18,12 +18,14 @@ from numba import njit
 from numpy.typing import NDArray
 
 from vto_pipeline.cloth.constraints.bending.hinge import (
+    Hinges,
     add_moment,
     apply_hinge_multiplier,
     hinge_angle_gradients,
     hinge_mobility,
 )
 from vto_pipeline.cloth.constraints.kind import Kind
+from vto_pipeline.model.garment import RestShape
 from vto_pipeline.numerics.linear.coloured_blocks import blocks
 from vto_pipeline.numerics.mechanics.slider import huber, secant_compliance, slider_slip, wrap_angle
 from vto_pipeline.numerics.mechanics.xpbd_row import bounded_step
@@ -54,27 +56,24 @@ class BendFriction(NamedTuple):
 
 
 def bend_friction(
-    hinges: NDArray[np.int32],
-    rest: NDArray[np.float64],
-    rest_angles: NDArray[np.float64] | None,
+    hinges: Hinges,
+    rest: RestShape,
     stiffness: NDArray[np.float64],
     limit: NDArray[np.float64],
 ) -> BendFriction:
     """Return sliders for these hinges.
 
     Args:
-        hinges: Ends and wings, shape (H, 4).
-        rest: Rest positions [m], shape (V, 3).
-        rest_angles: Of each hinge [rad], shape (H,); flat when None.
+        hinges: Those of the sheet.
+        rest: Its shape without forces.
         stiffness: Of the spring [N·m], positive, shape (H,).
         limit: Moment at which the slider gives way [N·m], positive, shape (H,).
     """
-    order, starts, colours = blocks(hinges, rest)
-    angles = np.zeros(len(hinges)) if rest_angles is None else rest_angles
+    order, starts, colours = blocks(hinges.vertices, rest.positions)
     return BendFriction(
-        np.ascontiguousarray(hinges[order]),
-        angles[order],
-        np.zeros((len(hinges), 1)),
+        np.ascontiguousarray(hinges.vertices[order]),
+        hinges.angle[order],
+        np.zeros((len(order), 1)),
         1.0 / stiffness[order],
         limit[order],
         0.0,

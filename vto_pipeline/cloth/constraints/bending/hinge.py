@@ -17,7 +17,10 @@ from numpy.typing import NDArray
 from vto_pipeline.cloth.constraints.kind import Kind
 from vto_pipeline.cloth.constraints.membrane.slivers import SLIVER, slenderness
 from vto_pipeline.cloth.constraints.membrane.yarns import thread_axes
+from vto_pipeline.geometry.topology import corners_from, hinge_halves, hinges
 from vto_pipeline.model.fabric import Fabric
+from vto_pipeline.model.garment import RestShape
+from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.numerics.linear.coloured_blocks import blocks
 from vto_pipeline.numerics.mechanics.bending import dihedral
 from vto_pipeline.numerics.mechanics.xpbd_row import multiplier_step
@@ -50,13 +53,17 @@ class Hinges(NamedTuple):
         vertices: Ends, then the wings, shape (H, 4).
         length: [m], shape (H,).
         area: Of both triangles [m²], shape (H,).
-        along_warp: Squared cosine of the angle between hinge and warp, shape (H,).
+        along_warp: Squared cosine of the angle between hinge and warp, in the first triangle, shape (H,).
+        angle: At rest [rad], shape (H,).
+        corners: Ends and wing of either triangle at rest [m], shape (H, 2, 3, 3). Across a seam, each in its own panel.
     """
 
     vertices: NDArray[np.int32]
     length: NDArray[np.float64]
     area: NDArray[np.float64]
     along_warp: NDArray[np.float64]
+    angle: NDArray[np.float64]
+    corners: NDArray[np.float64]
 
     def stiffness(self, fabric: Fabric) -> NDArray[np.float64]:
         """Return B l²/A [N·m], shape (H,): across a hinge at angle φ to the warp, B = B_warp sin²φ + B_weft cos²φ."""
@@ -65,47 +72,44 @@ class Hinges(NamedTuple):
         return stiff
 
 
-def solid_hinges(hinges: NDArray[np.int32], rest: NDArray[np.float64]) -> tuple[Hinges, NDArray[np.bool_]]:
-    """Return the hinges that can bend, and which of the given ones they are, shape (H,).
+def solid_hinges(mesh: TriangleMesh, rest: RestShape) -> Hinges:
+    """Return the hinges that can bend.
 
     Args:
-        hinges: Ends and wings as from `geometry.topology.hinges`, shape (H, 4).
-        rest: Rest positions [m], shape (V, 3).
+        mesh: Its triangles.
+        rest: Its shape without forces.
     """
-    edge = rest[hinges[:, 1]] - rest[hinges[:, 0]]
-    length_sq = np.einsum("ij,ij->i", edge, edge)
-    warp, _, area_one = thread_axes(hinges[:, [0, 1, 2]], rest)
-    _, _, area_other = thread_axes(hinges[:, [1, 0, 3]], rest)
+    halves = hinge_halves(mesh)
+    laid = rest.corners(mesh.faces).reshape(-1, 3)
+    one, other = laid[corners_from(halves[:, 0])], laid[corners_from(halves[:, 1])]
+    edge, opposed = one[:, 1] - one[:, 0], other[:, 1] - other[:, 0]
+    length_sq = 0.5 * (np.einsum("ij,ij->i", edge, edge) + np.einsum("ij,ij->i", opposed, opposed))
+    warp, _, area_one = thread_axes(one)
+    _, _, area_other = thread_axes(other)
     area = 0.5 * (area_one + area_other)
-    slender = np.minimum(slenderness(hinges[:, [0, 1, 2]], rest), slenderness(hinges[:, [1, 0, 3]], rest))
-    solid = (slender > SLIVER) & (length_sq > 0.0)
-    along = np.einsum("ij,ij->i", edge, warp)[solid] ** 2 / length_sq[solid]
-    return Hinges(hinges[solid], np.sqrt(length_sq[solid]), area[solid], along), solid
+    solid = (np.minimum(slenderness(one), slenderness(other)) > SLIVER) & (length_sq > 0.0)
+    along = np.einsum("ij,ij->i", edge, warp)[solid] ** 2 / np.einsum("ij,ij->i", edge, edge)[solid]
+    found = hinges(mesh)[solid]
+    angle = hinge_angles(rest.positions, found) if rest.rest_angles else np.zeros(len(found))
+    both = np.stack([one[solid], other[solid][:, [1, 0, 2]]], axis=1)
+    return Hinges(found, np.sqrt(length_sq[solid]), area[solid], along, angle, both)
 
 
-def bend(
-    hinges: NDArray[np.int32],
-    rest: NDArray[np.float64],
-    rest_angles: NDArray[np.float64] | None,
-    fabric: Fabric,
-    damping: float = 0.0,
-) -> Bend:
+def bend(mesh: TriangleMesh, rest: RestShape, fabric: Fabric, damping: float = 0.0) -> Bend:
     """Return the hinges of a sheet; those that do not resist bending are left out.
 
     Args:
-        hinges: Ends and wings as from `geometry.topology.hinges`, shape (H, 4).
-        rest: Rest positions, for lengths and areas [m], shape (V, 3).
-        rest_angles: Of each hinge [rad], shape (H,), as from `hinge_angles`; the sheet is flat at rest when None.
+        mesh: Its triangles.
+        rest: Its shape without forces.
         fabric: Bending rigidities.
         damping: Rayleigh's β [s].
     """
-    found, solid = solid_hinges(hinges, rest)
+    found = solid_hinges(mesh, rest)
     stiffness = found.stiffness(fabric)
     stiff = stiffness > 0.0
-    angles = np.zeros(len(stiffness)) if rest_angles is None else rest_angles[solid]
-    order, starts, colours = blocks(found.vertices[stiff], rest)
+    order, starts, colours = blocks(found.vertices[stiff], rest.positions)
     vertices = np.ascontiguousarray(found.vertices[stiff][order])
-    return Bend(vertices, angles[stiff][order], 1.0 / stiffness[stiff][order], damping, starts, colours)
+    return Bend(vertices, found.angle[stiff][order], 1.0 / stiffness[stiff][order], damping, starts, colours)
 
 
 @njit(cache=True, error_model="numpy")

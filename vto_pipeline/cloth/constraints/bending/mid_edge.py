@@ -23,9 +23,9 @@ def slope_shares(triangles: NDArray[np.float64], beyond: NDArray[np.float64]) ->
 
     Args:
         triangles: Rest corners of the edge's own triangle, the edge first [m], shape (N, 3, 3); then `beyond`.
-        beyond: The far corner of the triangle across the edge, and the corners across the own triangle's second and
-            third edge and across the other triangle's second and third edge [m]; NaN where there is none, shape
-            (N, 5, 3). The other triangle runs (second, first, far corner).
+        beyond: Rest corners of the triangle across the edge, and of those across the own triangle's second and third
+            edge and across the other triangle's second and third edge, from that edge on [m]; NaN where there is none,
+            shape (N, 5, 3, 3). Across a seam, each in its own panel.
 
     Returns:
         Shares of the angles at the edge itself and at these four edges, in this order, shape (N, 5).
@@ -34,17 +34,15 @@ def slope_shares(triangles: NDArray[np.float64], beyond: NDArray[np.float64]) ->
     half = np.zeros((len(length), 2))
     half[:, 0] = 0.5 * length
     tail, head = -half, half  # the edge lies on the x-axis, its middle in the origin
-    a, b = triangles[:, 0], triangles[:, 1]
-    own = _unfold(tail, head, a, b, triangles[:, 2])
-    other = _unfold(head, tail, b, a, beyond[:, 0])
-    c, d = triangles[:, 2], beyond[:, 0]
+    own = _unfold(tail, head, triangles)
+    other = _unfold(head, tail, beyond[:, 0])
     angles = np.stack(
         [
             _angles(tail, head, own, other),
-            _angles(head, own, tail, _unfold(own, head, c, b, beyond[:, 1])),
-            _angles(own, tail, head, _unfold(tail, own, a, c, beyond[:, 2])),
-            _angles(tail, other, head, _unfold(other, tail, d, a, beyond[:, 3])),
-            _angles(other, head, tail, _unfold(head, other, b, d, beyond[:, 4])),
+            _angles(head, own, tail, _unfold(own, head, beyond[:, 1])),
+            _angles(own, tail, head, _unfold(tail, own, beyond[:, 2])),
+            _angles(tail, other, head, _unfold(other, tail, beyond[:, 3])),
+            _angles(other, head, tail, _unfold(head, other, beyond[:, 4])),
         ],
         axis=2,
     )  # of the three unit quadratics at the five hinges
@@ -60,11 +58,16 @@ def slope_shares(triangles: NDArray[np.float64], beyond: NDArray[np.float64]) ->
     return shares
 
 
-def _unfold(p: _Points, q: _Points, rest_p: _Points, rest_q: _Points, rest_r: _Points) -> _Points:
-    """Return where r lies in the plane, left of the line from p to q, so far from both as at rest, shape (N, 2)."""
+def _unfold(p: _Points, q: _Points, rest: _Points) -> _Points:
+    """Return where the last corner of a triangle lies in the plane when its first edge runs from p to q, shape (N, 2).
+
+    Args:
+        p, q: Ends of the edge in the plane, the triangle to its left [m], shape (N, 2).
+        rest: The triangle at rest [m], shape (N, 3, 3).
+    """
     along = q - p
     length = np.linalg.norm(along, axis=1)
-    to_r, edge = rest_r - rest_p, rest_q - rest_p
+    to_r, edge = rest[:, 2] - rest[:, 0], rest[:, 1] - rest[:, 0]
     foot = np.einsum("ij,ij->i", to_r, edge) / length
     height = np.linalg.norm(np.cross(edge, to_r), axis=1) / length
     unit = along / length[:, None]

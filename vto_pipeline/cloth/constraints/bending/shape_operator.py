@@ -19,8 +19,9 @@ from vto_pipeline.cloth.constraints.bending.mid_edge import slope_shares
 from vto_pipeline.cloth.constraints.kind import Kind
 from vto_pipeline.cloth.constraints.membrane.yarns import thread_axes
 from vto_pipeline.errors import InputError
-from vto_pipeline.geometry.topology import opposite_half_edges
+from vto_pipeline.geometry.topology import corners_from, opposite_half_edges
 from vto_pipeline.model.fabric import Fabric
+from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.numerics.linear.coloured_blocks import blocks
 from vto_pipeline.numerics.mechanics.bending import dihedral
@@ -63,8 +64,7 @@ class ShapeOperator(NamedTuple):
 
 def shape_operator(
     mesh: TriangleMesh,
-    rest: NDArray[np.float64],
-    rest_angles: bool,
+    rest: RestShape,
     fabric: Fabric,
     *,
     held: NDArray[np.int64] | tuple[int, ...] = (),
@@ -75,8 +75,7 @@ def shape_operator(
 
     Args:
         mesh: Its triangles.
-        rest: Rest positions [m], shape (V, 3).
-        rest_angles: Keep the curvature of `rest`; else the sheet is flat at rest.
+        rest: Its shape without forces.
         fabric: Bending rigidities, those of a strip whose edges are free. The twist has the stiffness of an isotropic
             plate of rigidity √(B_warp B_weft).
         held: Vertices held where they are. A triangle of three does not bend, and a clamp is where it ends: half of
@@ -90,18 +89,19 @@ def shape_operator(
     if not -1.0 < poisson < 1.0:
         raise InputError(f"Poisson's ratio of bending is {poisson}; expected -1 to 1")
     faces = mesh.faces
-    warp, weft, double_area = thread_axes(faces, rest)
+    corners = rest.corners(faces)
+    warp, weft, double_area = thread_axes(corners)
     clamped = np.asarray(np.isin(faces, np.asarray(held, dtype=np.int64)).all(axis=1))
     flat = np.asarray(double_area <= 1e-12 * double_area.max(initial=0.0))
     opposite = _bending_edges(mesh, flat)
     vertices = _stencils(faces, opposite)
     compliance = _compliance(fabric, poisson)
-    weights = _weights(rest, faces, opposite, vertices, warp, weft, 0.5 * double_area, clamped, compliance)
+    weights = _weights(corners, opposite, warp, weft, 0.5 * double_area, clamped, compliance)
     kept = ~(flat | clamped) & (weights != 0.0).any(axis=(1, 2))
     vertices, weights, area = vertices[kept], weights[kept], 0.5 * double_area[kept]
-    order, starts, colours = blocks(vertices, rest)
+    order, starts, colours = blocks(vertices, rest.positions)
     vertices, weights = np.ascontiguousarray(vertices[order]), np.ascontiguousarray(weights[order])
-    curvature = _curvatures(rest, vertices, weights) if rest_angles else np.zeros((len(vertices), 3))
+    curvature = _curvatures(rest.positions, vertices, weights) if rest.rest_angles else np.zeros((len(vertices), 3))
     return ShapeOperator(vertices, weights, curvature, area[order], compliance, damping, starts, colours)
 
 
@@ -145,21 +145,18 @@ def _stencils(faces: NDArray[np.int32], opposite: NDArray[np.int32]) -> NDArray[
 
 
 def _weights(
-    rest: NDArray[np.float64],
-    faces: NDArray[np.int32],
+    corners: NDArray[np.float64],
     opposite: NDArray[np.int32],
-    vertices: NDArray[np.int32],
     warp: NDArray[np.float64],
     weft: NDArray[np.float64],
     area: NDArray[np.float64],
     clamped: NDArray[np.bool_],
     compliance: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return the curvature of each face per angle of each hinge, shape (F, 3, 9)."""
+    """Return the curvature of each face, of rest corners (F, 3, 3), per angle of each hinge, shape (F, 3, 9)."""
     bends = np.where((opposite >= 0) & clamped[opposite // 3], -1, opposite)  # what bends on both sides
-    weights = np.zeros((len(faces), 3, 9))
-    normals = np.zeros((len(faces), 3, 3))
-    corners = rest[faces]
+    weights = np.zeros((len(corners), 3, 9))
+    normals = np.zeros((len(corners), 3, 3))
     for k in range(3):
         along = corners[:, (k + 1) % 3] - corners[:, k]
         u, v = np.einsum("ij,ij->i", along, warp), np.einsum("ij,ij->i", along, weft)
@@ -170,7 +167,7 @@ def _weights(
         both = bends[:, k] >= 0
         weights[(half >= 0) & ~both, :, k] += normals[(half >= 0) & ~both, k]  # beside a clamp: its own slope
         here = np.flatnonzero(both & ~clamped)
-        shares = _shares(rest, faces, bends, here, k)
+        shares = _shares(corners, bends, here, k)
         other = np.array([k, (k + 1) % 3, (k + 2) % 3, 3 + 2 * k, 4 + 2 * k])
         for share, slot in zip(shares.T, other, strict=True):
             weights[here, :, slot] += share[:, None] * normals[here, k]
@@ -178,11 +175,11 @@ def _weights(
 
 
 def _shares(
-    rest: NDArray[np.float64], faces: NDArray[np.int32], bends: NDArray[np.int32], here: NDArray[np.int64], k: int
+    corners: NDArray[np.float64], bends: NDArray[np.int32], here: NDArray[np.int64], k: int
 ) -> NDArray[np.float64]:
     """Return the shares of edge k of these faces; see `slope_shares`."""
     half = bends[here, k]
-    turned = faces[here][:, [k, (k + 1) % 3, (k + 2) % 3]]
+    turned = corners[here][:, [k, (k + 1) % 3, (k + 2) % 3]]
     flat = bends.reshape(-1)
     across = [
         half,
@@ -191,9 +188,9 @@ def _shares(
         flat[3 * (half // 3) + (half + 1) % 3],
         flat[3 * (half // 3) + (half + 2) % 3],
     ]
-    apexes = np.stack([_apex(faces, one) for one in across], axis=1)
-    beyond = np.where((apexes >= 0)[:, :, None], rest[apexes], np.nan)
-    return slope_shares(rest[turned], beyond)
+    found = np.stack(across, axis=1)
+    beyond = corners.reshape(-1, 3)[corners_from(np.maximum(found, 0))]
+    return slope_shares(turned, np.where((found >= 0)[:, :, None, None], beyond, np.nan))
 
 
 def _free_edges(

@@ -25,6 +25,7 @@ from vto_pipeline.cloth.constraints.membrane.triangle import (
     triangles,
     write_stiffness,
 )
+from vto_pipeline.model.garment import RestShape
 from vto_pipeline.numerics.mechanics.membrane import pulls, thread_strains
 from vto_pipeline.numerics.mechanics.monotone_curve import MonotoneCurve, curve_at
 from vto_pipeline.numerics.mechanics.plane_stress import scaled
@@ -57,17 +58,17 @@ class Curve(NamedTuple):
 
 def curve(
     faces: NDArray[np.int32],
-    rest: NDArray[np.float64],
+    rest: RestShape,
     warp: MonotoneCurve,
     weft: MonotoneCurve,
     shear: float,
     damping: float = 0.0,
 ) -> Curve:
-    """Return the membrane of these triangles; warp runs along the vertical of the rest shape.
+    """Return the membrane of these triangles; warp is as `yarns.thread_axes` says.
 
     Args:
         faces: Shape (F, 3).
-        rest: Rest positions [m], shape (V, 3).
+        rest: Their shape without forces.
         warp, weft: Measured curves.
         shear: Shear stiffness [N/m].
         damping: Rayleigh's β [s].

@@ -17,6 +17,7 @@ from vto_pipeline.cloth.constraints.kind import Kind
 from vto_pipeline.cloth.constraints.membrane.stretch import orthotropic
 from vto_pipeline.cloth.constraints.membrane.triangle import add_pulls, deformed, fill_rows, solve_strains, triangles
 from vto_pipeline.model.fabric import Fabric
+from vto_pipeline.model.garment import RestShape
 from vto_pipeline.numerics.mechanics.membrane import green_strains, pulls
 from vto_pipeline.numerics.mechanics.plane_stress import plane_stress, scaled
 from vto_pipeline.numerics.mechanics.tension import tensile
@@ -41,12 +42,12 @@ class Green(NamedTuple):
     damping: float
 
 
-def green(faces: NDArray[np.int32], rest: NDArray[np.float64], fabric: Fabric, damping: float = 0.0) -> Green:
-    """Return the membrane of these triangles; warp runs along the vertical of the rest shape.
+def green(faces: NDArray[np.int32], rest: RestShape, fabric: Fabric, damping: float = 0.0) -> Green:
+    """Return the membrane of these triangles; warp is as `yarns.thread_axes` says.
 
     Args:
         faces: Shape (F, 3).
-        rest: Rest positions [m], shape (V, 3).
+        rest: Their shape without forces.
         fabric: Stiffnesses.
         damping: Rayleigh's β [s].
 

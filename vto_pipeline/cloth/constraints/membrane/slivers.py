@@ -13,10 +13,9 @@ to no cloth: it is taken no stiffer than a triangle of this height, and hinges b
 """
 
 
-def slenderness(faces: NDArray[np.int32], rest: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the height of triangles over their longest side, shape (F,)."""
-    corners = rest[faces]
+def slenderness(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the height of triangles over their longest side, shape (F,); corners of shape (F, 3, 3)."""
     sides = np.roll(corners, -1, axis=1) - corners
     double_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     longest_sq = (sides**2).sum(axis=2).max(axis=1)
-    return np.divide(double_area, longest_sq, out=np.zeros(len(faces)), where=longest_sq > 0.0)
+    return np.divide(double_area, longest_sq, out=np.zeros(len(corners)), where=longest_sq > 0.0)

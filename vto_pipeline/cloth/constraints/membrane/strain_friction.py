@@ -22,6 +22,7 @@ from vto_pipeline.cloth.constraints.membrane.triangle import (
     triangles,
     write_stiffness,
 )
+from vto_pipeline.model.garment import RestShape
 from vto_pipeline.numerics.mechanics.membrane import pulls, thread_strains
 from vto_pipeline.numerics.mechanics.plane_stress import scaled
 from vto_pipeline.numerics.mechanics.slider import huber, secant_compliance, slider_slip
@@ -53,15 +54,15 @@ class StrainFriction(NamedTuple):
 
 def strain_friction(
     faces: NDArray[np.int32],
-    rest: NDArray[np.float64],
+    rest: RestShape,
     slip: float,
     limit: ArrayLike,
 ) -> StrainFriction:
-    """Return sliders for these triangles; warp runs along the vertical of the rest shape.
+    """Return sliders for these triangles; warp is as `yarns.thread_axes` says.
 
     Args:
         faces: Shape (F, 3).
-        rest: Rest positions [m], shape (V, 3).
+        rest: Their shape without forces.
         slip: Change of strain at which the sliders give way, positive.
         limit: Force per width at which they do, for warp, weft and shear [N/m], shape (3,); zero for no friction.
     """

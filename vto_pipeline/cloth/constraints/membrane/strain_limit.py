@@ -23,6 +23,7 @@ from vto_pipeline.cloth.constraints.membrane.triangle import (
     triangles,
     write_stiffness,
 )
+from vto_pipeline.model.garment import RestShape
 from vto_pipeline.numerics.mechanics.membrane import pulls, thread_strains
 from vto_pipeline.numerics.mechanics.plane_stress import scaled
 from vto_pipeline.numerics.mechanics.tension import thread_tension
@@ -51,16 +52,16 @@ class StrainLimit(NamedTuple):
 
 def strain_limit(
     faces: NDArray[np.int32],
-    rest: NDArray[np.float64],
+    rest: RestShape,
     limits: ArrayLike,
     compliance: ArrayLike,
     damping: float = 0.0,
 ) -> StrainLimit:
-    """Return limits for these triangles; warp runs along the vertical of the rest shape.
+    """Return limits for these triangles; warp is as `yarns.thread_axes` says.
 
     Args:
         faces: Shape (F, 3).
-        rest: Rest positions [m], shape (V, 3).
+        rest: Their shape without forces.
         limits: Largest warp strain, weft strain and shear angle [rad], shape (3,); inf for none.
         compliance: Beyond them [m/N], shape (3,); zero is rigid, for solvers that can take it.
         damping: Rayleigh's β [s].

@@ -24,6 +24,7 @@ from vto_pipeline.cloth.constraints.membrane.triangle import (
 )
 from vto_pipeline.errors import InputError
 from vto_pipeline.model.fabric import Fabric
+from vto_pipeline.model.garment import RestShape
 from vto_pipeline.numerics.mechanics.membrane import pulls, thread_strains
 from vto_pipeline.numerics.mechanics.plane_stress import inverse_compliance, plane_stress, scaled
 from vto_pipeline.numerics.mechanics.tension import thread_tension
@@ -48,12 +49,12 @@ class Stretch(NamedTuple):
     damping: float
 
 
-def stretch(faces: NDArray[np.int32], rest: NDArray[np.float64], fabric: Fabric, damping: float = 0.0) -> Stretch:
-    """Return the membrane of these triangles; warp runs along the vertical of the rest shape.
+def stretch(faces: NDArray[np.int32], rest: RestShape, fabric: Fabric, damping: float = 0.0) -> Stretch:
+    """Return the membrane of these triangles; warp is as `yarns.thread_axes` says.
 
     Args:
         faces: Shape (F, 3).
-        rest: Rest positions [m], shape (V, 3).
+        rest: Their shape without forces.
         fabric: Stiffnesses.
         damping: Rayleigh's β [s].
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from vto_pipeline.cloth.constraints.membrane.slivers import SLIVER, slenderness
 from vto_pipeline.cloth.constraints.membrane.yarns import thread_axes
+from vto_pipeline.model.garment import RestShape
 from vto_pipeline.numerics.linear.coloured_blocks import blocks
 from vto_pipeline.numerics.mechanics.membrane import (
     corner_force,
@@ -44,23 +45,25 @@ class Triangles(NamedTuple):
     colours: NDArray[np.int64]
 
 
-def triangles(faces: NDArray[np.int32], rest: NDArray[np.float64]) -> Triangles:
+def triangles(faces: NDArray[np.int32], rest: RestShape) -> Triangles:
     """Return these triangles, laid out along their threads; those without area at rest carry nothing and are left out.
 
     Args:
         faces: Shape (F, 3).
-        rest: Rest positions [m], shape (V, 3).
+        rest: Their shape without forces.
     """
-    warp, weft, double_area = thread_axes(faces, rest)
+    corners = rest.corners(faces)
+    warp, weft, double_area = thread_axes(corners)
     solid = double_area > 1e-12 * double_area.max(initial=0.0)
-    faces, warp, weft, double_area = faces[solid], warp[solid], weft[solid], double_area[solid]
-    a, b, c = rest[faces[:, 0]], rest[faces[:, 1]], rest[faces[:, 2]]
+    faces, corners = faces[solid], corners[solid]
+    warp, weft, double_area = warp[solid], weft[solid], double_area[solid]
+    a, b, c = corners.transpose(1, 0, 2)
     gradients = np.empty((len(faces), 6))
     for k, (tail, head) in enumerate(((b, c), (c, a), (a, b))):
         edge_u, edge_v = np.einsum("ij,ij->i", head - tail, warp), np.einsum("ij,ij->i", head - tail, weft)
         gradients[:, 2 * k], gradients[:, 2 * k + 1] = -edge_v / double_area, edge_u / double_area
-    area = 0.5 * double_area * np.minimum(1.0, slenderness(faces, rest) / SLIVER)
-    order, starts, colours = blocks(faces, rest)
+    area = 0.5 * double_area * np.minimum(1.0, slenderness(corners) / SLIVER)
+    order, starts, colours = blocks(faces, rest.positions)
     return Triangles(np.ascontiguousarray(faces[order]), gradients[order], area[order], starts, colours)
 
 

@@ -7,13 +7,16 @@ from numpy.typing import NDArray
 
 
 def thread_axes(
-    faces: NDArray[np.int32], rest: NDArray[np.float64]
+    corners: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Return unit warp and weft directions of each triangle, shape (F, 3) each, and twice its area [m²], shape (F,).
 
     Warp is the vertical (+Y) laid onto the triangle; where a triangle lies flat, front (+Z) takes its place.
+
+    Args:
+        corners: At rest [m], shape (F, 3, 3).
     """
-    normal = np.cross(rest[faces[:, 1]] - rest[faces[:, 0]], rest[faces[:, 2]] - rest[faces[:, 0]])
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     double_area = np.linalg.norm(normal, axis=1)
     normal = np.divide(normal, double_area[:, None], out=np.zeros_like(normal), where=double_area[:, None] > 0)
     up = np.broadcast_to([0.0, 1.0, 0.0], normal.shape).copy()
