@@ -2,7 +2,8 @@
 
 bench, record, timing, machine, provenance: what a bench is, how it is carried out, and on what
 measures: what several benches read off a cloth
-cloth/, scaling/, physics/, stability/, collision/, drape/, body/, peers/: the benches
+own_process, live_rows: commands that are run one by one, and their rows
+cloth/, scaling/, physics/, stability/, collision/, drape/, body/, scan/, peers/: the benches
 samples/: the sample data and its truth
 demo: how far a run on the sample data is from the truth
 first_run: what `make demo` and `make test` cost from nothing

@@ -7,18 +7,13 @@ written as soon as it ends, and so outlives whatever ends the bench.
 from __future__ import annotations
 
 import argparse
-import csv
-import json
-import os
-import signal
-import subprocess
-import sys
-import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from vto_pipeline.bench.bench import Value
+from vto_pipeline.bench.live_rows import LiveRows
+from vto_pipeline.bench.own_process import run_vto
 from vto_pipeline.io.documents import read_json
 from vto_pipeline.io.meshes import read_mesh
 
@@ -41,16 +36,10 @@ def main() -> None:
         "--out", type=Path, default=Path("runs/garments"), metavar="DIR", help="for runs and rows.jsonl"
     )
     arguments = parser.parse_args()
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    table = csv.writer(sys.stdout, "excel-tab")
-    table.writerow(_COLUMNS)
+    table = LiveRows(arguments.out, _COLUMNS)
     for garment in arguments.garment:
         folder = arguments.out / f"{garment.stem}_on_{arguments.body.stem}"
-        row = drape_row(garment, arguments.body, folder, arguments.settings, arguments.limit)
-        with (arguments.out / "rows.jsonl").open("a") as rows:
-            rows.write(json.dumps(row) + "\n")
-        table.writerow([_text(row[name]) for name in _COLUMNS])
-        sys.stdout.flush()
+        table.add(drape_row(garment, arguments.body, folder, arguments.settings, arguments.limit))
 
 
 def drape_row(garment: Path, body: Path, folder: Path, settings: Sequence[str], limit: float) -> dict[str, Value]:
@@ -65,21 +54,15 @@ def drape_row(garment: Path, body: Path, folder: Path, settings: Sequence[str], 
     command = ["drape", "--garment", str(garment), "--body", str(body), "-o", str(folder)]
     for one in settings:
         command += ["--set", one]
-    program = "import sys; from vto_pipeline.cli.main import main; sys.exit(main())"
-    began = time.perf_counter()
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with (folder.parent / f"{folder.name}.log").open("wb") as log:
-        run = subprocess.Popen(
-            [sys.executable, "-c", program, *command], stdout=log, stderr=log, start_new_session=True
-        )
-        try:
-            outcome = _OUTCOMES.get(run.wait(limit), "killed")
-        except subprocess.TimeoutExpired:
-            os.killpg(run.pid, signal.SIGKILL)
-            run.wait()
-            outcome = "unfinished"
-    seconds = time.perf_counter() - began
-    return {"garment": garment.stem, "body": body.stem, "outcome": outcome, "seconds": seconds, **_figures(folder)}
+    ended = run_vto(command, folder.parent / f"{folder.name}.log", limit)
+    outcome = "unfinished" if ended.code is None else _OUTCOMES.get(ended.code, "killed")
+    return {
+        "garment": garment.stem,
+        "body": body.stem,
+        "outcome": outcome,
+        "seconds": ended.seconds,
+        **_figures(folder),
+    }
 
 
 def _figures(folder: Path) -> dict[str, Value]:
@@ -102,12 +85,6 @@ def _figures(folder: Path) -> dict[str, Value]:
 
 def _document(path: Path) -> Mapping[str, Any]:
     return read_json(path) if path.exists() else {}
-
-
-def _text(value: Value) -> str:
-    if value is None:
-        return "-"
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
 if __name__ == "__main__":

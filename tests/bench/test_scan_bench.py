@@ -1,0 +1,58 @@
+"""The scan bench: what it reads off a garment whose faults are known, and how it ends what does not end."""
+
+import numpy as np
+import pytest
+import trimesh
+from numpy.testing import assert_allclose
+
+from vto_pipeline.bench.own_process import run_vto
+from vto_pipeline.bench.scan.captures import scan_row
+from vto_pipeline.bench.scan.truth import beside_truth, scale_of
+from vto_pipeline.io.meshes import write_ply
+from vto_pipeline.model.mesh import TriangleMesh
+
+
+@pytest.fixture(scope="module")
+def vase():
+    """An open, round, uneven tube: two openings."""
+    turn, height = np.meshgrid(np.linspace(0, 2 * np.pi, 90, endpoint=False), np.linspace(0, 0.6, 60), indexing="ij")
+    radius = 0.15 + 0.05 * np.sin(6 * height) + 0.02 * np.cos(3 * turn)
+    vertices = np.stack([radius * np.cos(turn), height, radius * np.sin(turn)], axis=-1).reshape(-1, 3)
+    i, j = np.meshgrid(np.arange(90), np.arange(59), indexing="ij")
+    a, b = i * 60 + j, (i + 1) % 90 * 60 + j
+    faces = np.concatenate([np.stack([a, a + 1, b], -1), np.stack([b, a + 1, b + 1], -1)]).reshape(-1, 3)
+    return TriangleMesh(vertices, faces.astype(np.int32))
+
+
+def scaled(mesh, factor):
+    return TriangleMesh(factor * mesh.vertices, mesh.faces)
+
+
+@pytest.mark.parametrize("factor", [0.98, 1.0, 1.01])
+def test_the_scale_of_a_garment_is_found(vase, factor):
+    assert_allclose(scale_of(scaled(vase, factor), vase), factor, rtol=2e-4, atol=0)
+
+
+def test_a_garment_half_of_which_is_missing_is_incomplete_and_not_inaccurate(vase):
+    upper = TriangleMesh(vase.vertices, vase.faces[vase.vertices[vase.faces][:, :, 1].mean(axis=1) > 0.3])
+    found = beside_truth(upper, vase)
+    assert found["p99_mm"] < 0.01  # it is a part of the truth
+    assert 0.4 < found["complete_2mm"] < 0.6
+    assert (found["openings"], found["true_openings"]) == (2, 2)
+    assert_allclose(found["scale_off_percent"], 0.0, rtol=0, atol=0.05)  # of one percent
+
+
+def test_a_scan_that_takes_too_long_is_ended(tmp_path):
+    ended = run_vto(["--help"], tmp_path / "log", 0.01)
+    assert ended.code is None
+    assert run_vto(["--help"], tmp_path / "log", 60.0).code == 0
+
+
+def test_a_refused_capture_is_a_row_with_its_exit_code(vase, tmp_path):
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.2)
+    (tmp_path / "photos").mkdir()
+    write_ply(tmp_path / "body.ply", TriangleMesh(ball.vertices, ball.faces))
+    row = scan_row(tmp_path, "photos", tmp_path / "runs" / "one", [], 60.0)
+    assert row["exit"] == 3
+    assert "median_mm" not in row
+    assert "photos" in (tmp_path / "runs" / "one.log").read_text()

@@ -1,0 +1,55 @@
+"""One `vto` command in a process of its own, with a time limit: what crashes or hangs costs no other."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+_PROGRAM = "import sys; from vto_pipeline.cli.main import main; sys.exit(main())"
+_LOOK = 0.1
+"""Time between two looks at whether it has ended [s]."""
+
+
+class Ended(NamedTuple):
+    """How a command ended.
+
+    Args:
+        code: Its exit code; None when it ran out of time, negative when a signal ended it.
+        seconds: Wall time [s].
+        peak_mb: Largest memory of it or of one of its children [MB].
+    """
+
+    code: int | None
+    seconds: float
+    peak_mb: float
+
+
+def run_vto(arguments: Sequence[str], log: Path, limit: float) -> Ended:
+    """Run `vto` with these arguments.
+
+    Args:
+        arguments: After `vto`.
+        log: File for what it prints.
+        limit: Wall time after which it is ended, with all that it has started [s].
+    """
+    began = time.perf_counter()
+    log.parent.mkdir(parents=True, exist_ok=True)
+    with log.open("wb") as said:
+        process = subprocess.Popen(
+            [sys.executable, "-c", _PROGRAM, *arguments], stdout=said, stderr=said, start_new_session=True
+        )
+        late = False
+        while not (ended := os.wait4(process.pid, os.WNOHANG))[0]:  # which alone tells the memory of this one child
+            if not late and time.perf_counter() - began > limit:
+                late = True
+                os.killpg(process.pid, signal.SIGKILL)
+            time.sleep(_LOOK)
+    _, status, usage = ended
+    process.returncode = code = os.waitstatus_to_exitcode(status)
+    return Ended(None if late else code, time.perf_counter() - began, usage.ru_maxrss / 1000)

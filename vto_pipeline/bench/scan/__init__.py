@@ -1,0 +1,5 @@
+"""Scans of captures whose garment is known: how near they come, and what they cost.
+
+captures: capture folders on the command line, a row each
+truth: a scanned garment beside the true one
+"""
