@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
@@ -43,6 +44,7 @@ def run_rows(tasks: Sequence[RowTask], workers: int, scheduler: str | None, scra
         raise MissingDependencyError(
             "batches need dask.distributed", hint="pip install 'vto-pipeline[batch]'"
         ) from None
+    logging.getLogger("distributed").setLevel(logging.WARNING)
     with ExitStack() as stack:
         if scheduler is None:
             address: Any = stack.enter_context(
@@ -52,6 +54,7 @@ def run_rows(tasks: Sequence[RowTask], workers: int, scheduler: str | None, scra
                     memory_limit=0,  # rows are processes of their own, with limits of their own
                     dashboard_address=":0",  # any free port: two batches do not meet
                     local_directory=str(scratch),
+                    silence_logs=logging.WARNING,
                 )
             )
         else:
