@@ -18,6 +18,7 @@ from vto_pipeline.errors import ConfigError, InputError
 from vto_pipeline.io.bodies.measurements import read_measurements
 from vto_pipeline.io.captures.photos import read_board
 from vto_pipeline.io.fabrics import read_fabric
+from vto_pipeline.pipeline.batch.order import read_order
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -182,7 +183,7 @@ def test_examples_are_read_as_they_stand(page, block, tmp_path):
     path = tmp_path / "example.yaml"
     path.write_text(block.replace("../sample_data", str(ROOT / "sample_data")))
     kinds = {
-        "schema": lambda: planned(path, (), catalogue()),
+        "schema": lambda: read_order(path) if "\nrun:" in block else planned(path, (), catalogue()),
         "name": lambda: read_fabric(path),
         "instrument": lambda: read_fabric(path),
         "sex": lambda: read_measurements(path),

@@ -97,6 +97,12 @@ class IntersectingError(SimulationError):
     """The result still passes through the body or itself."""
 
 
+class BatchError(VtoError):
+    """Some rows of a batch are not done; the others are whole."""
+
+    exit_code = 6
+
+
 class MissingDependencyError(VtoError):
     """A library or a system package is not installed."""
 

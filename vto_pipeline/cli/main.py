@@ -22,6 +22,8 @@ COMMANDS = {
     "fit": "Fit an avatar to a body scan, measurements or two photos.",
     "drape": "Drape a garment on a body.",
     "run": "Run a pipeline document.",
+    "batch": "Run a document many times, with the changes of a table.",
+    "status": "Show what has become of every row of a batch.",
     "plan": "Show what a document would run, without running it.",
     "bench": "Measure error against run time and plot it.",
     "report": "Rebuild the page of a run.",
@@ -84,7 +86,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Returns:
         The exit code: 0 done, 2 bad usage, config or plan, 3 bad input, 4 failed computation, 5 missing dependency,
-        130 interrupted. Our own bugs (1) are left to Python, with their traceback.
+        6 a batch ended with failures, 130 interrupted. Our own bugs (1) are left to Python, with their traceback.
     """
     session = Session()
     try:

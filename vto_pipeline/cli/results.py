@@ -25,8 +25,17 @@ def result_lines(wanted: Iterable[str], out: Path, tables: Catalogue) -> Iterato
         kind = tables.kind(artifact)
         if artifact == "measurements":
             yield from table_lines(("girth", "cm", "± cm (95 %)"), _girths(kind.read(out / kind.filename)))
-        elif artifact.endswith("fit_report"):
-            garment = artifact.removesuffix("fit_report").rstrip("_")
+    yield from verdicts(wanted, out, tables)
+
+
+def verdicts(wanted: Iterable[str], out: Path, tables: Catalogue) -> Iterator[str]:
+    """Yield how each garment fits, in words.
+
+    Args: See `result_lines`.
+    """
+    for artifact in wanted:
+        if artifact.endswith("fit_report"):
+            kind, garment = tables.kind(artifact), artifact.removesuffix("fit_report").rstrip("_")
             yield f"fit{f' of {garment}' if garment else ''}: {kind.read(out / kind.filename)['verdict']}"
 
 

@@ -28,9 +28,16 @@ def catalogue() -> Catalogue:
 
 def planned(path: Path, overrides: Sequence[str], tables: Catalogue) -> tuple[Request, Plan]:
     """Return the request and the plan of a document."""
-    document, tables = _for_its_garments(load_yaml(path), tables)
-    request = read_request(document, path.resolve().parent, tables, overrides)
-    return request, make_plan(request, tables)
+    return planned_document(load_yaml(path), path.resolve().parent, overrides, tables)[:2]
+
+
+def planned_document(
+    document: Document, base: Path, overrides: Sequence[str], tables: Catalogue
+) -> tuple[Request, Plan, Catalogue]:
+    """Return the request, the plan and the tables of a loaded document, whose paths start from a folder."""
+    document, tables = _for_its_garments(document, tables)
+    request = read_request(document, base, tables, overrides)
+    return request, make_plan(request, tables), tables
 
 
 def _for_its_garments(document: Document, tables: Catalogue) -> tuple[Document, Catalogue]:
@@ -98,18 +105,17 @@ def run_document(
     force_all: bool,
     session: Session,
     tables: Catalogue,
+    cache: Path | None = None,
 ) -> None:
     """Run a document and print the outcome to stdout.
 
     Raises:
         VtoError: of whatever kind; a failed computation is recorded in run.json and its partial result named.
     """
-    document, tables = _for_its_garments(document, tables)
-    request = read_request(document, base, tables, overrides)
-    plan = make_plan(request, tables)
+    request, plan, tables = planned_document(document, base, overrides, tables)
     with show_progress(session) as listener:
         try:
-            record = run(request, plan, tables, output, force_all=force_all, listener=listener)
+            record = run(request, plan, tables, output, force_all=force_all, listener=listener, cache=cache)
         except ComputationError as error:
             if error.partial:
                 error.hint = "; ".join(

@@ -4,4 +4,5 @@ stage, catalogue: a row of the table; the tables an engine works on
 given, request, schema: from a document to a checked request
 plan, lacking: walking backwards from what is wanted to what is given
 execution/: running a plan
+batch/: running many
 """

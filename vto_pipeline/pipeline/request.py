@@ -100,14 +100,14 @@ def _override(data: dict[str, Any], text: str, catalogue: Catalogue) -> dict[str
         raise ConfigError(
             f"stages.{section}: unknown stage", where=source.where(), hint=suggest(section, catalogue.sections)
         )
-    change = {section: {key: _number_or_word(value)}}
+    change = {section: {key: number_or_word(value)}}
     check_schema(replace(source, data={"given": {}, "want": ["-"], "stages": change}), document_model(catalogue))
     stages = dict(data.get("stages") or {})
     stages[section] = {**stages.get(section, {}), **change[section]}
     return {**data, "stages": stages}
 
 
-def _number_or_word(text: str) -> Any:
+def number_or_word(text: str) -> Any:
     """Parse a value as JSON, else keep it as a string; the settings class validates it."""
     try:
         return json.loads(text)

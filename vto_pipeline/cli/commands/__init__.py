@@ -1,1 +1,1 @@
-"""One file a command: bench, doctor, drape, fit, plan, report, run, scan, schema, stages."""
+"""One file a command: batch, bench, doctor, drape, fit, plan, report, run, scan, schema, stages, status."""

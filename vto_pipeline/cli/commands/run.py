@@ -12,10 +12,16 @@ from vto_pipeline.cli.session import Session, pass_session
 
 @click.command("run")
 @click.argument("document", metavar="FILE.yaml", type=PATH)
+@click.option("--cache", type=PATH, metavar="DIR", help="Folder of results to share with other runs.")
 @pipeline_options
 @pass_session
 def run_command(
-    session: Session, document: Path, output: Path | None, overrides: tuple[str, ...], force_all: bool
+    session: Session,
+    document: Path,
+    cache: Path | None,
+    output: Path | None,
+    overrides: tuple[str, ...],
+    force_all: bool,
 ) -> None:
     """Run a pipeline document: make the wanted artifacts from the given inputs.
 
@@ -37,4 +43,5 @@ def run_command(
         force_all,
         session,
         catalogue(),
+        cache,
     )

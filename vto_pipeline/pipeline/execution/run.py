@@ -30,6 +30,7 @@ def run(
     *,
     force_all: bool = False,
     listener: Listener | None = None,
+    cache: Path | None = None,
 ) -> dict[str, Any]:
     """Run a plan in a folder, resuming from the results of earlier runs.
 
@@ -40,6 +41,7 @@ def run(
         folder: RUN; made if need be.
         force_all: Leave nothing out, for comparing.
         listener: Receives how it goes.
+        cache: Where results are kept, which several runs may share; None: in the run's folder.
 
     Returns:
         What run.json holds.
@@ -50,7 +52,8 @@ def run(
         ComputationError: a stage failed; its partial result is under RUN/out/partial.
     """
     with locked_run_folder(folder, [path for one in request.given.values() for path in one.paths]):
-        runner = _Run(request, plan, catalogue, folder, force_all, listener or Listener())
+        store = Store(folder / "cache" if cache is None else cache)
+        runner = _Run(request, plan, catalogue, folder, store, force_all, listener or Listener())
         return runner.run_all()
 
 
@@ -58,11 +61,18 @@ class _Run:
     """One run in progress."""
 
     def __init__(
-        self, request: Request, plan: Plan, catalogue: Catalogue, folder: Path, force_all: bool, listener: Listener
+        self,
+        request: Request,
+        plan: Plan,
+        catalogue: Catalogue,
+        folder: Path,
+        store: Store,
+        force_all: bool,
+        listener: Listener,
     ) -> None:
         self.request, self.plan, self.catalogue = request, plan, catalogue
         self.force_all, self.listener = force_all, listener
-        self.store = Store(folder / "cache")
+        self.store = store
         self.out = OutputFolder(folder / "out", catalogue)
         self.record = RunRecord(folder / RECORD, request, plan)
         self.results: dict[str, Result] = {}
@@ -106,14 +116,15 @@ class _Run:
         name = step.stage.name
         digests = {artifact: self._digest(artifact) for artifact in step.inputs}
         record.key = result_key(step, digests, self.request.seed, self.force_all)
-        result = self.store.find(name, record.key)
-        if result is None:
-            self.listener.started(number, len(self.plan.steps), step.stage)
-            result = self._make(step, record)
-            record.status = "ran"
-        else:
-            record.recall(result.record)
-            record.status = "cached"
+        with self.store.claimed(name, record.key):
+            result = self.store.find(name, record.key)
+            if result is None:
+                self.listener.started(number, len(self.plan.steps), step.stage)
+                result = self._make(step, record)
+                record.status = "ran"
+            else:
+                record.recall(result.record)
+                record.status = "cached"
         record.reason = result.record["reason"]
         if record.reason:
             record.status = "left_out"

@@ -1,13 +1,18 @@
-"""Results on disk: a folder with a manifest written last and renamed into place. No manifest, no result."""
+"""Results on disk: a folder with a manifest written last and renamed into place. No manifest, no result.
+
+Several runs may share a store: what one of them makes, the others wait for. All locks are the operating system's, so
+that a killed run leaves none.
+"""
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -45,7 +50,7 @@ class Result:
 
 
 class Store:
-    """All results of one run folder, by stage and key."""
+    """Results of one run, or of several that share them, by stage and key."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -61,13 +66,24 @@ class Store:
         return Result(folder, manifest["outputs"], manifest["digests"], manifest["record"]) if whole else None
 
     @contextmanager
+    def claimed(self, stage: str, key: str) -> Iterator[None]:
+        """Wait until no other run makes this result, and keep others from making it."""
+        (self.folder / stage).mkdir(parents=True, exist_ok=True)
+        with (self.folder / stage / f".{key}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            yield
+
+    @contextmanager
     def making(self, stage: str) -> Iterator[Path]:
         """A folder to make a result in; gone afterwards unless `finish` moved it."""
         self.folder.mkdir(parents=True, exist_ok=True)
         folder = Path(tempfile.mkdtemp(prefix=f"{_UNFINISHED}{stage}-", dir=self.folder))
+        held = os.open(folder, os.O_RDONLY)
+        fcntl.flock(held, fcntl.LOCK_EX)
         try:
             yield folder
         finally:
+            os.close(held)
             shutil.rmtree(folder, ignore_errors=True)
 
     def finish(
@@ -86,6 +102,12 @@ class Store:
         return Result(folder, dict(outputs), digests, dict(record))
 
     def sweep(self) -> None:
-        """Remove what interrupted runs left."""
+        """Remove what interrupted runs left, and nothing that a run at work is making."""
         for folder in self.folder.glob(f"{_UNFINISHED}*"):
-            shutil.rmtree(folder, ignore_errors=True)
+            with suppress(OSError):  # held by its run, or just gone
+                held = os.open(folder, os.O_RDONLY)
+                try:
+                    fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    shutil.rmtree(folder, ignore_errors=True)
+                finally:
+                    os.close(held)

@@ -1,0 +1,88 @@
+"""`vto batch` on the toy tables, on a cluster of this machine."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from vto_pipeline.cli.commands import batch
+
+TESTS = str(Path(__file__).parents[1])
+TOY_PROGRAM = (
+    f"import sys; sys.path.insert(0, {TESTS!r}); from vto_pipeline.cli import work; from toy_tables import TOY; "
+    "work.catalogue = lambda: TOY; from vto_pipeline.cli.main import main; sys.exit(main())"
+)
+TABLE = "name,given.left.number,stages.add.offset,stages.add.fail\na,left.txt,1,\nb,right.txt,2,\nc,left.txt,,true\n"
+ORDER = """\
+schema: 1
+run:
+  schema: 1
+  given: {left: {number: left.txt}, right: {number: right.txt}}
+  want: [squared, page]
+rows: table.csv
+"""
+
+
+@pytest.fixture
+def ordered(vto, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """`vto`, with a batch of three rows of which the third fails."""
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(batch, "PROGRAM", (sys.executable, "-c", TOY_PROGRAM))
+    (tmp_path / "order.yaml").write_text(ORDER)
+    (tmp_path / "table.csv").write_text(TABLE)
+    return vto
+
+
+def squared(row: str) -> str:
+    return Path("november", "rows", row, "out", "squared.txt").read_text()
+
+
+@pytest.mark.filterwarnings("default")  # of dask and its worker processes
+def test_a_batch_does_what_can_be_done_and_only_the_rest_again(ordered, tmp_path: Path) -> None:
+    said = ordered("batch", "order.yaml", "-o", "november", "--workers", "2")
+    assert said.code == 6, said.err
+    assert "1 of 3 rows are not done: 1 failed" in said.err
+    assert squared("a") == str((2 * 3 + 2 * 4 + 1) ** 2)
+    assert squared("b") == str((2 * 4 + 2 * 4 + 2) ** 2)
+    record = json.loads(Path("november/batch.json").read_text())
+    rows = {row["name"]: row for row in record["rows"]}
+    assert {name: row["status"] for name, row in rows.items()} == {"a": "done", "b": "done", "c": "failed"}
+    assert "sum diverged" in rows["c"]["problem"]
+    page = Path("november/page.html").read_text()
+    assert 'class="bad">failed' in page
+    assert "sum diverged" in page
+    made = len(list(Path("november/cache/right.double").glob("*/manifest.json")))
+    assert made == 1  # three rows need it
+
+    Path("table.csv").write_text(TABLE.replace("true", ""))
+    again = ordered("batch", "order.yaml", "-o", "november")
+    assert again.code == 0, again.err
+    assert "2 of 3 rows are done and unchanged" in again.err
+    assert "[1/1] c: done" in again.err
+    assert squared("c") == str((2 * 3 + 2 * 4) ** 2)
+
+    third = ordered("batch", "order.yaml", "-o", "november", "--json")
+    assert third.code == 0
+    assert third.data["counts"] == {"done": 3}
+
+    status = ordered("status", "november")
+    assert status.code == 0
+    assert status.out.startswith("3 rows: 3 done")
+
+
+def test_a_row_that_cannot_be_planned_stops_all_before_they_begin(ordered, tmp_path: Path) -> None:
+    (tmp_path / "table.csv").write_text(TABLE + "d,nowhere.txt,,\n")
+    said = ordered("batch", "order.yaml", "-o", "november")
+    assert said.code == 3
+    assert "row d" in said.err
+    assert "nowhere.txt" in said.err
+    assert not Path("november").exists()
+
+
+def test_a_folder_without_a_batch_has_no_status(vto) -> None:
+    said = vto("status", ".")
+    assert said.code == 3
+    assert "it has no batch.json" in said.err

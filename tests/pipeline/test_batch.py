@@ -1,0 +1,191 @@
+"""Batches on the toy tables: the rows of a table, limits and retries of a row, results shared by runs."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from vto_pipeline.errors import ConfigError, InputError
+from vto_pipeline.pipeline.batch.ledger import LEDGER, Ledger, read_ledger
+from vto_pipeline.pipeline.batch.order import read_order
+from vto_pipeline.pipeline.batch.row import RowResult, RowTask, run_row
+from vto_pipeline.pipeline.execution.store import Store
+
+RUN = "run: {schema: 1, given: {left: {number: left.txt}}, want: [total]}\n"
+
+
+def order(folder: Path, text: str, **tables: str) -> list:
+    """The rows of a batch document beside left.txt, right.txt and tables."""
+    for name, number in (("left.txt", "3"), ("right.txt", "4")):
+        (folder / name).write_text(number)
+    for name, table in tables.items():
+        (folder / f"{name}.csv").write_text(table)
+    (folder / "batch.yaml").write_text(f"schema: 1\n{text}")
+    return read_order(folder / "batch.yaml")
+
+
+def test_a_table_changes_keys_and_leaves_the_rest(tmp_path: Path) -> None:
+    table = "name,given.right.number,stages.add.offset,seed\na,right.txt,5,\nb,,,7\n"
+    first, second = order(tmp_path, f"{RUN}rows: table.csv\n", table=table)
+    left, right = (str((tmp_path / name).resolve()) for name in ("left.txt", "right.txt"))
+    assert (first.name, second.name) == ("a", "b")
+    assert first.data["given"] == {"left": {"number": left}, "right": {"number": right}}
+    assert first.data["stages"] == {"add": {"offset": 5}}
+    assert "seed" not in first.data
+    assert second.data == {"schema": 1, "given": {"left": {"number": left}}, "want": ["total"], "seed": 7}
+    assert second.where.endswith("table.csv, row 3")
+
+
+def test_every_combination_becomes_a_row(tmp_path: Path) -> None:
+    text = (
+        RUN
+        + "rows: [{name: a}, {name: b}]\nevery: {stages.add.offset: [1, 2], given.left.number: [left.txt, right.txt]}\n"
+    )
+    rows = order(tmp_path, text)
+    assert [row.name for row in rows][:3] == ["a_1_left", "a_1_right", "a_2_left"]
+    assert len(rows) == 8
+    assert len(order(tmp_path, RUN + "every: {seed: [1, 2, 3]}\n")) == 3
+
+
+def test_a_table_in_parquet_is_the_same_as_in_csv(tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    pyarrow = pytest.importorskip("pyarrow")
+    columns = {"name": ["a", "b"], "stages.add.offset": [5, None]}
+    parquet.write_table(pyarrow.table(columns), tmp_path / "table.parquet")
+    rows = order(tmp_path, f"{RUN}rows: table.parquet\n")
+    assert [row.data.get("stages") for row in rows] == [{"add": {"offset": 5}}, None]
+
+
+@pytest.mark.parametrize(
+    ("text", "table", "problem"),
+    [
+        (RUN, "", "the batch has no rows"),
+        (f"{RUN}rows: []\n", "", "the batch has no rows"),
+        (f"{RUN}rows: table.csv\n", "name\na\na\n", "the name 'a' is there 2 times"),
+        (f"{RUN}rows: table.csv\n", "name\n../a\n", "'../a' is not a valid name"),
+        (f"{RUN}rows: table.csv\n", "fabric\ndenim\n", "'fabric' is not a key of a pipeline document"),
+        (f"{RUN}rows: table.csv\n", "name\na,b\n", "more cells than the head"),
+        (f"{RUN}rows: nowhere.csv\n", "", "no such file"),
+        (f"{RUN}every: {{seed: {list(range(400))}, stages.add.offset: {list(range(400))}}}\n", "", "160000 rows"),
+        (f"{RUN}cows: table.csv\n", "", "cows: unknown key"),
+    ],
+)
+def test_a_wrong_batch_is_refused_with_its_place(tmp_path: Path, text: str, table: str, problem: str) -> None:
+    with pytest.raises(ConfigError, match="^") as caught:
+        order(tmp_path, text, table=table)
+    assert problem in caught.value.problem
+
+
+def test_the_key_of_a_row_is_what_decides_its_result(tmp_path: Path) -> None:
+    (row,) = order(tmp_path, f"{RUN}rows: [{{name: a}}]\n")
+    key = row.key(False)
+    os.utime(tmp_path / "left.txt", (1, 1))
+    assert row.key(False) == key
+    assert row.key(True) != key
+    (tmp_path / "left.txt").write_text("5")
+    assert row.key(False) != key
+
+
+def task(folder: Path, program: str, **limits: float) -> RowTask:
+    values = {"seconds": 60.0, "memory_mb": 2000.0, "retries": 0} | limits
+    return RowTask("a", "k", (sys.executable, "-c", program), str(folder / "logs" / "a.log"), 1, **values)
+
+
+def test_a_row_says_how_it_ended(tmp_path: Path) -> None:
+    done = run_row(task(tmp_path, "import sys; print('{}'); print('heard', file=sys.stderr)"))
+    assert (done.status, done.exit_code, done.problem, done.tries) == ("done", 0, "", 1)
+    assert (tmp_path / "logs" / "a.log").read_text() == "heard\n"
+    error = json.dumps({"error": {"problem": "no such file", "where": "b.yaml", "hint": ""}})
+    refused = run_row(task(tmp_path, f"import sys; print({error!r}); sys.exit(3)"))
+    assert (refused.status, refused.problem) == ("refused", "no such file (b.yaml)")
+    assert run_row(task(tmp_path, "import sys; sys.exit(4)")).status == "failed"
+
+
+def test_a_crash_is_tried_again_and_a_failure_is_not(tmp_path: Path) -> None:
+    count = f"open({str(tmp_path / 'count')!r}, 'a').write('x')"
+    crashed = run_row(task(tmp_path, f"{count}; import os; os.kill(os.getpid(), 11)", retries=2))
+    assert (crashed.status, crashed.exit_code, crashed.tries) == ("crashed", -11, 3)
+    assert len((tmp_path / "count").read_text()) == 3
+    run_row(task(tmp_path, f"{count}; import sys; sys.exit(4)", retries=2))
+    assert len((tmp_path / "count").read_text()) == 4
+
+
+def has_ended(pid: int) -> bool:
+    """Whether a process is gone, or waits only for somebody to take note of its end."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+    except FileNotFoundError:
+        return True
+
+
+def test_limits_end_a_row_and_all_that_it_has_started(tmp_path: Path) -> None:
+    pid = tmp_path / "pid"
+    child = f"import os, time; open({str(pid)!r}, 'w').write(str(os.getpid())); time.sleep(100)"
+    program = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {child!r}])"
+    began = time.monotonic()
+    late = run_row(task(tmp_path, program, seconds=3.0))
+    assert (late.status, late.problem) == ("too long", "it takes longer than 3 s")
+    assert time.monotonic() - began < 20.0  # s: not the hundred of the child
+    assert has_ended(int(pid.read_text()))
+    large = run_row(task(tmp_path, "import time; x = bytearray(300_000_000); time.sleep(60)", memory_mb=150.0))
+    assert (large.status, large.problem) == ("too large", "it needs more than 150 MB of memory")
+    assert large.peak_mb > 150.0
+
+
+def test_the_ledger_knows_what_is_done(tmp_path: Path) -> None:
+    ledger = Ledger(tmp_path, ["a", "b"])
+    ledger.enter(RowResult("a", "k", "done", 0, 2.5, 90.0, 1), "fits")
+    again = Ledger(tmp_path, ["a", "b", "c"])
+    assert [again.is_done(name, "k") for name in ("a", "b", "c")] == [True, False, False]
+    assert not again.is_done("a", "another")
+    assert again.expected_seconds("a") == 2.5
+    assert again.expected_seconds("c") == float("inf")
+    assert read_ledger(tmp_path)["counts"] == {"done": 1, "waiting": 1}
+    assert (tmp_path / "batch.csv").read_text().splitlines()[1] == "a,done,0,2.5,90.0,1,fits,"
+    (tmp_path / LEDGER).write_text('{"rows": [{}]}')
+    with pytest.raises(InputError, match="not the record of a batch"):
+        Ledger(tmp_path, ["a"])
+
+
+def test_what_one_run_makes_others_wait_for(tmp_path: Path) -> None:
+    """Two threads claim one result through stores of their own, as two runs do; the second finds it made."""
+    made: list[str] = []
+
+    def work(name: str) -> None:
+        store = Store(tmp_path)
+        with store.claimed("add", "key"):
+            if store.find("add", "key") is None:
+                with store.making("add") as folder:
+                    time.sleep(0.3)
+                    (folder / "total.txt").write_text("7")
+                    store.finish(folder, "add", "key", {"total": "total.txt"}, {})
+                made.append(name)
+
+    threads = [threading.Thread(target=work, args=(name,)) for name in "ab"]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(made) == 1
+
+
+def test_sweeping_leaves_what_a_run_is_making(tmp_path: Path) -> None:
+    program = (
+        "import os, sys, time; from pathlib import Path; from vto_pipeline.pipeline.execution.store import Store\n"
+        f"with Store(Path({str(tmp_path)!r})).making('add') as folder: print(folder, flush=True); time.sleep(60)"
+    )
+    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        folder = Path(process.stdout.readline().strip())
+        Store(tmp_path).sweep()
+        assert folder.is_dir()
+        process.kill()
+    Store(tmp_path).sweep()
+    assert not folder.exists()

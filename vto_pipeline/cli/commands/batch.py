@@ -1,0 +1,169 @@
+"""vto batch"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from vto_pipeline.cli.options import PATH, force_option, message_options
+from vto_pipeline.cli.session import Session, pass_session
+from vto_pipeline.errors import BatchError, VtoError
+
+if TYPE_CHECKING:
+    from vto_pipeline.pipeline.batch.ledger import Ledger
+    from vto_pipeline.pipeline.batch.order import Row
+    from vto_pipeline.pipeline.batch.row import RowTask
+
+PROGRAM = (sys.executable, "-c", "import sys; from vto_pipeline.cli.main import main; sys.exit(main())")
+"""What runs one row: this program once more, whatever is on the path."""
+
+
+@click.command("batch")
+@click.argument("document", metavar="FILE.yaml", type=PATH)
+@click.option("-o", "--output", type=PATH, metavar="BATCH", help="Folder of the batch. [default: runs/NAME]")
+@click.option("--workers", type=click.IntRange(1, 1000), help="Rows at once. [default: one a core, as memory allows]")
+@click.option("--scheduler", metavar="ADDRESS", help="Of a dask scheduler; its workers see the same folders.")
+@click.option("--memory", type=click.FloatRange(0.1, 4096), default=6.0, show_default=True, help="Limit of a row [GB].")
+@click.option("--time-limit", type=click.FloatRange(1), default=3600.0, show_default=True, help="Limit of a row [s].")
+@click.option("--retries", type=click.IntRange(0, 10), default=1, show_default=True, help="After a crash of a row.")
+@force_option
+@message_options
+@pass_session
+def batch_command(
+    session: Session,
+    document: Path,
+    output: Path | None,
+    workers: int | None,
+    scheduler: str | None,
+    memory: float,
+    time_limit: float,
+    retries: int,
+    force_all: bool,
+) -> None:
+    """Run a pipeline document many times, each time with the changes of one row of a table.
+
+    All rows are checked before the first one runs. What several rows need is made once. Rows that are done, and whose
+    inputs have not changed, are not run again. Exit code 6: some rows failed; the others are whole.
+
+    \b
+    vto batch orders.yaml -o batches/november
+    vto status batches/november
+    """
+    from vto_pipeline.pipeline.batch.cluster import default_workers, run_rows
+    from vto_pipeline.pipeline.batch.ledger import Ledger
+    from vto_pipeline.pipeline.batch.order import read_order
+    from vto_pipeline.pipeline.execution.folder import locked_run_folder
+
+    rows = read_order(document)
+    folder = (output or Path("runs") / document.stem).absolute()
+    _check_all(rows)
+    with locked_run_folder(folder):
+        ledger = Ledger(folder, [row.name for row in rows])
+        keys = {row.name: row.key(force_all) for row in rows}
+        missing = [row for row in rows if not ledger.is_done(row.name, keys[row.name])]
+        missing.sort(key=lambda row: -ledger.expected_seconds(row.name))  # the longest first; stable
+        if len(missing) < len(rows):
+            session.say(f"{len(rows) - len(missing)} of {len(rows)} rows are done and unchanged")
+        count = workers or default_workers(1e3 * memory)
+        limits = {"seconds": time_limit, "memory_mb": 1e3 * memory, "retries": retries}
+        tasks = [_task(row, keys[row.name], folder, force_all, count, limits) for row in missing]
+        for row in missing:
+            ledger.wait(row.name)
+        ledger.save()
+        began = time.monotonic()
+        for done, result in enumerate(run_rows(tasks, count, scheduler, folder / "workers") if tasks else (), start=1):
+            words = _found(folder / "rows" / result.name) if result.status == "done" else ""
+            ledger.enter(result, words)
+            left = (time.monotonic() - began) / done * (len(tasks) - done)
+            session.say(
+                f"[{done}/{len(tasks)}] {result.name}: {result.status} after {result.seconds:.1f} s"
+                f"{': ' if result.problem or words else ''}{result.problem or words}; about {left:.0f} s left"
+            )
+        _answer(session, folder, ledger)
+
+
+def _check_all(rows: Sequence[Row]) -> None:
+    """Plan every row, so that no mistake waits until hours have passed.
+
+    Raises:
+        VtoError: of the first row that is wrong.
+    """
+    from vto_pipeline.cli import work
+    from vto_pipeline.io.documents import Document
+
+    tables = work.catalogue()
+    for row in rows:
+        try:
+            work.planned_document(Document(row.data, Path(row.where)), Path("/"), (), tables)
+        except VtoError as error:
+            error.where = f"row {row.name}, {error.where or row.where}"
+            raise
+
+
+def _task(row: Row, key: str, folder: Path, force_all: bool, workers: int, limits: Mapping[str, Any]) -> RowTask:
+    """Write the row's document, and return what a worker is to do with it."""
+    from vto_pipeline.io.documents import write_json
+    from vto_pipeline.pipeline.batch.row import RowTask
+    from vto_pipeline.pipeline.execution.cost import thread_count
+
+    document = folder / "documents" / f"{row.name}.json"
+    write_json(document, row.data)
+    arguments = [
+        "run",
+        str(document),
+        "-o",
+        str(folder / "rows" / row.name),
+        "--cache",
+        str(folder / "cache"),
+        "--json",
+    ]
+    return RowTask(
+        name=row.name,
+        key=key,
+        command=(*PROGRAM, *arguments, *(["--force-all"] if force_all else [])),
+        log=str(folder / "logs" / f"{row.name}.log"),
+        threads=max(1, thread_count() // workers),
+        **limits,
+    )
+
+
+def _found(run: Path) -> str:
+    """Return what a row found in words: its verdicts."""
+    from vto_pipeline.cli import work
+    from vto_pipeline.cli.results import verdicts
+    from vto_pipeline.io.documents import read_json
+    from vto_pipeline.pipeline.execution.folder import RECORD
+
+    record = read_json(run / RECORD)
+    return "; ".join(verdicts(record["wanted"], run / "out", work.run_tables(run, work.catalogue())))
+
+
+def _answer(session: Session, folder: Path, ledger: Ledger) -> None:
+    """Write the page, and print the outcome.
+
+    Raises:
+        BatchError: not every row is done.
+    """
+    from vto_pipeline.io.files import replacing
+    from vto_pipeline.pipeline.batch.ledger import read_ledger
+    from vto_pipeline.report.batch_page import build_batch_page
+
+    batch = read_ledger(folder)
+    pages = {name: f"rows/{name}/out/page.html" for name in ledger.rows}
+    pages = {name: page for name, page in pages.items() if (folder / page).is_file()}
+    with replacing(folder / "page.html") as beside:
+        beside.write_text(build_batch_page(batch, pages), encoding="utf-8")
+    done = ledger.counts().get("done", 0)
+    if done < len(ledger.rows):
+        others = ", ".join(f"{count} {status}" for status, count in sorted(ledger.counts().items()) if status != "done")
+        raise BatchError(
+            f"{len(ledger.rows) - done} of {len(ledger.rows)} rows are not done: {others}",
+            where=str(folder),
+            hint=f"`vto status {folder}` lists them; run the same command again to repeat them only",
+        )
+    session.answer(batch, [f"{done} rows are done", f"  page  {folder / 'page.html'}"])

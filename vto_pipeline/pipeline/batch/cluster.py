@@ -1,0 +1,75 @@
+"""All rows of a batch on the workers of dask.distributed: here, or wherever a scheduler is."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from vto_pipeline.errors import ConfigError, MissingDependencyError
+from vto_pipeline.pipeline.batch.row import RowResult, RowTask, run_row
+
+_SHARE_OF_MEMORY = 0.8  # of the machine's that rows may take together
+
+
+def default_workers(memory_mb: float) -> int:
+    """Return how many rows run at once: one a core, as far as memory goes.
+
+    Args:
+        memory_mb: Limit of each [MB].
+    """
+    present = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e6
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return max(1, min(cores, int(_SHARE_OF_MEMORY * present / memory_mb)))
+
+
+def run_rows(tasks: Sequence[RowTask], workers: int, scheduler: str | None, scratch: Path) -> Iterator[RowResult]:
+    """Run all rows, and yield what becomes of each as soon as it ends.
+
+    Args:
+        tasks: In the order in which they begin.
+        workers: How many run at once on this machine, where there is no scheduler.
+        scheduler: Address of one, whose workers have this package and see the same folders; None: this machine.
+        scratch: Folder for the workers' own files.
+
+    Raises:
+        MissingDependencyError: no dask.distributed; ConfigError: no scheduler answers.
+    """
+    try:
+        from distributed import Client, LocalCluster, as_completed
+    except ImportError:
+        raise MissingDependencyError(
+            "batches need dask.distributed", hint="pip install 'vto-pipeline[batch]'"
+        ) from None
+    logging.getLogger("distributed").setLevel(logging.WARNING)
+    with ExitStack() as stack:
+        if scheduler is None:
+            address: Any = stack.enter_context(
+                LocalCluster(
+                    n_workers=min(workers, len(tasks)),
+                    threads_per_worker=1,
+                    memory_limit=0,  # rows are processes of their own, with limits of their own
+                    dashboard_address=":0",  # any free port: two batches do not meet
+                    local_directory=str(scratch),
+                    silence_logs=logging.WARNING,
+                )
+            )
+        else:
+            address = scheduler
+        try:
+            client = stack.enter_context(Client(address, timeout="20s"))
+        except (OSError, TimeoutError, ValueError) as error:
+            raise ConfigError(f"no scheduler answers: {error}", where=str(scheduler)) from None
+        futures = {
+            client.submit(run_row, task, key=f"{task.name}-{task.key}", pure=False, priority=-number): task
+            for number, task in enumerate(tasks)
+        }
+        for future in as_completed(futures):
+            task = futures[future]
+            if future.status == "finished":
+                yield future.result()
+            else:
+                yield RowResult(task.name, task.key, "lost", -9, 0.0, 0.0, 1, f"its worker died: {future.exception()}")
