@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from vto_pipeline.model.camera import Intrinsics
-from vto_pipeline.scan.depth.rgbd_frame import prepare_frame, reduced
+from vto_pipeline.scan.depth.rgbd_frame import prepare_frame
 from vto_pipeline.scan.photos.consistency import rays
 
 CAMERA = Intrinsics(640, 480, 525.0, 525.0, 319.5, 239.5)
@@ -71,6 +71,6 @@ def test_surfaces_seen_obliquely_take_no_part():
 
 def test_a_smaller_camera_sees_the_same_rays():
     """The middle of four pixels, in both."""
-    small = reduced(CAMERA, 2)
+    small = CAMERA.reduced(2)
     whole, half = rays(CAMERA.matrix, 480, 640), rays(small.matrix, 240, 320)
     assert_allclose(half, whole.reshape(240, 2, 320, 2, 3).mean((1, 3)), atol=1e-12)

@@ -2,7 +2,7 @@
 
 coarse_align, robust_icp, align: the scan in the frame of its mannequin
 color_model, graph_cut, subtract: the mannequin taken away
-loop_evidence, notches, rims, openings: real openings kept, scan holes filled
+loop_evidence, bare_parts, notches, rims, openings: real openings kept, scan holes filled
 simulation_mesh: the mesh that is simulated
 wearable: whether a surface can be a garment at all
 """

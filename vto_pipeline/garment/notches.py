@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from vto_pipeline.garment.bare_parts import BareParts
 from vto_pipeline.garment.loop_evidence import encloses
 from vto_pipeline.garment.rims import smooth_curve
 from vto_pipeline.geometry.remeshing.holes import fill_notch
@@ -27,20 +28,24 @@ LOOKED_AT = 120
 """Points of each rim between which notches are looked for."""
 ROUNDS = 3
 """How often notches are looked for: one rim may have several."""
+BARE = 0.2
+"""With a larger share over mannequin that was seen bare, it is no notch. Over a scan hole it is nothing."""
 WAVELENGTH = 0.025
 """Notches are looked for on the rim without its zigzag [m]."""
 
 
 def close_notches(
-    mesh: TriangleMesh, distance: SurfaceDistance, least_perimeter: float, reach: float
+    mesh: TriangleMesh, distance: SurfaceDistance, bare: BareParts | None, least_perimeter: float, reach: float
 ) -> tuple[TriangleMesh, int]:
     """Return the mesh with the notches of its rims filled, and how many there were.
 
     The line across a notch runs outside the mannequin or grazes it, and the rim that is left goes round the mannequin.
+    What would cover mannequin that was seen bare is no notch but the shape of the rim, as the V of an open collar.
 
     Args:
         mesh: The garment.
         distance: Signed distances to the mannequin.
+        bare: What was seen of the bare mannequin, if it is known.
         least_perimeter: Shorter loops are not looked at [m].
         reach: How far inside an opening the mannequin may end [m].
     """
@@ -50,7 +55,7 @@ def close_notches(
         notches = [
             notch
             for walk in rims
-            if (notch := _largest_notch(mesh, walk, distance, least_perimeter, reach)) is not None
+            if (notch := _largest_notch(mesh, walk, distance, bare, least_perimeter, reach)) is not None
         ]
         for around, directions in notches:
             mesh = _fill_smoothly(mesh, around, directions)
@@ -66,7 +71,12 @@ def _length(mesh: TriangleMesh, walk: IntArray) -> float:
 
 
 def _largest_notch(
-    mesh: TriangleMesh, walk: IntArray, distance: SurfaceDistance, least_perimeter: float, reach: float
+    mesh: TriangleMesh,
+    walk: IntArray,
+    distance: SurfaceDistance,
+    bare: BareParts | None,
+    least_perimeter: float,
+    reach: float,
 ) -> tuple[IntArray, FloatArray] | None:
     """Return the half-edges round the largest notch of a boundary loop, and the directions in which the rim comes to it
     and goes on after it, shape (2, 3); None when there is no notch."""
@@ -76,6 +86,8 @@ def _largest_notch(
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1))])
     at = np.unique(np.searchsorted(along[:-1], np.arange(LOOKED_AT) / LOOKED_AT * along[-1]).clip(max=len(walk) - 1))
     for start, end in _candidate_notches(points, along, at, distance, least_perimeter):
+        if bare is not None and np.mean(bare.under(_between(points, along, start, end))) > BARE:
+            continue
         left = at[np.argsort(np.mod(at - end, len(walk)))]  # from the notch's end round to its start
         left = left[: np.count_nonzero(np.mod(at - end, len(walk)) <= np.mod(start - end, len(walk)))]
         closing_line = points[start] + np.linspace(0.0, 1.0, 12)[1:-1, None] * (points[end] - points[start])
@@ -85,6 +97,15 @@ def _largest_notch(
             notch = np.roll(walk, -start)[: (end - start) % len(walk)]
             return notch, np.stack([before, after]) / np.linalg.norm([before, after], axis=1, keepdims=True)
     return None
+
+
+def _between(points: FloatArray, along: FloatArray, start: int, end: int) -> FloatArray:
+    """Return points spread over what would close a notch: from the rim round it to the line across, shape (N, 3)."""
+    share = np.linspace(0.0, 1.0, 25)[1:-1]
+    arc = np.mod(along[end] - along[start], along[-1])
+    rim = points[np.searchsorted(along[:-1], np.mod(along[start] + share * arc, along[-1])) % len(points)]
+    line = points[start] + share[:, None] * (points[end] - points[start])
+    return np.concatenate([rim + inwards * (line - rim) for inwards in (0.25, 0.5, 0.75)])
 
 
 def _candidate_notches(

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from vto_pipeline.errors import GarmentError
+from vto_pipeline.garment.bare_parts import BareParts
 from vto_pipeline.garment.loop_evidence import LoopShape, encloses, measure_loops
 from vto_pipeline.garment.notches import close_notches
 from vto_pipeline.garment.rims import drop_flaps, fair_rims, largest_piece, trim_ledges
@@ -40,7 +41,11 @@ class OpeningsConfig(Config):
 
 
 def close_scan_holes(
-    shell: TriangleMesh, mannequin: TriangleMesh | None, config: OpeningsConfig, job: Job
+    shell: TriangleMesh,
+    mannequin: TriangleMesh | None,
+    config: OpeningsConfig,
+    job: Job,
+    bare: BareParts | None = None,
 ) -> tuple[TriangleMesh, list[Opening], NDArray[np.bool_]]:
     """Fill the scan holes and keep the garment's own openings.
 
@@ -52,6 +57,7 @@ def close_scan_holes(
         mannequin: In the same frame, or None.
         config: Settings.
         job: Receives counts and perimeters.
+        bare: What was seen of the bare mannequin, if it is known.
 
     Returns:
         The garment in one piece; its openings, highest first; which of its vertices were observed, shape (V,).
@@ -68,7 +74,9 @@ def close_scan_holes(
     distance = None if mannequin is None else SurfaceDistance(mannequin)
     bridged, notches = clean, 0
     if distance is not None:
-        bridged, notches = close_notches(clean, distance, config.least_perimeter_mm * 1e-3, config.reach_mm * 1e-3)
+        bridged, notches = close_notches(
+            clean, distance, bare, config.least_perimeter_mm * 1e-3, config.reach_mm * 1e-3
+        )
     shapes = measure_loops(bridged)
     is_opening = _classify(bridged, shapes, distance, config, job)
     count = sum(is_opening)

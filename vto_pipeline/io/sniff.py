@@ -9,6 +9,7 @@ from vto_pipeline.errors import InputError
 from vto_pipeline.io import clouds, meshes
 from vto_pipeline.io.bodies import makehuman
 from vto_pipeline.io.captures import images, photos, video
+from vto_pipeline.io.captures.rgbd_layouts import find_layout
 from vto_pipeline.io.documents import load_yaml
 from vto_pipeline.io.files import listed
 from vto_pipeline.io.formats.ply_header import read_header
@@ -45,6 +46,9 @@ def find_kind(path: Path) -> tuple[str, str]:
 def _folder(path: Path) -> tuple[str, str] | None:
     if (path / "intrinsics.json").is_file() and (path / "depth").is_dir():
         return "depth", "it holds intrinsics.json and depth/"
+    layout = find_layout(path)
+    if layout is not None:
+        return "depth", f"it holds depth frames as {layout} lays them out"
     if (path / makehuman.BASE).is_file():
         return "surface", f"it holds MakeHuman's {makehuman.BASE}"
     pictures = listed(path, images.SUFFIXES)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -38,6 +38,19 @@ class Intrinsics:
     def matrix(self) -> FloatArray:
         """K, shape (3, 3)."""
         return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
+
+    def reduced(self, factor: int) -> Intrinsics:
+        """The camera of a picture whose pixels are `factor` times as wide; what does not fill one is cut off."""
+        shift = (factor - 1) / 2  # from the centre of the first small pixel to that of the first one
+        return replace(
+            self,
+            width=self.width // factor,
+            height=self.height // factor,
+            fx=self.fx / factor,
+            fy=self.fy / factor,
+            cx=(self.cx - shift) / factor,
+            cy=(self.cy - shift) / factor,
+        )
 
 
 @dataclass(frozen=True)

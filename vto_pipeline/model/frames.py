@@ -77,10 +77,14 @@ class DepthFrameSet:
 
     Args:
         depth_paths: 16-bit images, N of them; 0 means no reading.
-        color_paths: Colour images registered to the depth, N of them, or empty.
+        color_paths: Colour images, N of them, or empty.
         intrinsics: The depth camera.
         depth_scale: Units of the stored value per metre (1000 for millimetres).
         world_from_cam: Known poses [m], shape (N, 4, 4), or None.
+        poses_approximate: Whether those are good to centimetres only, as from a phone's own tracking.
+        color_intrinsics: The colour camera, which sits where the depth camera does, or None when each colour pixel
+            belongs to the depth pixel with its index.
+        confidence_paths: 8-bit images, N of them, 0 where a reading is not to be trusted, or empty.
     """
 
     depth_paths: tuple[Path, ...]
@@ -88,6 +92,9 @@ class DepthFrameSet:
     intrinsics: Intrinsics
     depth_scale: float
     world_from_cam: FloatArray | None = None
+    poses_approximate: bool = False
+    color_intrinsics: Intrinsics | None = None
+    confidence_paths: tuple[Path, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.depth_paths)

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from vto_pipeline.errors import ScanError
 from vto_pipeline.geometry.topology import component_areas
-from vto_pipeline.io.captures.depth import read_depth
+from vto_pipeline.io.captures.depth import frame_color, frame_depth
 from vto_pipeline.io.captures.images import read_image
 from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.camera import CameraSet, Intrinsics
@@ -138,7 +138,7 @@ def fuse_depth_frames(frames: DepthFrameSet, world_from_cam: FloatArray, config:
         job.note(f"fused what is within {sphere.radius:.2f} m of the place that the frames look at")
 
     def depth_of(index: int) -> NDArray[np.float32]:
-        depth = clean_depth(read_depth(paths[index], frames.depth_scale), camera)
+        depth = clean_depth(frame_depth(frames, index), camera)
         return depth if sphere is None else inside_sphere(depth, camera, world_from_cam[index], sphere)
 
     views = DepthViews(
@@ -146,7 +146,7 @@ def fuse_depth_frames(frames: DepthFrameSet, world_from_cam: FloatArray, config:
         (camera,) * len(paths),
         world_from_cam,
         depth_of,
-        lambda index: read_image(frames.color_paths[index]) if frames.color_paths else plain,
+        lambda index: plain if (picture := frame_color(frames, index)) is None else picture,
     )
     return _fuse(views, config, job)
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from vto_pipeline.cloth.rest_shape.from_hanging import RestShapeConfig, rest_shape
 from vto_pipeline.garment.align import AlignConfig, align_to_mannequin
+from vto_pipeline.garment.bare_parts import BareParts
 from vto_pipeline.garment.openings import OpeningsConfig, close_scan_holes, list_openings
 from vto_pipeline.garment.simulation_mesh import SimulationMeshConfig, remesh_for_simulation
 from vto_pipeline.garment.subtract import SubtractConfig, extract_garment, label_garment
@@ -41,9 +42,11 @@ def _subtract(inputs: Inputs, settings: SubtractConfig, job: Job) -> Outputs:
 
 
 def _openings(inputs: Inputs, settings: OpeningsConfig, job: Job) -> Outputs:
-    garment, openings, observed = close_scan_holes(
-        inputs["garment_shell"], inputs.get("mannequin_surface"), settings, job
-    )
+    mannequin, bare = inputs.get("mannequin_surface"), None
+    if mannequin is not None and "garment_placement" in inputs and "labels" in inputs:
+        scan = transform_mesh(inputs["garment_surface"], inputs["garment_placement"])
+        bare = BareParts(scan, inputs["labels"], mannequin)
+    garment, openings, observed = close_scan_holes(inputs["garment_shell"], mannequin, settings, job, bare)
     return {"garment": garment, "openings": openings, "observed": observed}
 
 
@@ -95,7 +98,7 @@ STAGES: tuple[Stage, ...] = (
         name="openings",
         about="scan holes filled, neck, hem and cuffs kept",
         needs=("garment_shell",),
-        optional=("mannequin_surface",),
+        optional=("mannequin_surface", "garment_surface", "garment_placement", "labels"),
         makes=("garment", "openings", "observed"),
         run=_openings,
         settings=OpeningsConfig,

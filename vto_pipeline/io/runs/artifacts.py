@@ -12,7 +12,7 @@ from vto_pipeline.io.bodies import avatars
 from vto_pipeline.io.bodies import measurements as bodies
 from vto_pipeline.io.bodies.makehuman import BASE
 from vto_pipeline.io.captures import cameras
-from vto_pipeline.io.captures.depth import read_depth_frames
+from vto_pipeline.io.captures.depth import holds_depth_frames, read_depth_frames
 from vto_pipeline.io.captures.images import SUFFIXES
 from vto_pipeline.io.captures.photo_archive import read_photo_archive, write_photo_archive
 from vto_pipeline.io.captures.photos import PHOTO_SUFFIXES, read_photos
@@ -114,7 +114,7 @@ def _role_kinds(role: str, prefix: str) -> tuple[ArtifactKind, ...]:
             f"{role}: frames of a depth camera",
             read_depth_frames,
             receive=_job_by_position(read_depth_frames),
-            in_folder=lambda folder: (folder / "depth").is_dir(),
+            in_folder=holds_depth_frames,
         ),
         _leaf(
             f"{role}_cloud",

@@ -19,6 +19,7 @@ from vto_pipeline.scan.depth.bundle import refine_together
 from vto_pipeline.scan.depth.pose_graph import Edge, disagreement, optimise_poses
 from vto_pipeline.scan.depth.rgbd_frame import RgbdFrame
 from vto_pipeline.scan.depth.tracker import TrackedFrame, Tracker
+from vto_pipeline.scan.in_order import in_order
 from vto_pipeline.scan.photos.consistency import rays
 from vto_pipeline.scan.upright import upright_from_scan
 
@@ -50,17 +51,63 @@ def estimate_trajectory(frames: DepthFrameSet, config: OdometryConfig, job: Job)
         job: Receives progress, frame by frame.
 
     Returns:
-        world_from_cam [m], shape (N, 4, 4), roughly upright, the first camera in front; given poses as they are.
+        world_from_cam [m], shape (N, 4, 4), roughly upright, the first camera in front; given poses as they are,
+        approximate ones refined.
 
     Raises:
         ScanError: a frame holds no readings, or tracking was lost.
     """
-    if frames.world_from_cam is not None:
+    given = frames.world_from_cam
+    if given is not None and not frames.poses_approximate:
         job.leave_out("odometry", "the frames come with poses")
-        return frames.world_from_cam
-    if not frames.color_paths:
-        job.warn("no colour frames: tracking by shape alone drifts on round garments")
+        return given
     tracker = Tracker(frames, config.min_overlap, config.max_jump_mm / 1000)
+    if given is None:
+        surfaces, start, owner = _tracked_path(tracker, config, job)
+    else:
+        surfaces, start, owner = _given_path(tracker, given, config, job)
+    bundle = refine_together(surfaces, start, np.radians(config.pair_deg), job)
+    path = bundle.world_from_cam
+    shift = np.linalg.norm(path[:, :3, 3] - start[:, :3, 3], axis=1)
+    job.measure(
+        frames=len(owner),
+        keyframes=len(surfaces),
+        pairs_refined=bundle.pairs,
+        refined_by_mm=round(1000 * float(np.median(shift)), 3),
+        last_step_mm=round(1000 * bundle.moved, 4),
+    )
+    poses = np.stack([path[k] @ relative for k, relative in owner])
+    return upright_from_scan(poses, _sample_points(surfaces, path)) @ poses
+
+
+def _given_path(
+    tracker: Tracker, poses: FloatArray, config: OdometryConfig, job: Job
+) -> tuple[list[RgbdFrame], FloatArray, list[tuple[int, FloatArray]]]:
+    """As `_tracked_path`, from given poses."""
+    chosen: list[int] = []
+    owner: list[tuple[int, FloatArray]] = []
+    for index, pose in enumerate(poses):
+        relative = np.linalg.inv(poses[chosen[-1]]) @ pose if chosen else np.eye(4)
+        turned = np.linalg.norm(Rotation.from_matrix(relative[:3, :3]).as_rotvec())
+        limit = np.radians(config.keyframe_deg)
+        if not chosen or turned > limit or np.linalg.norm(relative[:3, 3]) > limit:  # at a metre, the same to the eye
+            chosen.append(index)
+            relative = np.eye(4)
+        owner.append((len(chosen) - 1, relative))
+    surfaces = []
+    for frame in in_order(lambda k: tracker.prepare(chosen[k]), len(chosen)):
+        surfaces.append(frame.surface)
+        job.progress(0.7 * len(surfaces) / len(chosen), f"read keyframe {len(surfaces)} of {len(chosen)}")
+    return surfaces, poses[chosen], owner
+
+
+def _tracked_path(
+    tracker: Tracker, config: OdometryConfig, job: Job
+) -> tuple[list[RgbdFrame], FloatArray, list[tuple[int, FloatArray]]]:
+    """Keyframes and their poses; of each frame, which keyframe it follows and its pose in that keyframe's camera."""
+    colors = tracker.frames.color_paths
+    if not colors:
+        job.warn("no colour frames: tracking by shape alone drifts on round garments")
     keyframes, edges, owner = _track(tracker, config, job)
     path = _chained(keyframes, edges)
     loop_edges = _close_loops(tracker, keyframes, path, config, job)
@@ -70,26 +117,17 @@ def estimate_trajectory(frames: DepthFrameSet, config: OdometryConfig, job: Job)
     if loop_edges:
         path = optimise_poses(path, local, config.max_jump_mm / 3000)
     residual = np.array([disagreement(path, edge) for edge in local] or [0.0])
-    surfaces = [key.surface for key in keyframes]
-    bundle = refine_together(surfaces, path, np.radians(config.pair_deg), job)
-    path = bundle.world_from_cam
-    poses = np.stack([path[k] @ relative for k, relative in owner])
-    count = len(poses)
     job.measure(
-        frames=count,
-        keyframes=len(keyframes),
         loop_edges=len(loop_edges),
         edge_residual_median_mm=round(1000 * float(np.median(residual)), 3),
         edge_residual_max_mm=round(1000 * float(residual.max()), 3),
-        pairs_refined=bundle.pairs,
-        last_step_mm=round(1000 * bundle.moved, 4),
     )
     slid = sum(not edge.confirmed for edge in edges)
-    if slid and frames.color_paths:
-        job.warn(f"{slid} of {count - 1} steps have too few matched features: there, the path relies on shape alone")
+    if slid and colors:
+        job.warn(f"{slid} of {len(edges)} steps have too few matched features: there, the path relies on shape alone")
     if not loop_edges:
         job.warn("the path closes no loop: expect centimetres of drift; end the capture where it began")
-    return upright_from_scan(poses, _sample_points(surfaces, path)) @ poses
+    return [key.surface for key in keyframes], path, owner
 
 
 def _track(

@@ -62,26 +62,13 @@ def prepare_frame(color: ByteArray | None, depth: NDArray[np.float32], camera: I
     factor = max(1, round(camera.width / WIDTH))
     lens = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
     fitted, normals = _fit_planes(np.ascontiguousarray(depth), lens, factor)
-    small = reduced(camera, factor)
+    small = camera.reduced(factor)
     brightness = np.zeros(fitted.shape, np.float32)
     if color is not None:
         gray = cv2.cvtColor(color, cv2.COLOR_RGB2GRAY)[: small.height * factor, : small.width * factor]
         shrunk = cv2.resize(gray.astype(np.float32) / 255, (small.width, small.height), interpolation=cv2.INTER_AREA)
         brightness = np.asarray(cv2.GaussianBlur(shrunk, (0, 0), 0.8), dtype=np.float32)
     return RgbdFrame(small, fitted, normals, brightness)
-
-
-def reduced(camera: Intrinsics, factor: int) -> Intrinsics:
-    """The camera of a picture whose pixels are `factor` times as wide; what does not fill one is cut off."""
-    shift = (factor - 1) / 2  # from the centre of the first small pixel to that of the first one
-    return Intrinsics(
-        camera.width // factor,
-        camera.height // factor,
-        camera.fx / factor,
-        camera.fy / factor,
-        (camera.cx - shift) / factor,
-        (camera.cy - shift) / factor,
-    )
 
 
 @njit(cache=True, nogil=True)

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vto_pipeline.errors import ScanError
-from vto_pipeline.io.captures.depth import read_depth
-from vto_pipeline.io.captures.images import read_image
+from vto_pipeline.io.captures.depth import frame_color, frame_depth
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.frames import DepthFrameSet
 from vto_pipeline.scan.depth.depth_mask import clean_depth
@@ -66,11 +65,11 @@ class Tracker:
         """
         frames = self.frames
         path, camera = frames.depth_paths[index], frames.intrinsics
-        depth = clean_depth(read_depth(path, frames.depth_scale), camera)
+        depth = clean_depth(frame_depth(frames, index), camera)
         if np.count_nonzero(depth) < MIN_READINGS:
             problem = f"{np.count_nonzero(depth)} usable depth readings; at least {MIN_READINGS} are needed"
             raise ScanError(problem, where=str(path))
-        color = read_image(frames.color_paths[index]) if frames.color_paths else None
+        color = frame_color(frames, index)
         return TrackedFrame(index, prepare_frame(color, depth, camera), find_features(color, depth, camera))
 
     def track(self, source: TrackedFrame, target: TrackedFrame, steady: FloatArray) -> Edge:
