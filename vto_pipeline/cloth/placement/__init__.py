@@ -2,7 +2,8 @@
 
 place, voxel_fit: unit, axes and place of a garment on a body it was never on
 transfer, regrade: from the body it was on to another; in the same size or in the customer's
-rigid_escape: the garment led about a body as a whole
+rigid_escape, flexible_escape: the garment led about a body as a whole, or part by part
+way_out: what cloth inside a body asks for, so led
 body_growth: a thin body that grows inside the garment
 collapsed_start: a start in which no force has a direction
 collision_free_start: crossings untangled, or known and left alone

@@ -166,7 +166,7 @@ def _best_orientation_if_larger(
     ways = [best]
     for step in range(1, _STEPS + 1):
         larger = TriangleMesh(_LARGER**step * garment.vertices, garment.faces)
-        ways.append(_best_orientation(larger, body, config)[1])
+        ways.append(_best_orientation(larger, body, config.model_copy(update={"cube_mm": _COARSE * config.cube_mm}))[1])
         if ways[-1].score < _FALLING * max(way.score for way in ways):
             break
     turn = max(ways, key=lambda way: way.score).turn

@@ -38,9 +38,9 @@ def transfer_deformation(cloth: TriangleMesh, source: TriangleMesh, target: Tria
     gradient = np.einsum("nk,nkij->nij", shares, _vertex_gradients(source, target)[corners])
     gradient = _smoothed(gradient, matrix, area * near)
     held = np.einsum("nk,nkd->nd", shares, target.vertices[corners])
-    held += np.einsum("nij,nj->ni", _rotations(gradient), cloth.vertices - surface.point)
+    held += np.einsum("nij,nj->ni", nearest_rotations(gradient), cloth.vertices - surface.point)
     weight = diags(area * near**2 / _FIRM**2)
-    return np.asarray(splu((matrix + weight).tocsc()).solve(_divergence(cloth, matrix, gradient) + weight @ held))
+    return np.asarray(splu((matrix + weight).tocsc()).solve(divergence(cloth, matrix, gradient) + weight @ held))
 
 
 def _vertex_gradients(source: TriangleMesh, target: TriangleMesh) -> FloatArray:
@@ -78,8 +78,14 @@ def _smoothed(gradient: FloatArray, matrix: csr_matrix, weight: FloatArray) -> F
     return np.asarray(splu((matrix + held).tocsc()).solve(held @ flat)).reshape(-1, 3, 3)
 
 
-def _divergence(cloth: TriangleMesh, matrix: csr_matrix, gradient: FloatArray) -> FloatArray:
-    """Return the right side of Poisson's equation for edges turned and stretched by the mean of their ends, (V, 3)."""
+def divergence(cloth: TriangleMesh, matrix: csr_matrix, gradient: FloatArray) -> FloatArray:
+    """Return the right side of Poisson's equation for edges turned and stretched by the mean of their ends, (V, 3).
+
+    Args:
+        cloth: Whose edges [m].
+        matrix: Its Laplacian.
+        gradient: At each vertex, shape (V, 3, 3).
+    """
     edges = matrix.tocoo()
     i, j, weight = edges.row, edges.col, -edges.data
     apart = i != j
@@ -90,8 +96,8 @@ def _divergence(cloth: TriangleMesh, matrix: csr_matrix, gradient: FloatArray) -
     return result
 
 
-def _rotations(gradient: FloatArray) -> FloatArray:
-    """Return the nearest rotations (polar decomposition), shape (V, 3, 3)."""
+def nearest_rotations(gradient: FloatArray) -> FloatArray:
+    """Return the rotations nearest to these matrices (polar decomposition), shapes (V, 3, 3)."""
     left, _, right = np.linalg.svd(gradient)
     turn = left @ right
     left[:, :, 2] *= np.sign(np.linalg.det(turn))[:, None]
