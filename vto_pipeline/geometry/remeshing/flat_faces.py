@@ -22,7 +22,7 @@ from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 
 _STEPS = 4  # of a path along an edge
-_INSET = 1e-3  # of the way to the middle of a face: on a seam, it lies on its own side
+_INSET = 1e-6  # of the way to the middle of a face: on a seam, it lies on its own side
 _FLAT = 1e-9  # of the mean area: faces of less have no directions
 _ALIKE = 1e-6  # m: corners no farther apart are one
 _GAP = 0.02  # of an edge, outside its panel: it reaches across a dart
