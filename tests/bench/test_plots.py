@@ -12,7 +12,6 @@ from vto_pipeline.bench.plots.lines import Curves, _best, draw_curves
 from vto_pipeline.bench.plots.scaling_plot import draw_scaling
 from vto_pipeline.bench.plots.verdict_table import _signs, draw_verdicts
 from vto_pipeline.errors import InputError
-from vto_pipeline.report.chart import log_chart
 
 
 def bench(error: float = 1.0) -> dict:
@@ -42,20 +41,6 @@ def test_nothing_to_plot_is_an_error() -> None:
         draw_curves({"bench": "solvers", "rows": []}, Curves())
     with pytest.raises(InputError, match="none with an error"):
         draw_curves(bench(), Curves(figures=("penetration_mm",)))
-
-
-def test_chart_places_powers_of_ten_evenly() -> None:
-    svg = log_chart([1, 10, 100], [100, 10, 1], "x", "y")
-    path = svg.split('class="line" d="M')[1].split('"')[0]
-    points = [tuple(map(float, pair.split(","))) for pair in path.split("L")]
-    (ax, ay), (bx, by), (cx, cy) = points
-    assert bx - ax == pytest.approx(cx - bx, abs=0.11)  # written to a tenth of a unit
-    assert by - ay == pytest.approx(cy - by, abs=0.11)
-    assert cy > ay  # a smaller error is lower
-
-
-def test_chart_leaves_out_what_has_no_logarithm() -> None:
-    assert log_chart([1, 2, 3], [0.0, float("nan"), 1.0], "x", "y") == ""
 
 
 def many(count: int) -> dict:

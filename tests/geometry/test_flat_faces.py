@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 from shapes import grid
 
 from vto_pipeline.geometry.remeshing.flat_faces import carry_flat_faces, panel_of_faces, stretch_flat_faces
+from vto_pipeline.geometry.topology import hinge_halves
 from vto_pipeline.model.mesh import TriangleMesh
 
 RADIUS = 0.1
@@ -69,6 +70,8 @@ def test_another_mesh_gets_the_lengths_of_the_panels_across_seams(stretch):
     found = carry_flat_faces(mesh, laid, other)
     # a chord of one of 37 parts lies 0.4 mm below the tube; its image is the chord of the finer tube's facets: 1e-3
     assert_allclose(sides(found), geodesic(other, stretch), rtol=3e-3)
+    one, two = hinge_halves(other).T
+    assert_allclose(sides(found).ravel()[one], sides(found).ravel()[two], rtol=1e-9, err_msg="sewn sides are alike")
     cloth = 0.5 * np.abs(np.linalg.det(found[:, 1:] - found[:, :1])).sum()
     assert_allclose(cloth, stretch[0] * stretch[1] * 2 * np.pi * RADIUS * 0.4, rtol=2e-3)
     warp = turned(np.array([[0.0, 1.0]]), 2.0, 0.0)[0]  # where the upper panel's axis of the tube lies

@@ -56,7 +56,7 @@ VALUES: dict[str, Any] = {
     "collider": MovingBody(np.stack([POINTS, POINTS + 0.1]), FACES),
     "draped": MESH,
     "audit": {"finite": True, "intersections": 0, "strain": [0.1, 1 / 3]},
-    "trace": (TraceRow(0.1, 1, 12.5, 1 / 3, 2, 17), TraceRow(2.5e-7, 20, 1e-9, 0.0)),
+    "trace": (TraceRow(0.1, 1, 12.5, 1 / 3, 2, 17, 0.1, 1 / 7, 3.0), TraceRow(2.5e-7, 20, 1e-9, 0.0)),
     "fit_report": {"zones": {"waist": {"ease_mm": -3.25}}},
     "observed": RNG.random(8) > 0.5,
     "fit_maps": {"stretch": RNG.random(8), "clearance_mm": RNG.random(8)},

@@ -20,7 +20,7 @@ from vto_pipeline.cloth.placement.transfer import transfer_deformation
 from vto_pipeline.cloth.rest.multiresolution import come_to_rest
 from vto_pipeline.errors import DivergedError, FallenError, IntersectingError
 from vto_pipeline.model.body import MovingBody
-from vto_pipeline.model.cloth import Draped
+from vto_pipeline.model.cloth import Draped, seconds_within
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import Garment, RestShape
 from vto_pipeline.model.job import Job
@@ -101,7 +101,13 @@ def drape(
         **warn_if_too_small(draped, garment.rest, config.stretch_limit, job),
     }
     reached.phases.report_collision_work(reached.before)
-    job.measure(seconds=time.perf_counter() - began, steps=stepper.steps, error_mm=settling.error_mm, **findings)
+    job.measure(
+        seconds=time.perf_counter() - began,
+        steps=stepper.steps,
+        error_mm=settling.error_mm,
+        within_1_mm_s=seconds_within(settling.trace, 1.0),
+        **findings,
+    )
     if not settling.settled:
         job.warn(settling.not_settled_warning)
     refuse_crossings(findings, {"draped": draped, "audit": findings, "trace": tuple(settling.trace)})

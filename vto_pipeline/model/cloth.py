@@ -20,6 +20,7 @@ class TraceRow:
         residual: Residual force, rms over vertices, as a share of a vertex's weight.
         level: 0 on the garment's own mesh, 1 on the next coarser one, and so on.
         contacts: That pushed in the last step, where the method counts them.
+        true_mm_median, true_mm_p95, true_mm_max: Distance of the vertices to where they ended [mm]; None until then.
     """
 
     seconds: float
@@ -28,6 +29,18 @@ class TraceRow:
     residual: float
     level: int = 0
     contacts: int = 0
+    true_mm_median: float | None = None
+    true_mm_p95: float | None = None
+    true_mm_max: float | None = None
+
+
+def seconds_within(trace: Sequence[TraceRow], distance_mm: float) -> float | None:
+    """Return when 95 % of the vertices were this near to where they ended, for good [s]; None while that is unknown."""
+    if not trace or any(row.true_mm_p95 is None for row in trace):
+        return None
+    near = [row.true_mm_p95 is not None and row.true_mm_p95 <= distance_mm for row in trace]
+    since = len(near) - near[::-1].index(False) if False in near else 0
+    return trace[min(since, len(trace) - 1)].seconds
 
 
 @dataclass(frozen=True)

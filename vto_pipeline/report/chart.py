@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -12,33 +12,44 @@ _WIDTH, _HEIGHT = 640, 300
 _LEFT, _RIGHT, _TOP, _BOTTOM = 62, 14, 14, 44
 
 
-def log_chart(x: Sequence[float], y: Sequence[float], x_label: str, y_label: str) -> str:
-    """Draw y over x with both axes logarithmic, as an <svg> element.
+def log_chart(x: Sequence[float], lines: Mapping[str, Sequence[float | None]], x_label: str, y_label: str) -> str:
+    """Draw lines over x with both axes logarithmic, as an <svg> element.
 
     Args:
-        x, y: What to draw; points that are not positive and finite are left out.
+        x: Where their points are.
+        lines: Name, plain text of this package -> the points; those that are not positive and finite are left out, and
+            so are lines of fewer than two. Names are shown where there are several.
         x_label, y_label: Axis titles, plain text of this package, unit included.
 
     Returns:
-        The element, or an empty string when fewer than two points are left.
+        The element, or an empty string when no line is left.
     """
-    points = np.column_stack([np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)])
-    points = points[(np.isfinite(points) & (points > 0)).all(axis=1)]
-    if len(points) < 2:
+    drawn = {name: points for name, y in lines.items() if len(points := _positive(x, y)) > 1}
+    if not drawn:
         return ""
-    low, high = np.floor(np.log10(points.min(axis=0))), np.ceil(np.log10(points.max(axis=0)))
+    every = np.concatenate(list(drawn.values()))
+    low, high = np.floor(np.log10(every.min(axis=0))), np.ceil(np.log10(every.max(axis=0)))
     high = np.maximum(high, low + 1)
-    place = _to_page(np.log10(points), low, high)
-    path = "M" + "L".join(f"{px:.1f},{py:.1f}" for px, py in place)
-    pieces = [*_grid(low, high), f'<path class="line" d="{path}"/>']
-    pieces += [
-        f'<circle class="dot" cx="{px:.1f}" cy="{py:.1f}" r="2.5"/>' for px, py in place[:: max(1, len(place) // 40)]
-    ]
+    pieces = _grid(low, high)
+    for k, (name, points) in enumerate(drawn.items()):
+        place = _to_page(np.log10(points), low, high)
+        path = "M" + "L".join(f"{px:.1f},{py:.1f}" for px, py in place)
+        pieces.append(f'<path class="line l{k}" d="{path}"/>')
+        dots = place[:: max(1, len(place) // 40)]
+        pieces += [f'<circle class="dot l{k}" cx="{px:.1f}" cy="{py:.1f}" r="2.5"/>' for px, py in dots]
+        if len(drawn) > 1:
+            right, down = _WIDTH - _RIGHT - 8, _TOP + 16 + 16 * k
+            pieces.append(f'<text class="end l{k}" x="{right}" y="{down}">{name}</text>')
     middle_x, middle_y = 0.5 * (_LEFT + _WIDTH - _RIGHT), 0.5 * (_TOP + _HEIGHT - _BOTTOM)
     pieces.append(f'<text class="title" x="{middle_x:.0f}" y="{_HEIGHT - 6}">{x_label}</text>')
     pieces.append(f'<text class="title" transform="translate(14 {middle_y:.0f}) rotate(-90)">{y_label}</text>')
     name = f"{y_label} over {x_label}"
     return f'<svg class="chart" viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" aria-label="{name}">{"".join(pieces)}</svg>'
+
+
+def _positive(x: Sequence[float], y: Sequence[float | None]) -> FloatArray:
+    points = np.array([[a, np.nan if b is None else b] for a, b in zip(x, y, strict=True)], np.float64).reshape(-1, 2)
+    return np.asarray(points[(np.isfinite(points) & (points > 0)).all(axis=1)])
 
 
 def _grid(low: FloatArray, high: FloatArray) -> list[str]:

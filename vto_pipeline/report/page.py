@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from vto_pipeline.model.cloth import TraceRow, seconds_within
 from vto_pipeline.report.chart import log_chart
 from vto_pipeline.report.layers import list_layers
 from vto_pipeline.report.scene import build_page_scene, script_json
@@ -14,6 +15,7 @@ from vto_pipeline.report.verdicts import collect_verdicts, fit_reports
 from vto_pipeline.report.wording import centimetres, duration, figure, label, number
 
 _HERE = Path(__file__).parent
+_GOOD_MM = (5.0, 1.0)  # distances to the final shape for which the page says when they were reached
 
 
 def build_page(run_record: Mapping[str, Any], parts: Mapping[str, Any]) -> str:
@@ -42,12 +44,22 @@ def build_page(run_record: Mapping[str, Any], parts: Mapping[str, Any]) -> str:
         measurements=measurement_table(parts.get("measurements"), parts.get("body_measurements")),
         openings=parts.get("openings", []),
         audit=parts.get("audit", {}),
-        chart=log_chart([r.seconds for r in trace], [r.error_mm for r in trace], "run time [s]", "error [mm]"),
+        chart=log_chart([row.seconds for row in trace], _distances(trace), "run time [s]", "distance [mm]"),
         trace_end=trace[-1] if trace else None,
+        good_enough=[(distance, seconds_within(trace, distance)) for distance in _GOOD_MM],
         run=run_record,
         stages=[stage for stage in run_record.get("stages", []) if stage["status"] not in ("left_out", "planned")],
         left_out=left_out_table(run_record),
     )
+
+
+def _distances(trace: Sequence[TraceRow]) -> dict[str, list[float | None]]:
+    """Return what is drawn against run time: what was predicted, and what turned out."""
+    return {
+        "predicted while it ran": [row.error_mm for row in trace],
+        "true, 95 % of the cloth": [row.true_mm_p95 for row in trace],
+        "true, half of the cloth": [row.true_mm_median for row in trace],
+    }
 
 
 def _title(parts: Mapping[str, Any]) -> str:

@@ -22,8 +22,10 @@ from vto_pipeline.cloth.outfit.body_with_layers import wrap_in_surface
 from vto_pipeline.cloth.outfit.combined_cloth import MultiFrictionBody, combine_garments
 from vto_pipeline.cloth.placement.place import place_garment
 from vto_pipeline.cloth.rest.phases import Phases
+from vto_pipeline.cloth.rest.true_distance import with_true_distances
 from vto_pipeline.errors import ComputationError, DivergedError, FallenError, InputError, IntersectingError
 from vto_pipeline.model.body import MovingBody
+from vto_pipeline.model.cloth import seconds_within
 from vto_pipeline.model.garment import Garment
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -182,6 +184,8 @@ class _Outfit:
             error.partial = {f"{layer.name}_draped": layer.garment.mesh for layer in layers}
             raise
         phases.report_collision_work()
+        final = phases.some(settling.state.positions)
+        settling.trace = with_true_distances(settling.trace, settling.looks, final)
         x = settling.state.positions
         worn = [
             replace(one, garment=replace(one.garment, mesh=replace(one.garment.mesh, vertices=x[span])))
@@ -211,6 +215,7 @@ class _Outfit:
             put_on_s=dict(seconds),
             steps=stepper.steps,
             error_mm=error_mm,
+            within_1_mm_s=seconds_within(settling.trace, 1.0),
             layer_error_mm={
                 one.name: None if error_mm is None else error_mm * float(np.sqrt(len(x) / len(x[span])))
                 for one, span in zip(worn, joined.vertices, strict=True)

@@ -56,6 +56,7 @@ class SettlingResult:
         error: Predicted distance to the state of rest, rms over vertices [m]; infinite while unknown.
         residual: Residual force as a share of weight.
         trace: One row for each look.
+        looks: Where some of its vertices were at each [m], shape (S, 3).
         jammed: Whether it was stopped since contacts hold forces far above its weight, and they do not fall.
         caught: Whether it was stopped since it passes through a body that has stretched it beyond what cloth bears.
     """
@@ -65,6 +66,7 @@ class SettlingResult:
     error: float = np.inf
     residual: float = np.inf
     trace: list[TraceRow] = field(default_factory=list)
+    looks: list[FloatArray] = field(default_factory=list)
     jammed: bool = False
     caught: bool = False
 
@@ -94,6 +96,7 @@ def relax_to_rest(
     limits: SettleLimits,
     watch: Callable[[float, float], None] = lambda done, error: None,
     is_caught: Callable[[FloatArray], bool] = lambda positions: False,
+    some: Callable[[FloatArray], FloatArray] = lambda positions: positions[:0],
 ) -> SettlingResult:
     """Run until rest; where that depends on the steps, halve them until halving changes no more than the bound.
 
@@ -113,6 +116,7 @@ def relax_to_rest(
         limits: When to stop.
         watch: Receives the share of time used and the error [m] at each look.
         is_caught: Whether there is no way on from positions [m], shape (V, 3); asked once the first pull is over.
+        some: Returns those of the positions [m], shape (V, 3), that are to be kept of each look, shape (S, 3).
 
     Raises:
         FallenError: all of it is under the lowest thing that could hold it.
@@ -156,6 +160,7 @@ def relax_to_rest(
         seconds = time.perf_counter() - began
         row = TraceRow(seconds, stepper.steps, 1e3 * result.error, result.residual, contacts=stepper.pushing_contacts)
         result.trace.append(row)
+        result.looks.append(some(after.positions))
         watch(share, result.error)
         result.caught = looks >= _JAM_LOOKS and is_caught(after.positions)
         result.jammed = _is_jammed([one.residual for one in result.trace])

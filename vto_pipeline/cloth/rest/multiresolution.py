@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 from vto_pipeline.cloth.drape_config import DrapeConfig
@@ -19,8 +20,10 @@ from vto_pipeline.cloth.model.build import ClothModel, at_rest, build_cloth
 from vto_pipeline.cloth.rest.coarsening import CoarseGarment, coarsen
 from vto_pipeline.cloth.rest.convergence import SettlingResult
 from vto_pipeline.cloth.rest.phases import REST, ROUGH, Phases
+from vto_pipeline.cloth.rest.true_distance import some_positions, with_true_distances
 from vto_pipeline.cloth.simulation import default_skin
 from vto_pipeline.errors import GarmentError, InputError
+from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.cloth import TraceRow
 from vto_pipeline.model.fabric import Fabric
@@ -88,6 +91,7 @@ class _CoarseToFine:
     def run(self, body: MovingBody, deadline: float) -> RestOnMesh:
         """Return the garment at rest on its own mesh."""
         trace: list[TraceRow] = []
+        looks: list[FloatArray] = []
         before: tuple[Phases, ...] = ()
         garments = [self._garment, *(one.garment for one in self._coarser)]
         start, motion, fresh = garments[-1], body, True
@@ -98,6 +102,7 @@ class _CoarseToFine:
                 start, motion, fresh = garments[level - 1], body, True
                 continue
             trace += found.settling.trace
+            looks += found.settling.looks
             before += (found.phases,)
             self._job.note(
                 f"first came to rest on {len(start.mesh.vertices)} vertices: {time.perf_counter() - now:.1f} s, "
@@ -109,7 +114,9 @@ class _CoarseToFine:
             motion = MovingBody(body.keyframes[-1:], body.faces)
         reached = self._rest_on(0, start, motion, deadline, fresh=fresh)
         assert reached is not None  # only coarser ones are given up
-        reached.settling.trace[:0] = trace
+        settling = reached.settling
+        final = reached.phases.some(settling.state.positions)
+        settling.trace = with_true_distances(trace + settling.trace, looks + settling.looks, final)
         return reached._replace(before=before)
 
     def _rest_on(
@@ -132,6 +139,7 @@ class _CoarseToFine:
             config, job = self._rough, self._part(level)
             model = build_cloth(garment.mesh, garment.rest, self._fabric, materials=config)
         phases = Phases(model, garment.rest, self._fabric, config, job)
+        phases.some = partial(self._some, level)
         first = TriangleMesh(body.keyframes[0], body.faces)
         state = phases.resolve_crossings(at_rest(garment.mesh.vertices))
         if fresh:  # the others start outside the body, but for corners that edges have cut
@@ -158,6 +166,12 @@ class _CoarseToFine:
         if level > 0:  # what matters in the end warns again
             self._job.notes += [f"on {len(model.mass)} vertices: {text}" for text in job.warnings]
         return RestOnMesh(model, phases, stepper, settling)
+
+    def _some(self, level: int, positions: FloatArray) -> FloatArray:
+        """Return where some vertices of the garment's own mesh are when those of a coarser one are here [m]."""
+        for coarse in self._coarser[:level][::-1]:
+            positions = coarse.prolong(positions)
+        return some_positions(len(self._model.mass))(positions)
 
     def _leave_out(self, model: ClothModel, why: str) -> None:
         self._job.leave_out(f"coming to rest on {len(model.mass)} vertices first", why)

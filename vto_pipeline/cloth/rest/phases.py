@@ -17,6 +17,7 @@ from vto_pipeline.cloth.placement.body_growth import plan_body_growth
 from vto_pipeline.cloth.placement.clear_body import OVERSTRETCHED, clear_body_crossings, longest_stretch
 from vto_pipeline.cloth.placement.collision_free_start import find_collision_free_start
 from vto_pipeline.cloth.rest.convergence import SettleLimits, SettlingResult, relax_to_rest
+from vto_pipeline.cloth.rest.true_distance import some_positions
 from vto_pipeline.cloth.simulation import default_skin
 from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
@@ -50,6 +51,7 @@ class Phases:
 
     Attributes:
         crossings_left: Pairs of triangles that still met after it was last freed.
+        some: What is kept of the positions [m], shape (V, 3), at each look: some of the vertices, shape (S, 3).
     """
 
     def __init__(self, model: ClothModel, rest: RestShape, fabric: Fabric, config: DrapeConfig, job: Job) -> None:
@@ -61,6 +63,7 @@ class Phases:
         self._config = config
         self._job = job
         self.crossings_left = 0
+        self.some = some_positions(len(model.mass))
         self._crossed = np.zeros(len(model.mass), np.bool_)
         self._counters: list[CollisionCounters] = []
         self._colliders: list[VariableSpeedBody] = []
@@ -176,22 +179,24 @@ class Phases:
         if self._config.substeps is None and stepper.has_exact_rest:
             stepper.substeps = min(stepper.substeps, _LONG)
         trace: list[TraceRow] = []
+        looks: list[FloatArray] = []
         began = time.perf_counter()
         for turn in range(_TURNS):
             error, times = passes[min(turn, len(passes) - 1)]
             enough = replace(limits, error=max(error, limits.error), residual=times * limits.residual)
             spent = time.perf_counter() - began
-            settling = relax_to_rest(stepper, state, enough, watch, is_caught)
+            settling = relax_to_rest(stepper, state, enough, watch, is_caught, self.some)
             trace += [replace(row, seconds=spent + row.seconds) for row in settling.trace]
+            looks += settling.looks
+            settling.trace, settling.looks = trace, looks
             if settling.caught:  # a thicker skin only stretches it more
-                settling.trace = trace
                 break
             self._job.progress(0.9, "clearing the body")
             state, crossing = clear_body_crossings(
                 stepper, settling.state, rest, faces, body, self._config.clear_rounds
             )
             lies_clear = state is settling.state
-            settling.state, settling.trace = state, trace
+            settling.state = state
             if not lies_clear:  # nobody has looked at it since it was moved
                 settling.settled, settling.error = False, np.inf
             if len(crossing) > 0 and self._config.clear_rounds > 0:  # nor will waiting clear it

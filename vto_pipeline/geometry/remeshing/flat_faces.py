@@ -22,11 +22,12 @@ from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 
 _STEPS = 4  # of a path along an edge
-_INSET = 1e-3  # of the way to the middle of a face: on a seam, it lies on its own side
+_INSET = 1e-6  # of the way to the middle of a face: on a seam, it lies on its own side
 _FLAT = 1e-9  # of the mean area: faces of less have no directions
 _ALIKE = 1e-6  # m: corners no farther apart are one
 _GAP = 0.02  # of an edge, outside its panel: it reaches across a dart
 _LONGER, _LONGEST = 1.5, 4.0  # times as in space: a side asks for a seam; even folds that are cut short are no more
+_VAGUE = 1e-6  # weight of a side that is not known for certain
 _LOOKS = 7  # along a side
 _FAR = 100.0  # m between panels that are looked at side by side
 
@@ -78,12 +79,13 @@ def carry_flat_faces(source: TriangleMesh, laid: FloatArray, mesh: TriangleMesh)
     leaves[whole] = _leaves_panel(place[whole], into[whole], laid, panel)
     beyond[whole] = _across_own_seam(place[whole], corners[whole], leaves[whole])
     found, known = _unfolded(place, beyond, own, into, middle[:, 0], _seams(source, laid, panel))
-    known &= ~leaves | (found != place).any(axis=(1, 2))
+    moved = (found != place).any(axis=(1, 2))
+    known &= ~leaves | moved
     centre = found.mean(axis=1, keepdims=True)
     found = centre + (found - centre) / (1.0 - _INSET)
     lost = ~known | (_sides(found) > _LONGEST * _sides(corners)).any(axis=1)
     found[lost] = _measured(surface, to_plane, laid, base, corners[lost])
-    return found
+    return _agreed(found, mesh, lost | moved | ~whole)
 
 
 def panel_of_faces(mesh: TriangleMesh, laid: FloatArray) -> NDArray[np.int64]:
@@ -106,9 +108,7 @@ def stretch_flat_faces(laid: FloatArray, mesh: TriangleMesh, positions: FloatArr
         positions: Where its vertices go [m], shape (V, 3).
     """
     was, now, flat = (_sides(corners) for corners in (mesh.vertices[mesh.faces], positions[mesh.faces], laid))
-    found, closes = _triangles(np.divide(now, was, out=np.ones_like(was), where=was > 0.0) * flat)
-    found[~closes] = laid[~closes]
-    return _turned(found, laid, np.broadcast_to([0.0, 1.0], (len(laid), 2)))
+    return _with_sides(laid, np.divide(now, was, out=np.ones_like(was), where=was > 0.0) * flat)
 
 
 def _welded(mesh: TriangleMesh) -> NDArray[np.int64]:
@@ -239,6 +239,30 @@ def _lengths_below(surface: SurfaceDistance, to_plane: FloatArray, corners: Floa
     moves = np.diff(ends, axis=2).reshape(-1, 3)
     steps = np.linalg.norm(np.einsum("nij,nj->ni", to_plane[face], moves), axis=1)
     return np.asarray(steps.reshape(len(corners), 3, _STEPS).sum(axis=2))
+
+
+def _agreed(laid: FloatArray, mesh: TriangleMesh, vague: NDArray[np.bool_]) -> FloatArray:
+    """Return flat faces of which the vague ones have the sides of their neighbours, or the average where all are vague.
+
+    Args:
+        laid: Faces in the plane [m], shape (G, 3, 2).
+        mesh: Their mesh.
+        vague: Which of them reach across a seam or were measured.
+    """
+    ends = np.sort(np.stack([mesh.faces, np.roll(mesh.faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    edge = np.unique(ends, axis=0, return_inverse=True)[1].reshape(-1)
+    trust = np.repeat(np.where(vague, _VAGUE, 1.0), 3)
+    agreed = np.bincount(edge, trust * _sides(laid).reshape(-1)) / np.bincount(edge, trust)
+    found = laid.copy()
+    found[vague] = _with_sides(laid[vague], agreed[edge].reshape(-1, 3)[vague])
+    return found
+
+
+def _with_sides(laid: FloatArray, sides: FloatArray) -> FloatArray:
+    """Return flat triangles (G, 3, 2) with other sides (G, 3), v where it was; as they are if these would not close."""
+    found, closes = _triangles(sides)
+    found[~closes] = laid[~closes]
+    return _turned(found, laid, np.broadcast_to([0.0, 1.0], (len(laid), 2)))
 
 
 def _triangles(sides: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
