@@ -5,6 +5,7 @@ import pytest
 from cloth_scenes import ball, fabric, moved, tube
 from numpy.testing import assert_allclose, assert_array_equal
 
+import vto_pipeline.cloth.drape as drape_module
 import vto_pipeline.cloth.rest.phases as phases_module
 from vto_pipeline.cloth.drape import drape
 from vto_pipeline.cloth.placement.collision_free_start import Start
@@ -42,6 +43,16 @@ def double_vest(through=0.0):
     out = through * np.exp(-((y - 0.1) ** 2 + z**2) / 0.02**2) * (x > 0)
     moved_out[: len(x)] *= 1.0 + out[:, None] / np.hypot(x, z)[:, None] * [1.0, 0.0, 1.0]
     return Garment(TriangleMesh(moved_out, mesh.faces), RestShape(mesh.vertices))
+
+
+@pytest.mark.parametrize(("judged", "settled"), [(0.02, True), (0.04, False)])
+def test_what_the_judge_finds_out_of_balance_is_not_settled(monkeypatch, judged, settled):
+    real, job = drape_module.audit, Job()
+    monkeypatch.setattr(drape_module, "audit", lambda *a, **k: {**real(*a, **k), "judged_residual": judged})
+    config = {"settle_seconds": 4.0, "target_error_mm": 3.0, "target_residual": 0.01}
+    found = drape(vest(), pear(), fabric(bending=1e-5), config, job)
+    assert found.audit["settled"] is settled
+    assert any("the judge finds a residual force of 0.04" in text for text in job.warnings) is not settled
 
 
 def test_a_vest_comes_to_rest_on_the_pear():

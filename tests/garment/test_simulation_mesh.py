@@ -95,6 +95,14 @@ def test_a_tube_comes_out_as_a_tube_whatever_was_wrong_with_it(how):
     assert all(words in told for words in CASES[how])
 
 
+def test_faces_that_run_against_each_other_are_turned_before_remeshing():
+    job = Job()
+    made = remesh_for_simulation(broken("turned faces"), CONFIG, job)
+    assert len(boundary_loops(made)) == 2
+    assert_allclose(len(made.faces), len(remesh_for_simulation(tube(), CONFIG, Job()).faces), rtol=0.02)
+    assert any("to agree with their neighbours" in text for text in job.notes)
+
+
 def test_each_of_several_pieces_is_kept_and_treated_for_itself():
     even = remesh_for_simulation(tube(), CONFIG, Job())
     job, loose = Job(), SimulationMeshConfig(edge_mm=EDGE, least_angle_deg=10)

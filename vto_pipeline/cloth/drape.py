@@ -27,6 +27,7 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
 _SHOWN = 5  # places named in a message
+_AGREES = 3.0  # times the residual force that was asked for: the judge has its own view of what bodies bear
 
 
 def drape(
@@ -100,6 +101,10 @@ def drape(
         ),
         **warn_if_too_small(draped, garment.rest, config.stretch_limit, job),
     }
+    judged = findings.get("judged_residual")
+    if settling.settled and isinstance(judged, float) and judged > _AGREES * config.target_residual:
+        findings["settled"] = False
+        job.warn(f"not at rest: the judge finds a residual force of {judged:.2g} of a vertex's weight")
     reached.phases.report_collision_work(reached.before)
     job.measure(
         seconds=time.perf_counter() - began,

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.geometry.remeshing.remesh import RemeshConfig, edge_lengths, perimeter, remesh
-from vto_pipeline.geometry.remeshing.repair import RepairConfig, is_manifold, repair
+from vto_pipeline.geometry.remeshing.repair import RepairConfig, is_manifold, is_oriented, repair
 from vto_pipeline.geometry.topology import (
     boundary_loops,
     component_areas,
@@ -50,7 +50,8 @@ def remesh_for_simulation(garment: TriangleMesh, config: SimulationMeshConfig, j
     Raises:
         InputError: no face has an area.
     """
-    sound = garment if is_manifold(garment) else repair(garment, RepairConfig(), job)
+    usable = is_manifold(garment) and is_oriented(garment)
+    sound = garment if usable else repair(garment, RepairConfig(), job)
     pieces = list(_pieces(sound, config, job))
     made = []
     for k, piece in enumerate(pieces):

@@ -19,7 +19,7 @@ from vto_pipeline.cloth.dynamics.stepper import Stepper
 from vto_pipeline.cloth.model.build import ClothModel, at_rest, build_cloth
 from vto_pipeline.cloth.rest.coarsening import CoarseGarment, coarsen
 from vto_pipeline.cloth.rest.convergence import SettlingResult
-from vto_pipeline.cloth.rest.phases import REST, ROUGH, Phases
+from vto_pipeline.cloth.rest.phases import PLACED, REST, ROUGH, Phases
 from vto_pipeline.cloth.rest.true_distance import some_positions, with_true_distances
 from vto_pipeline.cloth.simulation import default_skin
 from vto_pipeline.errors import GarmentError, InputError
@@ -155,7 +155,7 @@ class _CoarseToFine:
         state = phases.follow_body(state, stepper, collider, body.final)
         before = time.perf_counter() - self._began
         settling = phases.settle_and_clear(
-            state, stepper, body.final, deadline, (ROUGH,) if level > 0 else (ROUGH, REST)
+            state, stepper, body.final, deadline, (ROUGH,) if level > 0 else (PLACED, REST)
         )
         if level > 0 and (settling.jammed or settling.caught):
             weights = f"with forces of {settling.residual:.0f} times a vertex's weight"

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from vto_pipeline.errors import InputError
-from vto_pipeline.geometry.topology import edge_face_counts, face_components, submesh
+from vto_pipeline.geometry.topology import edge_face_counts, face_components, half_edges, submesh
 from vto_pipeline.model.arrays import IntArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -48,6 +48,12 @@ def is_manifold(mesh: TriangleMesh) -> bool:
         return False
     used = np.unique(mesh.faces)
     return bool(igl.is_vertex_manifold(mesh.faces.astype(np.int64))[used].all())
+
+
+def is_oriented(mesh: TriangleMesh) -> bool:
+    """Return whether no two faces run the same way along an edge."""
+    halves = half_edges(mesh).astype(np.int64)
+    return len(np.unique(halves[:, 0] * len(mesh.vertices) + halves[:, 1])) == len(halves)
 
 
 def _weld(mesh: TriangleMesh, tolerance: float, job: Job) -> TriangleMesh:
