@@ -16,6 +16,7 @@ class TriangleMesh:
         vertices: Positions [m], shape (V, 3).
         faces: Vertex indices, counter-clockwise seen from outside, shape (F, 3); at least one.
         colors: sRGB, shape (V, 3), or None.
+        metric: Whether lengths are metres; if not, their unit is unknown, as of photos without a scale.
 
     Raises:
         InputError: wrong shape, not finite, no face, or an index out of range.
@@ -24,6 +25,7 @@ class TriangleMesh:
     vertices: FloatArray
     faces: IntArray
     colors: ByteArray | None = None
+    metric: bool = True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vertices", freeze("vertices", self.vertices, (None, 3), "f8"))

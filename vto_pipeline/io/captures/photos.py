@@ -16,6 +16,8 @@ from vto_pipeline.model.frames import CharucoBoard, PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.settings import Config
 
+BOARD_FILE = "board.yaml"
+
 
 class BoardFile(Config):
     """board.yaml: the ChArUco board in the scene."""
@@ -53,7 +55,7 @@ def read_photos(folder: Path, *, job: Job | None = None) -> PhotoSet:
     if job is not None:
         known = sum(camera is not None for camera in intrinsics)
         job.note(f"{folder.name}: {len(paths)} photos, focal length known from EXIF for {known}")
-    board = folder / "board.yaml"
+    board = folder / BOARD_FILE
     return PhotoSet(paths, intrinsics, read_board(board) if board.exists() else None)
 
 
