@@ -38,15 +38,35 @@ def test_scan_finds_out_what_it_got(typed):
     assert code == 0
     assert "cloud.ply: cloud, because" in err
     assert caught["data"]["given"] == {"garment": {"cloud": "cloud.ply"}}
-    assert caught["data"]["want"] == ["garment", "openings", "page"]
+    assert caught["data"]["want"] == ["garment", "openings", "garment_scan_report", "page"]
     assert caught["output"] == Path("runs/scan_cloud")
     _, caught, _ = typed("scan", "mesh.ply", "--role", "garment", "--mannequin", "form.ply", "-o", "x", "--force-all")
     assert caught["data"]["given"] == {"garment": {"surface": "mesh.ply"}, "mannequin": {"surface": "form.ply"}}
-    assert caught["data"]["want"] == ["garment", "openings", "labels", "page"]
+    assert caught["data"]["want"] == ["garment", "openings", "labels", "garment_scan_report", "page"]
     assert (caught["output"], caught["force_all"]) == (Path("x"), True)
     _, caught, _ = typed("scan", "cloud.ply", "--role", "body", "--set", "poisson.depth=7")
-    assert caught["data"]["want"] == ["body_surface", "page"]
+    assert caught["data"]["want"] == ["body_surface", "body_scan_report", "page"]
     assert caught["overrides"] == ("poisson.depth=7",)
+
+
+def test_photos_that_nothing_scales_are_scanned_and_not_cut(typed):
+    bare = ["garment_surface", "garment_scan_report", "page"]
+    Path("photos").mkdir()
+    for name in ("a.jpg", "b.jpg"):
+        (Path("photos") / name).write_bytes(b"")
+    _, caught, err = typed("scan", "photos", "--role", "garment")
+    assert caught["data"]["want"] == bare
+    assert "no scale" in err
+    ends = ("a.jpg:10,20.5+b.jpg:12,22", "a.jpg:300,20+b.jpg:310,25")
+    _, caught, err = typed("scan", "photos", "--role", "garment", "--distance", *ends, "0.42")
+    assert caught["data"]["want"] == ["garment", "openings", "garment_scan_report", "page"]
+    first = {"one": {"a.jpg": [10.0, 20.5], "b.jpg": [12.0, 22.0]}, "metres": 0.42}
+    assert first.items() <= caught["data"]["stages"]["scale"]["lengths"][0].items()
+    assert "no scale" not in err
+    assert typed("scan", "photos", "--role", "garment", "--distance", "a.jpg", ends[1], "0.42")[0] == 2
+    assert typed("scan", "cloud.ply", "--role", "body", "--distance", *ends, "0.42")[0] == 2
+    _, caught, _ = typed("scan", "photos", "--role", "garment", "--mannequin", "form.ply")
+    assert "garment" in caught["data"]["want"]
 
 
 def test_scan_refuses_what_is_no_capture(typed):

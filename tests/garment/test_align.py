@@ -6,7 +6,7 @@ import dressed_form
 import numpy as np
 import pytest
 import trimesh
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.align import AlignConfig, align_to_mannequin
@@ -78,3 +78,61 @@ def test_a_mannequin_that_looks_alike_all_round_is_refused():
             Job(),
         )
     assert "several sides" in caught.value.hint
+
+
+UNSCALED = 0.137  # units of the scan per metre: as arbitrary as structure from motion has it
+
+
+@pytest.fixture(scope="module")
+def unscaled(scene):
+    """The dressed form in units that nobody knows, upright and turned, among walls and things of a room."""
+    upright = transform_mesh(scene.scan, scene.mannequin_from_surface)
+    turned = transform_mesh(upright, np.linalg.inv(dressed_form.rigid([2, 140, -3], [0.3, 0.1, -0.5])))
+    return TriangleMesh(turned.vertices / UNSCALED, turned.faces, turned.colors, metric=False)
+
+
+def with_room(surface):
+    """The scan with patches of walls round it, as photos of a room leave them."""
+    walls = [trimesh.creation.box(extents=[0.6, 0.5, 0.02]).subdivide_to_size(0.05) for _ in range(5)]
+    for number, wall in enumerate(walls):
+        wall.apply_translation([0.0, 0.4 + 0.2 * number, 1.1 + 0.1 * number])
+        wall.apply_transform(trimesh.transformations.rotation_matrix(1.1 * number, [0, 1, 0]))
+    every = trimesh.util.concatenate(walls)
+    vertices = np.concatenate([surface.vertices, every.vertices / UNSCALED])
+    faces = np.concatenate([surface.faces, every.faces + len(surface.vertices)])
+    return TriangleMesh(vertices, faces, metric=False)
+
+
+@pytest.mark.parametrize("room", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_a_scan_without_scale_gets_it_from_the_mannequin(scene, unscaled, room):
+    job = Job()
+    surface = with_room(unscaled) if room else unscaled
+    found = align_to_mannequin(surface, scene.form, QUICK, job)
+    back = np.linalg.inv(dressed_form.rigid([2, 140, -3], [0.3, 0.1, -0.5]))
+    on_scan = transform_mesh(scene.form, np.diag([1 / UNSCALED] * 3 + [1.0]) @ back)
+    off = np.linalg.norm(transform_mesh(on_scan, found).vertices - scene.form.vertices, axis=1)
+    assert 1e-6 < off.max() < 1e-3  # noise of 0.3 mm; exact would mean the answer leaked
+    scale = np.cbrt(np.linalg.det(found[:3, :3]))
+    assert_allclose(scale, UNSCALED, rtol=2e-3, atol=0)  # asked of a mannequin: 1 %
+    assert abs(scale / UNSCALED - 1) < 4e-2 * job.metrics["scale_error_percent"] + 1e-6  # within four of its sigmas
+    assert job.metrics["scale_source"] == "mannequin"
+
+
+@pytest.mark.slow
+def test_something_else_is_refused_at_any_size(scene):
+    crate = trimesh.creation.box(extents=[0.5, 0.9, 0.5]).subdivide_to_size(0.03)
+    with pytest.raises(GarmentError):
+        align_to_mannequin(TriangleMesh(crate.vertices, crate.faces, metric=False), scene.form, QUICK, Job())
+
+
+@pytest.mark.slow
+def test_a_scan_that_shows_only_a_plane_is_refused():
+    """Its size does not matter: it lies on the mannequin in all."""
+    plane = trimesh.creation.box(extents=[1.0, 0.2, 1.0]).subdivide_to_size(0.05)
+    middle = np.abs(plane.triangles_center[:, [0, 2]]).max(axis=1) < 0.3
+    part = plane.submesh([np.flatnonzero(middle & (plane.triangles_center[:, 1] > 0.09))], append=True)
+    rough = part.vertices + np.random.default_rng(0).normal(0.0, 3e-4, part.vertices.shape)
+    with pytest.raises(GarmentError):
+        align_to_mannequin(
+            TriangleMesh(rough, part.faces, metric=False), TriangleMesh(plane.vertices, plane.faces), QUICK, Job()
+        )

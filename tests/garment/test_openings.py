@@ -92,6 +92,22 @@ def test_a_sleeve_longer_than_the_arm_is_still_open():
     assert len(openings) == 2
 
 
+@pytest.mark.parametrize(("keep", "heights"), [(1, [HEIGHT]), (2, [HEIGHT, 0.0]), (3, [HEIGHT, 0.2, 0.0])])
+def test_as_many_openings_stay_as_are_asked_for(keep, heights):
+    """Evidence first: the two ends; then the longest of the others, here the larger of two holes in the side."""
+    larger, smaller = punched(sleeve(), [[0.1, 0.2, 0.0]], 0.04), [[-0.1, 0.3, 0.0]]
+    torn = punched(larger, smaller, 0.015)
+    job = Job()
+    _, openings, _ = close_scan_holes(torn, arm(), OpeningsConfig(keep=keep, least_perimeter_mm=0), job)
+    assert_allclose([o.center[1] for o in openings], heights, rtol=0, atol=0.01)
+    assert any("against the evidence" in note for note in job.notes) == (keep != 2)
+
+
+def test_more_openings_than_there_are_loops_cannot_be_kept():
+    with pytest.raises(GarmentError, match="only 2 boundary loops"):
+        close_scan_holes(sleeve(), arm(), OpeningsConfig(keep=3), Job())
+
+
 def test_another_count_than_expected_is_an_error_that_lists_them():
     with pytest.raises(GarmentError, match="2 openings found, expected 4: opening of 628 mm"):
         close_scan_holes(sleeve(), arm(), OpeningsConfig(expected=4, fair_mm=0), Job())

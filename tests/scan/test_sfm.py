@@ -15,9 +15,9 @@ from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.scan.photos import scale as scale_module
 from vto_pipeline.scan.photos.board import board_corners
-from vto_pipeline.scan.photos.features import SURE, FeatureConfig, detect, match
-from vto_pipeline.scan.photos.mapping import _copy
-from vto_pipeline.scan.photos.scale import ScaleConfig, apply_board
+from vto_pipeline.scan.photos.matching.features import SURE, FeatureConfig, detect, match
+from vto_pipeline.scan.photos.matching.mapping import _copy
+from vto_pipeline.scan.photos.scale import ScaleConfig, apply_board, apply_scale
 from vto_pipeline.scan.photos.sfm import SfmConfig, estimate_cameras
 from vto_pipeline.scan.similarity import fit_similarity
 
@@ -82,10 +82,11 @@ def test_board_gives_metres_and_the_floor(sparse, shot, scene):
 
 def test_without_a_board_the_scan_stays_without_scale(sparse, shot):
     job = Job()
-    cameras, cloud = apply_board(replace(shot[0], board=None), *sparse[:2], ScaleConfig(), job)
+    cameras, cloud = apply_scale(replace(shot[0], board=None), *sparse[:2], ScaleConfig(), job)
     assert cameras is sparse[0]
     assert cloud is sparse[1]
-    assert "no scale" in job.warnings[0]
+    assert "no scale" in job.notes[0]
+    assert "scale_source" not in job.metrics
 
 
 def test_wrong_board_warns_and_leaves_the_scale_alone(sparse, shot):
@@ -139,7 +140,7 @@ def test_a_pair_whose_matches_contradict_each_other_is_dropped(tmp_path, turned,
         cv2.imwrite(str(path), picture)
     found, database = PhotoSet(paths, (None, None)), tmp_path / "x.db"
     assert min(detect(found, database, SURE, FeatureConfig())) > 500
-    assert match(found, database, FeatureConfig(), 0) == kept
+    assert match(found, database, FeatureConfig(), Job()) == kept
 
 
 @pytest.mark.parametrize("copies", [2, 5])

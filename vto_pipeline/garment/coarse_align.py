@@ -17,7 +17,6 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 INSIDE_PENALTY = 2.0
 LARGEST_GRID = 120
-"""Cells along the longest side; a larger scene gets larger cells."""
 
 
 def upright_rotations(count: int) -> list[FloatArray]:
@@ -46,14 +45,22 @@ class PlacementSearch:
         mannequin: The mannequin under the garment.
         distance: Its distance queries.
         cell: Wanted cell size of the score field [m].
+        largest_grid: Cells along the longest side; a larger scene gets larger cells.
     """
 
-    def __init__(self, points: FloatArray, mannequin: TriangleMesh, distance: SurfaceDistance, cell: float) -> None:
+    def __init__(
+        self,
+        points: FloatArray,
+        mannequin: TriangleMesh,
+        distance: SurfaceDistance,
+        cell: float,
+        largest_grid: int = LARGEST_GRID,
+    ) -> None:
         self._middle = points.mean(axis=0)
         self._points = points - self._middle
         reach = np.linalg.norm(self._points, axis=1).max()  # of any rotation of the scan
         low, high = mannequin.vertices.min(axis=0), mannequin.vertices.max(axis=0)
-        self._cell = max(cell, float((high - low).max() + 2.0 * reach) / LARGEST_GRID)
+        self._cell = max(cell, float((high - low).max() + 2.0 * reach) / largest_grid)
         margin = 2.0 * self._cell
         self._low = low - margin
         size = np.ceil((high - low + 2.0 * margin) / self._cell).astype(int)

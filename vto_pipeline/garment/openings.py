@@ -29,6 +29,12 @@ class OpeningsConfig(Config):
 
     edge_mm: float = Field(4.0, ge=0.5, le=50, description="Finer scans are thinned to about this edge length [mm]")
     expected: int | None = Field(None, ge=0, le=50, description="Number of openings; any other count is an error")
+    keep: int | None = Field(
+        None,
+        ge=1,
+        le=50,
+        description="Number of openings that stay, whatever the evidence: the likeliest, then longest",
+    )
     ledge_mm: float = Field(40.0, ge=0, le=200, description="Widest ledge sought between cloth and mannequin [mm]")
     flap_edges: float = Field(4.0, ge=0, le=50, description="Parts that hang on by less are dropped [edge lengths]")
     fair_mm: float = Field(40.0, ge=0, le=200, description="Zigzags shorter than this are smoothed out of rims [mm]")
@@ -79,6 +85,8 @@ def close_scan_holes(
         )
     shapes = measure_loops(bridged)
     is_opening = _classify(bridged, shapes, distance, config, job)
+    if config.keep is not None:
+        is_opening = _kept(shapes, is_opening, config.keep, job)
     count = sum(is_opening)
     if config.expected is not None and count != config.expected:
         raise GarmentError(f"{count} openings found, expected {config.expected}: {_listing(shapes, is_opening)}")
@@ -152,6 +160,19 @@ def _classify(
             job.note(f"beyond the mannequin, by its shape alone: {_listing([shape], [True])}")
         real.append(around or hangs)
     return real
+
+
+def _kept(shapes: list[LoopShape], likely: list[bool], count: int, job: Job) -> list[bool]:
+    """Return which loops stay open when their number is given: those with evidence first, then the longest."""
+    if len(shapes) < count:
+        raise GarmentError(f"only {len(shapes)} boundary loops, but {count} openings are to be kept")
+    order = sorted(range(len(shapes)), key=lambda i: (not likely[i], -shapes[i].perimeter))
+    kept = [i in order[:count] for i in range(len(shapes))]
+    turned = [i for i in range(len(shapes)) if kept[i] != likely[i]]
+    if turned:
+        changed = _listing([shapes[i] for i in turned], [kept[i] for i in turned])
+        job.note(f"against the evidence, because {count} openings are to be kept: {changed}")
+    return kept
 
 
 def _listing(shapes: list[LoopShape], real: list[bool]) -> str:

@@ -21,6 +21,7 @@ from vto_pipeline.io.formats.clean_up import check_sound, drop_degenerate, merge
 from vto_pipeline.io.formats.obj import parse_obj
 from vto_pipeline.io.formats.off import parse_off
 from vto_pipeline.io.formats.ply import parse_ply
+from vto_pipeline.io.formats.ply_header import ARBITRARY
 from vto_pipeline.io.formats.stl import parse_stl
 from vto_pipeline.io.gltf.read import parse_gltf
 from vto_pipeline.io.lengths import to_metres
@@ -51,7 +52,7 @@ def read_mesh(path: Path, *, unit: str | None = None, job: Job | None = None) ->
         job: Notified of the guessed unit and of every change.
 
     Returns:
-        The mesh [m]; the axes are the file's.
+        The mesh [m]; the axes are the file's. Without a unit, a file of ours that says its unit is unknown stays so.
 
     Raises:
         InputError: no such file, or no unit fits; FormatError: the file breaks its format or holds no sound mesh.
@@ -70,7 +71,8 @@ def read_mesh(path: Path, *, unit: str | None = None, job: Job | None = None) ->
     count = len(arrays["vertices"])
     arrays, needless = drop_degenerate(arrays)
     arrays, turned = turn_outward(arrays)
-    vertices = to_metres(arrays["vertices"], unit, path, job)
+    metric = unit is not None or "arbitrary" not in arrays
+    vertices = to_metres(arrays["vertices"], unit, path, job) if metric else arrays["vertices"]
     if job is not None:
         for note in notes + needless + turned:
             job.note(f"{path.name}: {note}")
@@ -79,7 +81,8 @@ def read_mesh(path: Path, *, unit: str | None = None, job: Job | None = None) ->
         ):  # OBJ counts nothing, so that a cut between two lines leaves no trace
             job.warn(f"{path.name}: {count - len(vertices)} vertices belong to no face: is the file truncated?")
     try:
-        return TriangleMesh(vertices, arrays["faces"], arrays.get("colors"), arrays.get("texture"))
+        texture = arrays.get("texture")
+        return TriangleMesh(vertices, arrays["faces"], arrays.get("colors"), texture, metric)
     except InputError as e:
         raise FormatError(e.problem, where=str(path), hint=e.hint) from None
 
@@ -107,7 +110,8 @@ def read_own_mesh(path: Path) -> TriangleMesh:
     arrays = parse_ply(str(path))
     if "faces" not in arrays:
         raise FormatError("points without faces; expected a mesh", where=str(path))
-    return TriangleMesh(arrays["vertices"], arrays["faces"], arrays.get("colors"))
+    metric = "arbitrary" not in arrays
+    return TriangleMesh(arrays["vertices"], arrays["faces"], arrays.get("colors"), metric=metric)
 
 
 def write_ply(path: Path, value: TriangleMesh | PointCloud) -> None:
@@ -122,7 +126,8 @@ def write_ply(path: Path, value: TriangleMesh | PointCloud) -> None:
     table = np.empty(len(points), [(name, kind) for name, kind, _ in fields])
     for name, _, column in fields:
         table[name] = column
-    header = ["ply", "format binary_little_endian 1.0", "comment metres, +Y up", f"element vertex {len(points)}"]
+    unit = ARBITRARY if isinstance(value, TriangleMesh) and not value.metric else "metres"
+    header = ["ply", "format binary_little_endian 1.0", f"comment {unit}, +Y up", f"element vertex {len(points)}"]
     header += [f"property {'double' if kind == '<f8' else 'uchar'} {name}" for name, kind, _ in fields]
     faces = b""
     if isinstance(value, TriangleMesh):

@@ -18,6 +18,7 @@ class TriangleMesh:
         colors: sRGB, shape (V, 3), or None.
         texture: Texture coordinates of each face's corners, v up, in whatever unit, shape (F, 3, 2), or None. What
             makes another mesh of this one does without them.
+        metric: Whether lengths are metres; if not, their unit is unknown, as of photos without a scale.
 
     Raises:
         InputError: wrong shape, not finite, no face, or an index out of range.
@@ -27,6 +28,7 @@ class TriangleMesh:
     faces: IntArray
     colors: ByteArray | None = None
     texture: FloatArray | None = None
+    metric: bool = True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vertices", freeze("vertices", self.vertices, (None, 3), "f8"))

@@ -13,6 +13,7 @@ from vto_pipeline.avatar.scan.body_transfer import transfer_motion
 from vto_pipeline.cloth.drape import drape
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.placement.regrade import GradeConfig, worn_rest
+from vto_pipeline.geometry.metres import need_metres
 from vto_pipeline.io.fabric_formats.assumed import assumption_notes
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.garment import Garment
@@ -39,7 +40,7 @@ def _morph(inputs: Inputs, settings: MorphConfig, job: Job) -> Outputs:
 
 
 def _mesh_morph(inputs: Inputs, settings: MorphConfig, job: Job) -> Outputs:
-    body = inputs["body_mesh"]
+    body = need_metres(inputs["body_mesh"], "a body")
     if "body_avatar" not in inputs:
         job.leave_out("fitting an avatar", "a body mesh was given, and the cloth is draped on it directly")
         return {"collider": MovingBody(body.vertices[np.newaxis], body.faces)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from vto_pipeline.garment.openings import OpeningsConfig, close_scan_holes, list
 from vto_pipeline.garment.simulation_mesh import SimulationMeshConfig, remesh_for_simulation
 from vto_pipeline.garment.subtract import SubtractConfig, extract_garment, label_garment
 from vto_pipeline.garment.wearable import check_wearable
+from vto_pipeline.geometry.metres import need_metres
 from vto_pipeline.geometry.remeshing.repair import RepairConfig, repair
 from vto_pipeline.geometry.rigid import transform_mesh
 from vto_pipeline.model.garment import SurfaceLabels
@@ -25,16 +27,18 @@ Outputs = Mapping[str, Any]
 
 
 def _align(inputs: Inputs, settings: AlignConfig, job: Job) -> Outputs:
-    placement = align_to_mannequin(inputs["garment_surface"], inputs["mannequin_surface"], settings, job)
+    mannequin = need_metres(inputs["mannequin_surface"], "the mannequin")
+    placement = align_to_mannequin(inputs["garment_surface"], mannequin, settings, job)
     return {"garment_placement": placement}
 
 
 def _subtract(inputs: Inputs, settings: SubtractConfig, job: Job) -> Outputs:
     surface = inputs["garment_surface"]
     if "garment_placement" in inputs:
-        surface = transform_mesh(surface, inputs["garment_placement"])
+        surface = replace(transform_mesh(surface, inputs["garment_placement"]), metric=True)
         labels = label_garment(surface, inputs["mannequin_surface"], settings, job)
     else:
+        need_metres(surface, "a garment without a mannequin")
         job.leave_out("subtraction", "no mannequin was given: the whole scan is garment")
         everything = np.ones(len(surface.vertices), dtype=bool)
         labels = SurfaceLabels(everything, everything.astype(float))
@@ -51,7 +55,7 @@ def _openings(inputs: Inputs, settings: OpeningsConfig, job: Job) -> Outputs:
 
 
 def _take_mesh(inputs: Inputs, settings: RepairConfig, job: Job) -> Outputs:
-    garment = repair(inputs["garment_mesh"], settings, job)
+    garment = repair(need_metres(inputs["garment_mesh"], "a garment"), settings, job)
     openings = list_openings(garment)
     check_wearable(garment, openings)
     job.measure(openings=len(openings), vertices=len(garment.vertices))

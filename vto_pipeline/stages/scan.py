@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from vto_pipeline.model.job import Job
@@ -10,7 +11,7 @@ from vto_pipeline.pipeline.stage import Stage
 from vto_pipeline.scan.depth.odometry import OdometryConfig, estimate_trajectory
 from vto_pipeline.scan.fuse import FuseConfig, PhotoFuseConfig, check_coverage, fuse_depth_frames, fuse_depth_maps
 from vto_pipeline.scan.keyframes import KeyframesConfig, take_keyframes
-from vto_pipeline.scan.photos.scale import ScaleConfig, apply_board
+from vto_pipeline.scan.photos.scale import ScaleConfig, apply_scale
 from vto_pipeline.scan.photos.sfm import SfmConfig, estimate_cameras
 from vto_pipeline.scan.photos.stereo import StereoConfig, estimate_depth_maps
 from vto_pipeline.scan.surface import SurfaceConfig, reconstruct_cloud
@@ -30,7 +31,7 @@ def _sfm(inputs: Inputs, settings: SfmConfig, job: Job) -> Outputs:
 
 def _scale(inputs: Inputs, settings: ScaleConfig, job: Job) -> Outputs:
     cameras, points = inputs["sparse"]
-    cameras, points = apply_board(inputs["photos"], cameras, points, settings, job)
+    cameras, points = apply_scale(inputs["photos"], cameras, points, settings, job)
     return {"cameras": cameras, "points": points}
 
 
@@ -40,7 +41,7 @@ def _stereo(inputs: Inputs, settings: StereoConfig, job: Job) -> Outputs:
 
 def _fuse_photos(inputs: Inputs, settings: PhotoFuseConfig, job: Job) -> Outputs:
     photos, cameras, points, maps = (inputs[name] for name in ("photos", "cameras", "points", "depth_maps"))
-    surface = fuse_depth_maps(photos, cameras, maps, settings, job)
+    surface = replace(fuse_depth_maps(photos, cameras, maps, settings, job), metric=cameras.metric)
     check_coverage(surface, maps, points, settings, job)
     return {"surface": surface}
 
@@ -78,7 +79,7 @@ STAGES: tuple[Stage, ...] = (
     ),
     *for_each_role(
         "scale",
-        "scale and floor, from the printed board",
+        "scale and floor, from the printed board, or scale from a stated length",
         needs=("photos", "sparse"),
         makes=("cameras", "points"),
         run=_scale,

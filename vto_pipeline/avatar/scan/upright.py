@@ -6,6 +6,7 @@ import numpy as np
 
 from vto_pipeline.errors import AvatarError
 from vto_pipeline.geometry.floor import level_band
+from vto_pipeline.geometry.metres import need_metres
 from vto_pipeline.geometry.topology import component_areas, submesh
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.job import Job
@@ -36,8 +37,9 @@ def in_metres(scan: TriangleMesh, job: Job) -> TriangleMesh:
 
     Raises:
         AvatarError: in no unit is it as large as a body or a form.
+        ScanError: its unit is unknown.
     """
-    piece, area = component_areas(scan)
+    piece, area = component_areas(need_metres(scan, "fitting a body"))
     count = len(area)
     corners = scan.vertices[scan.faces].reshape(-1, 3)
     of = np.repeat(piece, 3)

@@ -20,7 +20,7 @@ from vto_pipeline.model.settings import Config
 PHOTO_SUFFIXES = SUFFIXES | heic.SUFFIXES
 """What photos may be; COLMAP and OpenCV read those in HEIC as JPEG."""
 
-BOARD = "board.yaml"
+BOARD_FILE = "board.yaml"
 """The file that describes the board in a scene."""
 
 
@@ -63,7 +63,7 @@ def read_photos(folder: Path, *, job: Job | None = None) -> PhotoSet:
     if job is not None:
         known = sum(camera is not None for camera in intrinsics)
         job.note(f"{folder.name}: {len(paths)} photos, focal length known from EXIF for {known}")
-    board = folder / BOARD
+    board = folder / BOARD_FILE
     return PhotoSet(paths, intrinsics, read_board(board) if board.exists() else None)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from vto_pipeline.errors import FormatError, InputError
 from vto_pipeline.io.arrays import Arrays
-from vto_pipeline.io.captures.photos import BOARD, read_board
+from vto_pipeline.io.captures.photos import BOARD_FILE, read_board
 from vto_pipeline.io.files import check_file, listed
 from vto_pipeline.io.sandbox import run_limited
 from vto_pipeline.model.arrays import ByteArray, FloatArray, IntArray
@@ -51,7 +51,7 @@ def read_video(path: Path, *, job: Job | None = None) -> Video:
         path = inside[0]
     path = check_file(path, SUFFIXES, _FILE_BYTES)
     found = run_limited(probe, str(path.resolve()), where=str(path))
-    board = None if folder is None or not (folder / BOARD).exists() else read_board(folder / BOARD)
+    board = None if folder is None or not (folder / BOARD_FILE).exists() else read_board(folder / BOARD_FILE)
     video = Video(path.resolve(), int(found["width"]), int(found["height"]), board)
     if job is not None:
         job.note(f"{path.name}: a video of {video.width} x {video.height}")

@@ -24,7 +24,8 @@ def parse_ply(name: str) -> Arrays:
         name: Path of the file.
 
     Returns:
-        vertices (V, 3); where given: faces (F, 3), normals (V, 3), colors (V, 3) uint8; notes.
+        vertices (V, 3); where given: faces (F, 3), normals (V, 3), colors (V, 3) uint8; notes; `arbitrary` where the
+        file says that its unit is unknown.
 
     Raises:
         FormatError: the file breaks the format, or its counts do not fit its size.
@@ -127,6 +128,8 @@ def _arrays(header: Header, tables: dict[str, list[NDArray[Any]]], path: Path) -
                 raise FormatError("faces have no vertex_indices", where=str(path))
             groups.append(run[field])
         arrays["faces"], notes = triangulate_polygons(groups, path)
+    if not header.metric:
+        arrays["arbitrary"] = np.array(True)
     return {**arrays, "notes": np.array(notes, dtype=np.str_)}
 
 

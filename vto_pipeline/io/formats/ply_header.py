@@ -22,6 +22,8 @@ _TYPES = {
 }
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _HEADER_BYTES = 1_000_000
+ARBITRARY = "lengths are arbitrary"
+"""Comment in a file of unknown unit: a scan without a scale."""
 
 
 @dataclass(frozen=True)
@@ -48,12 +50,13 @@ class Element:
 
 @dataclass(frozen=True)
 class Header:
-    """The declared elements; the data starts at byte `start`, after `lines` lines."""
+    """The declared elements; the data starts at byte `start`, after `lines` lines; whether its unit is known."""
 
     order: str
     elements: tuple[Element, ...]
     start: int
     lines: int
+    metric: bool = True
 
 
 def read_header(data: bytes, path: Path) -> Header:
@@ -68,6 +71,7 @@ def read_header(data: bytes, path: Path) -> Header:
         raise FormatError("not a PLY file: no 'ply ... end_header'", where=str(path), hint=CUT_OFF)
     lines = data[:end].decode("latin-1").splitlines()
     order: str | None = None
+    metric = True
     tables: list[tuple[str, int, list[Property]]] = []
     for number, line in enumerate(lines, start=1):
         words = line.split()
@@ -80,13 +84,15 @@ def read_header(data: bytes, path: Path) -> Header:
                 tables[-1][2].append(Property(name, _TYPES[kind], _TYPES[length]))
             case ["property", kind, name] if tables and kind in _TYPES:
                 tables[-1][2].append(Property(name, _TYPES[kind]))
+            case ["comment", *words] if " ".join(words).startswith(ARBITRARY):
+                metric = False
             case [] | ["ply"] | ["comment", *_] | ["obj_info", *_]:
                 pass
             case _:
                 raise FormatError(f"header line {line[:60]!r} is not understood", where=f"{path}, line {number}")
     if order is None:
         raise FormatError("header has no format line", where=str(path))
-    header = Header(order, tuple(Element(n, c, tuple(p)) for n, c, p in tables), stop + 1, len(lines) + 1)
+    header = Header(order, tuple(Element(n, c, tuple(p)) for n, c, p in tables), stop + 1, len(lines) + 1, metric)
     _check_promise(header, data, path)
     return header
 

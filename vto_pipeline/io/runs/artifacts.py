@@ -147,6 +147,7 @@ def _role_kinds(role: str, prefix: str) -> tuple[ArtifactKind, ...]:
             inline=_with_unit(meshes.read_mesh),
             in_folder=lambda folder: (folder / BASE).is_file(),
         ),
+        made("scan_report", "scan_report.json", "how good the scan is where there is no truth", read_json, write_json),
     )
 
 

@@ -41,7 +41,7 @@ def make_final(
 
 
 def make_finals_again(folder: Path, catalogue: Catalogue) -> list[Path]:
-    """Run all final stages on the folder of a run that has ended, with default settings.
+    """Run the final stages of a run that has ended again, with default settings; of a failed one, those it has got to.
 
     Args:
         folder: RUN.
@@ -51,7 +51,7 @@ def make_finals_again(folder: Path, catalogue: Catalogue) -> list[Path]:
         The files written.
 
     Raises:
-        InputError: it is not the folder of a run, or lacks what a final stage needs.
+        InputError: it is not the folder of a run, or lacks what its final stages need.
     """
     run_record = read_json(existing_run(folder) / RECORD)
     given = {}
@@ -62,17 +62,20 @@ def make_finals_again(folder: Path, catalogue: Catalogue) -> list[Path]:
         except InputError:
             continue  # moved since: the page does without
     out = OutputFolder(folder / "out", catalogue)
-    written = []
+    planned = {stage["name"] for stage in run_record["stages"] if stage["status"] != "left_out"}
+    written, lacking = [], []
     with locked_run_folder(folder):
         for stage in catalogue.stages:
-            if stage.final:
-                missing = [
-                    n for n in stage.needs if n not in given and not (out.folder / catalogue.kind(n).filename).is_file()
-                ]
-                if missing:
-                    raise InputError(
-                        f"{stage.name} needs {', '.join(missing)}, which this run did not make", where=str(folder)
-                    )
-                make_final(stage, stage.settings(), out, given, run_record, Job())
-                written += [out.folder / catalogue.kind(artifact).filename for artifact in stage.makes]
+            if not stage.final or stage.name not in planned:
+                continue
+            missing = [
+                n for n in stage.needs if n not in given and not (out.folder / catalogue.kind(n).filename).is_file()
+            ]
+            if missing:
+                lacking.append(f"{stage.name} needs {', '.join(missing)}, which this run did not make")
+                continue
+            make_final(stage, stage.settings(), out, given, run_record, Job())
+            written += [out.folder / catalogue.kind(artifact).filename for artifact in stage.makes]
+    if lacking and not written:
+        raise InputError("; ".join(lacking), where=str(folder))
     return written

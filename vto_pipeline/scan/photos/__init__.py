@@ -1,7 +1,7 @@
 """From photos to posed cameras and dense depth.
 
-features, mapping, triangulation, sfm: matches, cameras and sparse points
-board, scale: metres, a floor and an origin from a printed board
+matching/, triangulation, region, sfm: matches, cameras and sparse points, without what surrounds the object
+board, lengths, scale: metres from a printed board, with floor and origin, or from stated lengths
 neighbours, rectify, disparity, subpixel, consistency, stereo: dense depth
 coverage: how much of what the photos see has depth
 """

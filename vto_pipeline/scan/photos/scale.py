@@ -1,4 +1,4 @@
-"""Metric scale, floor and origin from a printed board."""
+"""Metric scale of photos: from a printed board, with floor and origin, or from a stated length."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
 from vto_pipeline.model.settings import Config
 from vto_pipeline.scan.photos.board import board_corners, detect_board
+from vto_pipeline.scan.photos.lengths import StatedLength, scale_from_lengths
 from vto_pipeline.scan.photos.sfm import transform_reconstruction
 from vto_pipeline.scan.photos.triangulation import triangulate_points
 from vto_pipeline.scan.similarity import fit_similarity
@@ -25,6 +26,35 @@ class ScaleConfig(Config):
     min_corners: int = Field(6, ge=4, le=1000, description="Corners of the board that at least two photos must see")
     max_error_px: float = Field(2.0, gt=0.1, le=20, description="Corners further from their place are left out [px]")
     max_scale_error: float = Field(0.003, gt=0, le=0.1, description="Standard error above which to warn [share]")
+    lengths: tuple[StatedLength, ...] = Field((), description="Known distances between points marked in photos")
+
+
+def apply_scale(
+    photos: PhotoSet, cameras: CameraSet, cloud: PointCloud, config: ScaleConfig, job: Job
+) -> tuple[CameraSet, PointCloud]:
+    """Bring cameras and points into metres, by the best there is: a stated length, else a board, else not at all.
+
+    What a user states wins over the board: a board.yaml may be left over from another set-up.
+
+    Raises:
+        ScanError: a stated length cannot be used.
+    """
+    if cameras.metric:
+        job.leave_out("scale", "the camera poses were given in metres")
+        job.measure(scale_source="given poses")
+        return cameras, cloud
+    if config.lengths:
+        scale, error = scale_from_lengths(cameras, config.lengths, config.max_error_px, job)
+        job.measure(scale_source="stated length")
+        if error > config.max_scale_error:
+            job.warn(
+                f"the stated lengths fix the scale to {100 * error:.2f} % only; state a longer one, in more photos"
+            )
+        return transform_reconstruction(cameras, cloud, np.eye(4), scale=scale, metric=True)
+    if photos.board is None:
+        job.note("no board.yaml with the photos and no stated length: the scan has no scale of its own")
+        return cameras, cloud
+    return apply_board(photos, cameras, cloud, config, job)
 
 
 def apply_board(
@@ -36,18 +66,16 @@ def apply_board(
     squares.
 
     Args:
-        photos: Photos, and the board if there is one.
+        photos: Photos and the board.
         cameras, cloud: Up to scale.
         config: Settings.
         job: Notified of the error of the scale.
 
     Returns:
         Both in the board's world: metres, y = 0 the board's plane, +Y up, the origin at its centre, +X along its
-        columns. Without a board, or with too little of it seen: unchanged, with a warning.
+        columns. With too little of it seen: unchanged, with a warning.
     """
-    if photos.board is None:
-        job.warn("no board.yaml with the photos: the scan has no scale; lengths are arbitrary")
-        return cameras, cloud
+    assert photos.board is not None
     job.progress(0.0, "looking for the board")
     found = detect_board(photos, cameras.names, job)
     world = board_corners(photos.board)
@@ -81,6 +109,7 @@ def apply_board(
         board_rms_px=round(float(np.sqrt((error_px[good] ** 2).mean())), 3),
         board_corner_median_mm=round(rms_mm, 3),
         scale_error_percent=round(100 * scale_error, 4),
+        scale_source="board",
     )
     if scale_error > config.max_scale_error:
         job.warn(f"the board fixes the scale to {100 * scale_error:.2f} % only; show more of it, in more photos")

@@ -16,8 +16,9 @@ from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
 from vto_pipeline.model.settings import Config
-from vto_pipeline.scan.photos.features import FAINT, SURE, FeatureConfig, detect, match
-from vto_pipeline.scan.photos.mapping import MIN_PHOTOS, map_photos
+from vto_pipeline.scan.photos.matching.features import FAINT, SURE, FeatureConfig, detect, match
+from vto_pipeline.scan.photos.matching.mapping import MIN_PHOTOS, map_photos
+from vto_pipeline.scan.photos.region import object_region
 from vto_pipeline.scan.upright import upright_from_scan
 
 ADVICE = (
@@ -63,7 +64,7 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
             database = Path(scratch) / "faint.db"
             counts = detect(photos, database, FAINT, config.features)
         job.progress(0.3, f"matching {len(photos.paths)} photos")
-        pairs = match(photos, database, config.features, job.seed)
+        pairs = match(photos, database, config.features, job)
         job.progress(0.7, f"placing cameras, {pairs} matched pairs")
         model = map_photos(database, photos.paths[0].parent, len(photos.paths), job)
     names = [path.name for path in photos.paths]
@@ -73,7 +74,10 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
         problem = f"{few} ({pairs} pairs match); features per photo: {each}"
         raise ScanError(problem, where=str(photos.paths[0].parent), hint=ADVICE)
     cameras, cloud = _upright(*_values(model, names, config))
+    cloud = _without_surroundings(cameras, cloud, job)
     if cameras.unregistered:
+        reasons = {name: f"could not be placed ({counts[names.index(name)]} features)" for name in cameras.unregistered}
+        job.measure(left_out_photos=reasons)
         lost = ", ".join(f"{name} ({counts[names.index(name)]} features)" for name in cameras.unregistered)
         job.warn(f"{len(cameras.unregistered)} of {len(names)} photos could not be placed: {lost}. {ADVICE}")
     job.measure(
@@ -118,6 +122,18 @@ def _intrinsics(camera: Any) -> Intrinsics:
     """COLMAP counts pixels from the corner of the first one, we from its centre."""
     focal, cx, cy, k1 = camera.params
     return Intrinsics(camera.width, camera.height, focal, focal, cx - 0.5, cy - 0.5, k1)
+
+
+def _without_surroundings(cameras: CameraSet, cloud: PointCloud, job: Job) -> PointCloud:
+    """The points that can be of the object: those of walls and furniture would choose the depths that are searched."""
+    region = object_region(cameras)
+    inside = np.ones(len(cloud.points), bool) if region is None else region.holds(cloud.points)
+    if inside.all() or not inside.any():
+        return cloud
+    job.measure(surroundings_share=round(float(1 - inside.mean()), 3))
+    job.note(f"left out {int((~inside).sum())} of {len(inside)} sparse points, which lie as far out as the cameras")
+    normals = None if cloud.normals is None else cloud.normals[inside]
+    return PointCloud(cloud.points[inside], normals, None if cloud.colors is None else cloud.colors[inside])
 
 
 def _upright(cameras: CameraSet, cloud: PointCloud) -> tuple[CameraSet, PointCloud]:

@@ -21,10 +21,11 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
 from vto_pipeline.model.settings import Config
 from vto_pipeline.scan.library_message import library_message
-from vto_pipeline.scan.photos.consistency import agreeing_views, consensus
+from vto_pipeline.scan.photos.consistency import agreeing_views, consensus, rays
 from vto_pipeline.scan.photos.disparity import MatchConfig, match_pair
 from vto_pipeline.scan.photos.neighbours import choose_pairs, visibility
 from vto_pipeline.scan.photos.rectify import StereoView, rectify
+from vto_pipeline.scan.photos.region import object_region
 
 PAIR_BYTES = 250
 """Working memory of one pair per pixel of a photo, with windows as large as they may be [B]."""
@@ -204,13 +205,18 @@ def _in_order(work: Callable[[Any], Any], pairs: list[tuple[int, int]]) -> Itera
 
 
 def _check(merged: DepthMaps, pairs: list[tuple[int, int]], config: StereoConfig, job: Job) -> NDArray[np.float32]:
-    """Depths that enough other photos confirm, shape (C, H, W)."""
+    """Depths that enough other photos confirm and that can be of the object, shape (C, H, W)."""
     checked = np.zeros_like(merged.depth)
+    region = object_region(CameraSet(merged.names, merged.intrinsics, merged.world_from_cam))
     for i, depth in enumerate(merged.depth):
         others = sorted({a + b - i for a, b in pairs if i in (a, b)})
         if others:
             votes = agreeing_views(merged, i, others, config.check_tolerance)
             checked[i] = np.where(votes >= config.check_views, depth, 0)
+            if region is not None:
+                local = rays(merged.intrinsics[i].matrix, *depth.shape) * depth[..., None]
+                pose = merged.world_from_cam[i]
+                checked[i][~region.holds(local @ pose[:3, :3].T + pose[:3, 3])] = 0
         job.progress(0.9 + 0.1 * (i + 1) / len(checked), f"checking photo {i + 1} of {len(checked)}")
     checked.flags.writeable = False
     return checked

@@ -5,15 +5,20 @@ from __future__ import annotations
 from collections import defaultdict
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from vto_pipeline.errors import ScanError
 from vto_pipeline.io.captures.images import read_image_size
 from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.frames import PhotoSet
+from vto_pipeline.model.job import Job
 from vto_pipeline.model.settings import Config
 from vto_pipeline.scan.library_message import COLMAP_ERRORS, library_message
+from vto_pipeline.scan.photos.matching.fixed_camera import Pair, moving_matches, still_features
 
 GUESSED_FOCAL = 1.2
 """COLMAP's guess where EXIF says nothing, in longer sides of the picture."""
@@ -85,14 +90,16 @@ def detect(photos: PhotoSet, database: Path, contrast: float, config: FeatureCon
     return [counts.get(name, 0) for name in names]
 
 
-def match(photos: PhotoSet, database: Path, config: FeatureConfig, seed: int) -> int:
+def match(photos: PhotoSet, database: Path, config: FeatureConfig, job: Job) -> int:
     """Match features between photos, and keep the pairs that one two-view geometry explains.
+
+    Where the camera did not move, the background is left out first.
 
     Args:
         photos: Photos.
         database: Holds their features.
         config: Settings.
-        seed: Of the RANSAC.
+        job: Seeds the RANSAC; notified when the camera did not move.
 
     Returns:
         Number of matched pairs.
@@ -105,7 +112,7 @@ def match(photos: PhotoSet, database: Path, config: FeatureConfig, seed: int) ->
     pairs = database.with_name("pairs.txt")
     pairs.write_text("".join(f"{a} {b}\n" for a, b in _pairs([path.name for path in photos.paths], config)))
     verification = pycolmap.TwoViewGeometryOptions()
-    verification.ransac.random_seed = seed
+    verification.ransac.random_seed = job.seed
     try:
         pycolmap.match_image_pairs(
             database,
@@ -114,6 +121,8 @@ def match(photos: PhotoSet, database: Path, config: FeatureConfig, seed: int) ->
             verification,
             device=pycolmap.Device.cpu,
         )
+        if _drop_background(database, photos, job):
+            pycolmap.verify_matches(database, pairs, verification)
     except COLMAP_ERRORS as error:
         problem = f"the features of {len(photos.paths)} photos could not be matched: {library_message(error)}"
         raise ScanError(problem, where=str(photos.paths[0].parent)) from error
@@ -126,6 +135,31 @@ def match(photos: PhotoSet, database: Path, config: FeatureConfig, seed: int) ->
             else:
                 opened.delete_two_view_geometry(first, second)
     return kept
+
+
+def _drop_background(database: Path, photos: PhotoSet, job: Job) -> bool:
+    """Take the matches of a background that stays out of the database; return whether there were any."""
+    import pycolmap
+
+    with pycolmap.Database.open(str(database)) as opened:
+        numbers = {image.name: image.image_id for image in opened.read_all_images()}
+        names = {number: name for name, number in numbers.items()}
+        places = {name: opened.read_keypoints(number)[:, :2].astype(np.float64) for name, number in numbers.items()}
+        matches: dict[Pair, NDArray[Any]] = {}
+        for pair, rows in zip(*opened.read_all_matches(), strict=True):
+            one, other = pycolmap.pair_id_to_image_pair(pair)
+            matches[names[one], names[other]] = rows
+        found = still_features(places, matches, max(max(read_image_size(path)) for path in photos.paths))
+        job.measure(still_share=round(found.share, 3))
+        if not found.fixed_camera:
+            return False
+        job.note(f"the camera did not move: {100 * found.share:.0f} % of the features are background, and left out")
+        opened.clear_two_view_geometries()
+        opened.clear_matches()
+        for (first, second), moving in moving_matches(matches, found.still).items():
+            if len(moving):
+                opened.write_matches(numbers[first], numbers[second], moving)
+    return True
 
 
 def _groups(photos: PhotoSet) -> dict[tuple[int, int, Intrinsics | None], list[str]]:
