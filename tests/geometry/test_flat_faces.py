@@ -123,6 +123,20 @@ def test_across_a_dart_lengths_are_those_of_the_sewn_cone(cut, around):
     assert_allclose(sides(found), sides(truth), rtol=5e-3)  # facets of 3 degrees
 
 
+def test_three_corners_on_a_straight_border_span_what_they_span_in_space():
+    mesh, laid = tube(96, 41)
+    rim = mesh.vertices[[0, 2 * 41, 7 * 41]]  # along an arc in space, along a line in the panel
+    top = mesh.vertices[[2 * 41 + 20]]
+    other = TriangleMesh(np.concatenate([rim, top]), np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3]]))
+    found = carry_flat_faces(mesh, laid, other)
+    arc = RADIUS * 2 * np.pi * np.array([7.0, 5.0, 2.0]) / 96
+    assert_allclose(sides(found)[0], arc, rtol=9e-3)  # chords of up to 26 degrees are shorter by as much
+    area = 0.5 * np.abs(np.linalg.det(found[:, 1:] - found[:, :1]))
+    in_space = 0.5 * np.linalg.norm(np.cross(rim[1] - rim[0], rim[2] - rim[0]))
+    assert_allclose(area[0], in_space, rtol=0.02)
+    assert area[0] < 0.05 * area[1]
+
+
 def test_flat_faces_stretch_as_their_mesh_does():
     mesh = grid(6, 5)
     laid = 0.9 * mesh.vertices[mesh.faces][:, :, :2]

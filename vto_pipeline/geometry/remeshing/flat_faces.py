@@ -28,6 +28,7 @@ _ALIKE = 1e-6  # m: corners no farther apart are one
 _GAP = 0.02  # of an edge, outside its panel: it reaches across a dart
 _LONGER, _LONGEST = 1.5, 4.0  # times as in space: a side asks for a seam; even folds that are cut short are no more
 _VAGUE = 1e-6  # weight of a side that is not known for certain
+_THIN = 0.01  # height over longest side: what is thinner does not count as cloth
 _LOOKS = 7  # along a side
 _FAR = 100.0  # m between panels that are looked at side by side
 
@@ -85,7 +86,10 @@ def carry_flat_faces(source: TriangleMesh, laid: FloatArray, mesh: TriangleMesh)
     found = centre + (found - centre) / (1.0 - _INSET)
     lost = ~known | (_sides(found) > _LONGEST * _sides(corners)).any(axis=1)
     found[lost] = _measured(surface, to_plane, laid, base, corners[lost])
-    return _agreed(found, mesh, lost | moved | ~whole)
+    found = _agreed(found, mesh, lost | moved | ~whole)
+    thin = _slenderness(found) < _THIN
+    found[thin] = _as_in_space(found[thin], corners[thin])
+    return found
 
 
 def panel_of_faces(mesh: TriangleMesh, laid: FloatArray) -> NDArray[np.int64]:
@@ -256,6 +260,20 @@ def _agreed(laid: FloatArray, mesh: TriangleMesh, vague: NDArray[np.bool_]) -> F
     found = laid.copy()
     found[vague] = _with_sides(laid[vague], agreed[edge].reshape(-1, 3)[vague])
     return found
+
+
+def _as_in_space(laid: FloatArray, corners: FloatArray) -> FloatArray:
+    """Return flat faces (G, 3, 2) in the shape they have in space (G, 3, 3), with their longest sides as they were.
+
+    Three corners on a border that is straight in its panel span a triangle of no height, which could bear no strain.
+    """
+    longest = (_sides(laid).max(axis=1) / np.maximum(_sides(corners).max(axis=1), _ALIKE))[:, None]
+    return _with_sides(laid, longest * _sides(corners))
+
+
+def _slenderness(laid: FloatArray) -> FloatArray:
+    """Return the heights of flat triangles (G, 3, 2) over their longest sides, shape (G,)."""
+    return np.asarray(np.abs(np.linalg.det(_edges(laid))) / np.maximum(_sides(laid).max(axis=1), _ALIKE) ** 2)
 
 
 def _with_sides(laid: FloatArray, sides: FloatArray) -> FloatArray:
