@@ -1,5 +1,7 @@
 """The place of a garment on a body it was never on: unit, axes, shift."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from cloth_scenes import moved, tube
@@ -8,10 +10,13 @@ from numpy.testing import assert_allclose
 from vto_pipeline.cloth.placement.place import PlaceConfig, find_placement
 from vto_pipeline.cloth.placement.voxel_fit import VoxelFit, quarter_turns
 from vto_pipeline.errors import InputError
+from vto_pipeline.geometry.remeshing.remesh import RemeshConfig, remesh
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.io.meshes import read_mesh
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
+DATA = Path(__file__).parents[3] / "shared" / "data"
 FINE = PlaceConfig(cube_mm=10)
 Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 DOWN = np.diag([-1.0, -1.0, 1.0])
@@ -134,3 +139,14 @@ def test_quarter_turns_are_the_rotations_of_a_cube_and_cubes_turn_like_meshes():
         anew = VoxelFit(turned, pear(), 0.02, 2.0).best_placement(np.eye(3))
         assert_allclose(anew.shift, 0.0, rtol=0, atol=0.021)  # a cube: the lattices differ by part of one
         assert_allclose(anew.score, found.score, rtol=0, atol=0.05)
+
+
+@pytest.mark.real_data
+@pytest.mark.skipif(not DATA.exists(), reason="the data folder is absent")
+def test_a_tight_blouse_is_not_put_on_upside_down():
+    """Tight in the chest, it would be filled better by the hips, its sleeves beside them. +z is up in its file."""
+    garment = read_mesh(DATA / "garments" / "berkeley" / "blouse-short" / "blouse-short-iso.obj")
+    body = read_mesh(DATA / "bodies" / "mh_female_averageweight.ply")
+    found = find_placement(remesh(garment, RemeshConfig(edge_mm=20), Job()), body, PlaceConfig(), Job())
+    assert_allclose(found.turn[1], [0.0, 0.0, 1.0], rtol=0, atol=0)
+    assert found.scale == 1.0

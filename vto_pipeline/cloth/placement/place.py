@@ -21,6 +21,7 @@ from vto_pipeline.units import LENGTH_M
 _PLAUSIBLE = (0.12, 1.3)  # longest side of a garment as a share of the body's: from briefs to a gown with a train
 _SMALLEST = 0.02  # the same of a patch of cloth that is in metres: no other unit would make it larger
 _COARSE = 2.0  # times the cube: enough to tell which ways up are worth a second look
+_TELLING = 1.5  # times the cube: enough to tell them apart
 _CLOSE = 0.9  # of the best coarse worth: these are looked at again with fine cubes
 _ALIKE = 0.98  # as good, but for where the cubes happen to lie
 _LARGER, _STEPS = 1.2, 4  # a garment may start up to twice as large as it is
@@ -104,7 +105,7 @@ def find_placement(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfi
             hint="give it as it is worn, sewn and open; drape.place=as_it_stands drapes it from where it lies",
         )
     if stands.score < config.turned_well * best.score:
-        best = _best_orientation_if_larger(metres, body, best, config)
+        best = _best_orientation_if_larger(metres, body, config)
     as_turned = 1.0 if (best.turn == stands.turn).all() else _relative_score(stands.score, best.score)
     if as_turned >= _ALIKE:
         best = stands
@@ -159,17 +160,22 @@ def _best_orientation(
     return ways[0], max(ways, key=lambda way: way.score)
 
 
-def _best_orientation_if_larger(
-    garment: TriangleMesh, body: TriangleMesh, best: VoxelPlacement, config: PlaceConfig
-) -> VoxelPlacement:
-    """Return the best place, turned as the garment would be if larger: one too small for the trunk may suit a thigh."""
-    ways = [best]
-    for step in range(1, _STEPS + 1):
+def _best_orientation_if_larger(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig) -> VoxelPlacement:
+    """Return the best place, turned as the garment would be if larger.
+
+    One too small for the trunk may suit a thigh, and a tight top the hips upside down, its sleeves beside them. So the
+    turn is that which suits the size that fits best and the next larger one, in which nothing is tight.
+    """
+    turns, scores = quarter_turns(), []
+    for step in range(_STEPS + 1):
         larger = TriangleMesh(_LARGER**step * garment.vertices, garment.faces)
-        ways.append(_best_orientation(larger, body, config.model_copy(update={"cube_mm": _COARSE * config.cube_mm}))[1])
-        if ways[-1].score < _FALLING * max(way.score for way in ways):
+        cubes = VoxelFit(larger, body, 1e-3 * _TELLING * config.cube_mm, config.cloth_in_body)
+        scores.append(np.array([cubes.best_placement(turn).score for turn in turns]))
+        if scores[-1].max() < _FALLING * max(one.max() for one in scores):
             break
-    turn = max(ways, key=lambda way: way.score).turn
+    fits = int(np.argmax([one.max() for one in scores]))
+    relative = sum(one / max(one.max(), 1e-9) for one in scores[fits : fits + 2])
+    turn = turns[int(np.argmax(relative))]
     return VoxelFit(garment, body, 1e-3 * config.cube_mm, config.cloth_in_body).best_placement(turn)
 
 
