@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.job import Job
-from vto_pipeline.scan.depth.bundle import refine_together
+from vto_pipeline.scan.depth.bundle import PARTNERS, choose_pairs, refine_together
 from vto_pipeline.scan.depth.rgbd_frame import prepare_frame
 
 CAMERA = Intrinsics(320, 240, 262.5, 262.5, 159.5, 119.5)
@@ -62,6 +62,21 @@ def test_the_distance_from_the_object_is_found(seen):
 def ring(poses):
     """Mean distance of the cameras from their middle [m]."""
     return np.linalg.norm(poses[:, :3, 3] - poses[:, :3, 3].mean(0), axis=1).mean()
+
+
+def test_many_frames_have_no_more_partners_each_and_these_at_all_angles():
+    turns = np.radians(np.arange(0, 360, 0.5))
+    poses = np.tile(np.eye(4), (len(turns), 1, 1))
+    poses[:, :3, :3] = Rotation.from_rotvec(np.column_stack([0 * turns, turns, 0 * turns])).as_matrix()
+    pairs = np.array(choose_pairs(poses, np.radians(45)))
+    angle = np.abs((turns[pairs[:, 0]] - turns[pairs[:, 1]] + np.pi) % (2 * np.pi) - np.pi)
+    assert (np.bincount(pairs[:, 1]) == PARTNERS).all()
+    assert np.degrees(angle.max()) < 45.01
+    shares = np.histogram(np.degrees(angle), [0, 15, 30, 45.01])[0] / len(pairs)
+    assert np.abs(shares - 1 / 3).max() < 0.05
+    few = choose_pairs(poses[::60], np.radians(45))
+    assert len(few) == 2 * 12
+    assert all(i != j for i, j in few)
 
 
 def test_a_frame_that_sees_nothing_of_the_others_stays(seen):

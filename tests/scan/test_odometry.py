@@ -5,17 +5,19 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from scan_scene import depth_frames
 from scipy.spatial.transform import Rotation
 
 from vto_pipeline.errors import ScanError
+from vto_pipeline.io.captures.cameras import read_trajectory, write_trajectory
 from vto_pipeline.io.captures.depth import read_depth
 from vto_pipeline.io.captures.images import read_image
 from vto_pipeline.model.job import Job
 from vto_pipeline.scan.depth.odometry import OdometryConfig, estimate_trajectory
 from vto_pipeline.scan.depth.rgbd_alignment import align_frames
 from vto_pipeline.scan.depth.rgbd_frame import prepare_frame
+from vto_pipeline.scan.fuse import FuseConfig, fuse_depth_frames
 from vto_pipeline.scan.photos.consistency import rays
 
 
@@ -103,13 +105,47 @@ def test_information_is_that_of_the_points_positions(walk):
     assert_allclose(found.information, truth, rtol=1e-6, atol=1e-6 * np.abs(truth).max())  # sums in another order
 
 
-def test_empty_frame_is_refused(walk, tmp_path):
+def with_blanks(walk, tmp_path, *which, reading=0):
+    """The first five frames, some without a reading, or with the same one everywhere [mm]."""
     blank = tmp_path / "blank.png"
-    cv2.imwrite(str(blank), np.zeros((240, 320), np.uint16))
-    frames = replace(walk[0], depth_paths=(*walk[0].depth_paths[:3], blank), color_paths=walk[0].color_paths[:4])
-    with pytest.raises(ScanError, match="0 usable depth readings") as caught:
-        estimate_trajectory(frames, OdometryConfig(), Job())
+    cv2.imwrite(str(blank), np.full((240, 320), reading, np.uint16))
+    depth = tuple(blank if k in which else path for k, path in enumerate(walk[0].depth_paths[:5]))
+    return replace(walk[0], depth_paths=depth, color_paths=walk[0].color_paths[:5])
+
+
+@pytest.mark.parametrize("approximate", [False, True])
+@pytest.mark.parametrize("blank", [0, 2])
+def test_an_empty_frame_is_left_out(walk, tmp_path, blank, approximate):
+    frames = with_blanks(walk, tmp_path, blank)
+    if approximate:
+        frames = replace(frames, world_from_cam=walk[1][:5], poses_approximate=True)
+    job = Job()
+    found = estimate_trajectory(frames, OdometryConfig(), job)
+    if not approximate:  # otherwise its pose is known all the same
+        assert np.isnan(found[blank]).all()
+        assert any("left out 1 of 5 frames" in text and "blank.png" in text for text in job.warnings)
+    good = [k for k in range(5) if k != blank]
+    assert np.linalg.norm(centred(found[good], walk[1][good]), axis=1).max() < 5e-3  # steps of 280 mm
+    write_trajectory(tmp_path / "trajectory.json", found)
+    assert_array_equal(read_trajectory(tmp_path / "trajectory.json"), found)
+    surface = fuse_depth_frames(frames, found, FuseConfig(voxel_mm=6), Job())
+    assert len(surface.faces) > 5000
+
+
+def test_too_many_empty_frames_are_refused(walk, tmp_path):
+    with pytest.raises(ScanError, match="usable depth readings") as caught:
+        estimate_trajectory(with_blanks(walk, tmp_path, 1, 3), OdometryConfig(), Job())
     assert "blank.png" in caught.value.where
+
+
+def test_a_frame_of_something_else_is_left_out_and_the_path_resumed(walk, tmp_path):
+    """Frame 2 is a wall half a metre away, in the colours of the scene."""
+    job = Job()
+    found = estimate_trajectory(with_blanks(walk, tmp_path, 2, reading=500), OdometryConfig(), job)
+    good = [0, 1, 3, 4]
+    assert np.isnan(found[2]).all()
+    assert np.linalg.norm(centred(found[good], walk[1][good]), axis=1).max() < 5e-3  # steps of 280 mm
+    assert any("left out 1 of 5 frames" in text and "lost track" in text for text in job.warnings)
 
 
 def few(walk, *chosen):

@@ -119,7 +119,7 @@ def fuse_depth_frames(frames: DepthFrameSet, world_from_cam: FloatArray, config:
 
     Args:
         frames: Depth, and colour if there is any.
-        world_from_cam: Poses [m], shape (N, 4, 4).
+        world_from_cam: Poses [m], shape (N, 4, 4); NaN for frames to leave out.
         config: Settings.
         job: Receives progress, frame by frame.
 
@@ -129,24 +129,29 @@ def fuse_depth_frames(frames: DepthFrameSet, world_from_cam: FloatArray, config:
     Raises:
         ScanError: no surface came out.
     """
-    camera, paths = frames.intrinsics, frames.depth_paths
+    used = np.flatnonzero(np.isfinite(world_from_cam).all(axis=(1, 2)))
+    camera, poses = frames.intrinsics, world_from_cam[used]
     plain = np.full((camera.height, camera.width, 3), GREY, np.uint8)
-    sphere = object_sphere(world_from_cam)
+    sphere = object_sphere(poses)
     if sphere is None:
         job.note("the frames do not look at one place from around: all that they see is fused")
     else:
         job.note(f"fused what is within {sphere.radius:.2f} m of the place that the frames look at")
 
     def depth_of(index: int) -> NDArray[np.float32]:
-        depth = clean_depth(frame_depth(frames, index), camera)
-        return depth if sphere is None else inside_sphere(depth, camera, world_from_cam[index], sphere)
+        depth = clean_depth(frame_depth(frames, int(used[index])), camera)
+        return depth if sphere is None else inside_sphere(depth, camera, poses[index], sphere)
+
+    def color_of(index: int) -> ByteArray:
+        picture = frame_color(frames, int(used[index]))
+        return plain if picture is None else picture
 
     views = DepthViews(
-        tuple(path.name for path in paths),
-        (camera,) * len(paths),
-        world_from_cam,
+        tuple(frames.depth_paths[k].name for k in used),
+        (camera,) * len(used),
+        poses,
         depth_of,
-        lambda index: plain if (picture := frame_color(frames, index)) is None else picture,
+        color_of,
     )
     return _fuse(views, config, job)
 

@@ -70,12 +70,14 @@ def read_depth_maps(path: Path) -> DepthMaps:
 
 
 def write_trajectory(path: Path, world_from_cam: FloatArray) -> None:
-    """Write poses (N, 4, 4) in the layout of a depth folder's poses.json."""
-    write_json(path, {"world_from_cam": world_from_cam})
+    """Write poses (N, 4, 4) in the layout of a depth folder's poses.json; NaN, where there is none, as null."""
+    stored = world_from_cam.astype(object)
+    stored[np.isnan(world_from_cam)] = None
+    write_json(path, {"world_from_cam": stored})
 
 
 def read_trajectory(path: Path) -> FloatArray:
-    """Read poses (N, 4, 4).
+    """Read poses (N, 4, 4); NaN where there is none.
 
     Raises:
         FormatError: not what `write_trajectory` wrote.

@@ -29,6 +29,9 @@ ROUNDS = ((0.03, 5), (0.01, 10))
 SETTLED = 2e-5
 """A round ends when no frame moves more [rad, m]."""
 
+PARTNERS = 24
+"""Frames that a frame is held to: so the work grows with the frames, not with their square."""
+
 LEAST_OVERLAP = 0.2
 """Share of the source's points that must fall on the target's surface."""
 
@@ -59,9 +62,7 @@ def refine_together(frames: Sequence[RgbdFrame], poses: FloatArray, widest: floa
         widest: Largest angle between lines of sight of a pair [rad].
         job: Receives progress.
     """
-    forward = poses[:, :3, 2]
-    seen = forward @ forward.T > np.cos(widest)
-    pairs = [(int(i), int(j)) for i, j in np.argwhere(seen) if i != j]
+    pairs = choose_pairs(poses, widest)
     poses = poses.copy()
     moved, used = 0.0, 0
     with ThreadPoolExecutor(os.cpu_count()) as pool:
@@ -83,6 +84,23 @@ def refine_together(frames: Sequence[RgbdFrame], poses: FloatArray, widest: floa
                 if moved < SETTLED:
                     break
     return Bundle(poses, used, moved)
+
+
+def choose_pairs(poses: FloatArray, widest: float) -> list[tuple[int, int]]:
+    """Ordered pairs of frames whose lines of sight differ by up to an angle [rad], at most `PARTNERS` for each target.
+
+    Of more, every so many in the order of the angle, so that all angles have their say.
+    """
+    forward = poses[:, :3, 2]
+    cosine = forward @ forward.T
+    np.fill_diagonal(cosine, -2.0)
+    pairs = []
+    for target, row in enumerate(cosine):
+        order = np.argsort(-row, kind="stable")[: int(np.count_nonzero(row > np.cos(widest)))]
+        if len(order) > PARTNERS:
+            order = order[np.linspace(0, len(order) - 1, PARTNERS).round().astype(int)]
+        pairs += [(int(source), target) for source in order]
+    return sorted(pairs)
 
 
 def _solve(count: int, pairs: list[tuple[int, int]], found: list[PairSums], inverse: FloatArray) -> FloatArray:

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import Field
 from scipy.spatial.transform import Rotation
 
+from vto_pipeline.errors import ScanError
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.frames import DepthFrameSet
 from vto_pipeline.model.job import Job
@@ -18,10 +19,18 @@ from vto_pipeline.model.settings import Config
 from vto_pipeline.scan.depth.bundle import refine_together
 from vto_pipeline.scan.depth.pose_graph import Edge, disagreement, optimise_poses
 from vto_pipeline.scan.depth.rgbd_frame import RgbdFrame
-from vto_pipeline.scan.depth.tracker import TrackedFrame, Tracker
-from vto_pipeline.scan.in_order import in_order
+from vto_pipeline.scan.depth.tracker import MIN_READINGS, TrackedFrame, Tracker
 from vto_pipeline.scan.photos.consistency import rays
 from vto_pipeline.scan.upright import upright_from_scan
+
+Place = tuple[int, FloatArray]
+"""Of a frame: the keyframe that it follows, and its pose in that keyframe's camera."""
+
+LOOKED_BACK = 10
+"""Keyframes before the last to which a frame that lost track is held."""
+
+MOST_LOST = 0.34
+"""Share of the frames that may be left out."""
 
 
 class OdometryConfig(Config):
@@ -51,11 +60,11 @@ def estimate_trajectory(frames: DepthFrameSet, config: OdometryConfig, job: Job)
         job: Receives progress, frame by frame.
 
     Returns:
-        world_from_cam [m], shape (N, 4, 4), roughly upright, the first camera in front; given poses as they are,
-        approximate ones refined.
+        world_from_cam [m], shape (N, 4, 4), roughly upright, the first camera in front; NaN for frames that are left
+        out. Given poses are returned as they are, approximate ones refined.
 
     Raises:
-        ScanError: a frame holds no readings, or tracking was lost.
+        ScanError: more than a third of the frames hold no readings or lost track.
     """
     given = frames.world_from_cam
     if given is not None and not frames.poses_approximate:
@@ -76,35 +85,41 @@ def estimate_trajectory(frames: DepthFrameSet, config: OdometryConfig, job: Job)
         refined_by_mm=round(1000 * float(np.median(shift)), 3),
         last_step_mm=round(1000 * bundle.moved, 4),
     )
-    poses = np.stack([path[k] @ relative for k, relative in owner])
-    return upright_from_scan(poses, _sample_points(surfaces, path)) @ poses
+    known = [k for k, place in enumerate(owner) if place is not None]
+    poses = np.full((len(owner), 4, 4), np.nan)
+    poses[known] = [path[place[0]] @ place[1] for place in owner if place is not None]
+    poses[known] = upright_from_scan(poses[known], _sample_points(surfaces, path)) @ poses[known]
+    return poses
 
 
 def _given_path(
     tracker: Tracker, poses: FloatArray, config: OdometryConfig, job: Job
-) -> tuple[list[RgbdFrame], FloatArray, list[tuple[int, FloatArray]]]:
+) -> tuple[list[RgbdFrame], FloatArray, list[Place | None]]:
     """As `_tracked_path`, from given poses."""
-    chosen: list[int] = []
-    owner: list[tuple[int, FloatArray]] = []
+    chosen = [0]
+    limit = np.radians(config.keyframe_deg)  # at a metre, a shift by as many metres is the same to the eye
     for index, pose in enumerate(poses):
-        relative = np.linalg.inv(poses[chosen[-1]]) @ pose if chosen else np.eye(4)
+        relative = np.linalg.inv(poses[chosen[-1]]) @ pose
         turned = np.linalg.norm(Rotation.from_matrix(relative[:3, :3]).as_rotvec())
-        limit = np.radians(config.keyframe_deg)
-        if not chosen or turned > limit or np.linalg.norm(relative[:3, 3]) > limit:  # at a metre, the same to the eye
+        if turned > limit or np.linalg.norm(relative[:3, 3]) > limit:
             chosen.append(index)
-            relative = np.eye(4)
-        owner.append((len(chosen) - 1, relative))
-    surfaces = []
-    for frame in in_order(lambda k: tracker.prepare(chosen[k]), len(chosen)):
-        surfaces.append(frame.surface)
-        job.progress(0.7 * len(surfaces) / len(chosen), f"read keyframe {len(surfaces)} of {len(chosen)}")
-    return surfaces, poses[chosen], owner
+    keyframes = []
+    for done, frame in enumerate(tracker.read(chosen)):
+        if frame is not None:
+            keyframes.append(frame)
+        job.progress(0.7 * (done + 1) / len(chosen), f"read keyframe {done + 1} of {len(chosen)}")
+    if not keyframes:
+        tracker.prepare(chosen[0])  # says why
+    at = [frame.index for frame in keyframes]
+    last = np.maximum(np.searchsorted(at, np.arange(len(poses)), side="right") - 1, 0)
+    owner: list[Place | None] = [(int(k), np.linalg.inv(poses[at[k]]) @ p) for k, p in zip(last, poses, strict=True)]
+    return [frame.surface for frame in keyframes], poses[at], owner
 
 
 def _tracked_path(
     tracker: Tracker, config: OdometryConfig, job: Job
-) -> tuple[list[RgbdFrame], FloatArray, list[tuple[int, FloatArray]]]:
-    """Keyframes and their poses; of each frame, which keyframe it follows and its pose in that keyframe's camera."""
+) -> tuple[list[RgbdFrame], FloatArray, list[Place | None]]:
+    """Keyframes, their poses, and the place of each frame; None where it is left out."""
     colors = tracker.frames.color_paths
     if not colors:
         job.warn("no colour frames: tracking by shape alone drifts on round garments")
@@ -132,41 +147,72 @@ def _tracked_path(
 
 def _track(
     tracker: Tracker, config: OdometryConfig, job: Job
-) -> tuple[list[TrackedFrame], list[Edge], list[tuple[int, FloatArray]]]:
-    """Keyframes; an edge from each frame but the first to the keyframe before it; of each frame, which keyframe it
-    follows and its pose in that keyframe's camera."""
+) -> tuple[list[TrackedFrame], list[Edge], list[Place | None]]:
+    """Keyframes; an edge from each frame but the first to a keyframe before it; the place of each frame.
+
+    A frame that fits neither the last keyframe nor one before it is left out.
+    """
     keyframes: list[TrackedFrame] = []
     edges: list[Edge] = []
-    owner: list[tuple[int, FloatArray]] = []
-    step = np.eye(4)  # of the last frame, in its own camera
-    count = len(tracker.frames.depth_paths)
-    for frame in tracker.read():
+    owner: list[Place | None] = []
+    lost: list[ScanError] = []
+    before, step = np.eye(4), np.eye(4)  # the last frame in the last keyframe's camera; its motion in its own
+    paths = tracker.frames.depth_paths
+    for index, frame in enumerate(tracker.read(range(len(paths)))):
+        job.progress(0.6 * (index + 1) / len(paths), f"tracked frame {index + 1} of {len(paths)}")
+        if frame is None:
+            owner.append(None)
+            lost.append(ScanError(f"fewer than {MIN_READINGS} usable depth readings", where=str(paths[index])))
+            continue
         if not keyframes:
             keyframes.append(frame)
             owner.append((0, np.eye(4)))
             continue
-        before = owner[-1][1]
-        edge = tracker.track(frame, keyframes[-1], before @ step)
+        edge = _edge_to_keyframe(tracker, frame, keyframes, before @ step, lost)
+        if edge is None:
+            owner.append(None)
+            continue
         edges.append(edge)
         pose = edge.target_from_source
-        step = np.linalg.inv(before) @ pose
         turned = np.degrees(np.linalg.norm(Rotation.from_matrix(pose[:3, :3]).as_rotvec()))
-        if turned > config.keyframe_deg or edge.overlap < config.keyframe_overlap:
+        found_again = edge.target != keyframes[-1].index
+        step = np.eye(4) if found_again else np.linalg.inv(before) @ pose
+        if turned > config.keyframe_deg or edge.overlap < config.keyframe_overlap or found_again:
             keyframes.append(frame)
-            owner.append((len(keyframes) - 1, np.eye(4)))
-        else:
-            owner.append((len(keyframes) - 1, pose))
-        job.progress(0.6 * len(owner) / count, f"tracked frame {len(owner)} of {count}")
+            pose = np.eye(4)
+        owner.append((len(keyframes) - 1, pose))
+        before = pose
+    if len(lost) > MOST_LOST * len(paths):
+        raise lost[0]
+    if lost:
+        job.warn(f"left out {len(lost)} of {len(paths)} frames; the first: {lost[0].where}: {lost[0].problem}")
     return keyframes, edges, owner
+
+
+def _edge_to_keyframe(
+    tracker: Tracker, frame: TrackedFrame, keyframes: list[TrackedFrame], steady: FloatArray, lost: list[ScanError]
+) -> Edge | None:
+    """An edge to the last keyframe, or to an earlier one whose features match; what was wrong with the last is kept."""
+    try:
+        return tracker.track(frame, keyframes[-1], steady)
+    except ScanError as error:
+        if tracker.frames.color_paths:
+            for key in keyframes[-2 : -2 - LOOKED_BACK : -1]:
+                edge = tracker.try_track(frame, key, np.eye(4))
+                if edge is not None:
+                    return edge
+        lost.append(error)
+        return None
 
 
 def _chained(keyframes: list[TrackedFrame], edges: list[Edge]) -> FloatArray:
     """Poses of the keyframes along the path, shape (K, 4, 4)."""
-    motion = {edge.source: edge.target_from_source for edge in edges}
-    poses = [np.eye(4)]
+    edge_from = {edge.source: edge for edge in edges}
+    pose_of = {keyframes[0].index: np.eye(4)}
     for key in keyframes[1:]:
-        poses.append(poses[-1] @ motion[key.index])
-    return np.stack(poses)
+        edge = edge_from[key.index]
+        pose_of[key.index] = pose_of[edge.target] @ edge.target_from_source
+    return np.stack([pose_of[key.index] for key in keyframes])
 
 
 def _close_loops(

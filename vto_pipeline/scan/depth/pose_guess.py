@@ -21,19 +21,19 @@ class ImageFeatures:
     Args:
         pixels: Shape (K, 2).
         points: The same in the camera's frame [m], shape (K, 3); z = 0 where there is no reading.
-        descriptors: Shape (K, 128), float32.
+        descriptors: Shape (K, 128); OpenCV's are whole numbers up to 255.
     """
 
     pixels: FloatArray
     points: FloatArray
-    descriptors: NDArray[np.float32]
+    descriptors: NDArray[np.float32] | NDArray[np.uint8]
 
 
 def find_features(color: ByteArray | None, depth: NDArray[np.float32], camera: Intrinsics) -> ImageFeatures:
     """Detect features (Lowe 2004) and look up their depth; without colour there are none."""
     import cv2
 
-    none = ImageFeatures(np.empty((0, 2)), np.empty((0, 3)), np.empty((0, 128), np.float32))
+    none = ImageFeatures(np.empty((0, 2)), np.empty((0, 3)), np.empty((0, 128), np.uint8))
     if color is None:
         return none
     found, descriptors = cv2.SIFT.create(2000).detectAndCompute(cv2.cvtColor(color, cv2.COLOR_RGB2GRAY), None)
@@ -44,7 +44,7 @@ def find_features(color: ByteArray | None, depth: NDArray[np.float32], camera: I
     z = depth[np.clip(row, 0, depth.shape[0] - 1), np.clip(column, 0, depth.shape[1] - 1)].astype(float)
     flat = (pixels - [camera.cx, camera.cy]) / [camera.fx, camera.fy]
     return ImageFeatures(
-        pixels, np.column_stack([flat, np.ones(len(flat))]) * z[:, None], np.asarray(descriptors, np.float32)
+        pixels, np.column_stack([flat, np.ones(len(flat))]) * z[:, None], np.asarray(descriptors).astype(np.uint8)
     )
 
 

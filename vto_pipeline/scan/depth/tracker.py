@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,13 +49,9 @@ class Tracker:
     def __init__(self, frames: DepthFrameSet, min_overlap: float, max_jump: float) -> None:
         self.frames, self.min_overlap, self.max_jump = frames, min_overlap, max_jump
 
-    def read(self) -> Iterator[TrackedFrame]:
-        """Give the frames in order; only a few are in memory at a time.
-
-        Raises:
-            ScanError: a frame holds next to no readings.
-        """
-        return in_order(self.prepare, len(self.frames.depth_paths))
+    def read(self, chosen: Sequence[int]) -> Iterator[TrackedFrame | None]:
+        """Give some frames in order, None for one that holds next to no readings; few are in memory at a time."""
+        return in_order(lambda k: self._try_prepare(chosen[k]), len(chosen))
 
     def prepare(self, index: int) -> TrackedFrame:
         """Read one frame.
@@ -71,6 +67,12 @@ class Tracker:
             raise ScanError(problem, where=str(path))
         color = frame_color(frames, index)
         return TrackedFrame(index, prepare_frame(color, depth, camera), find_features(color, depth, camera))
+
+    def _try_prepare(self, index: int) -> TrackedFrame | None:
+        try:
+            return self.prepare(index)
+        except ScanError:
+            return None
 
     def track(self, source: TrackedFrame, target: TrackedFrame, steady: FloatArray) -> Edge:
         """Track one frame to another: from matched features, or where these are too few from a steady motion.
