@@ -122,3 +122,28 @@ def test_two_that_compile_at_the_same_time_never_load_each_others_code(tmp_path,
     for thread in threads:
         thread.join()
     assert all(files[0].load(k) == f"code {k}" for k in (0, 1)) is safe
+
+
+_ALONE = """
+import numpy as np
+from vto_pipeline.numerics.linear.block_matrix import pattern
+from vto_pipeline.numerics.linear.direct import DirectSolver
+side = 40
+at = np.arange(side * side).reshape(side, side)
+one = np.concatenate([at[:, :-1].ravel(), at[:-1].ravel(), at[:-1, :-1].ravel()])
+two = np.concatenate([at[:, 1:].ravel(), at[1:].ravel(), at[1:, 1:].ravel()])
+matrix, places = pattern(np.concatenate([one, two]), np.concatenate([two, one]), side * side)
+matrix.blocks[:] = 0.0
+np.add.at(matrix.blocks, places, -np.eye(3))
+matrix.blocks[matrix.diagonal] += 7.0 * np.eye(3)
+solver = DirectSolver(matrix)
+assert solver._plan.flops > 4e6  # enough for threads
+print(solver.factorise(matrix.blocks))
+"""
+
+
+def test_a_parallel_factorisation_may_be_the_first_thing_that_a_process_does():
+    """Twice: the kernels then come from the cache, which starts no threads for those that only call parallel ones."""
+    for _ in range(2):
+        done = subprocess.run([sys.executable, "-c", _ALONE], capture_output=True, text=True, timeout=300)
+        assert (done.returncode, done.stdout.strip()) == (0, "True"), done.stderr

@@ -137,7 +137,7 @@ def test_trousers_are_judged_as_trousers_whatever_the_setting(monkeypatch: pytes
 
 
 class _Rest:
-    positions, worn_as = None, "same_garment"
+    positions, worn_as, panels = None, "same_garment", None
 
 
 class _Body:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,6 +21,7 @@ class DirectSolver:
     """
 
     def __init__(self, matrix: BlockMatrix) -> None:
+        numba.get_num_threads()  # starts them: a kernel from the cache whose callees are parallel does not, and crashes
         self._starts = matrix.starts
         self._weights, self._links = np.empty((0, 4)), np.empty((0, 3, 3))
         order = dissection(matrix.starts, matrix.columns)
