@@ -166,3 +166,26 @@ def test_where_cloth_is_about_to_buckle_steps_are_short_enough_for_it_to():
     assert found.state.positions[0, 0] == pytest.approx(1e-3, abs=1e-5)
     assert strip.substeps == 0.5
     assert not strip.exact
+
+
+class Indefinite(Steps):
+    """Cloth that buckles within an edge: with the exact stiffness no step is short enough."""
+
+    def choices(self, count):
+        """Steps per frame and whether they are exact, in so many looks, the cloth all but still."""
+        chooser, chosen = StableNewtonSteps(self, 0.01), []
+        for _ in range(count):
+            chooser.choose(near=True, residual=1.0)
+            chosen.append((self.substeps, self.exact))
+        return chosen
+
+
+def test_where_no_step_is_short_enough_time_goes_on_with_the_usual_stiffness():
+    chosen = Indefinite().choices(200)
+    usual = [steps == 0.5 and not exact for steps, exact in chosen]
+    shortest = [exact and steps == 32.0 for steps, exact in chosen]
+    assert any(shortest)  # it was tried
+    assert np.mean(usual) > 0.8
+    runs = np.diff(np.flatnonzero(shortest))
+    assert runs.min() > 4  # never one after another, in which time would stand still
+    assert (np.diff(runs) > 0).all()  # and tried more and more seldom

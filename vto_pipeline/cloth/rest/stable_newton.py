@@ -14,6 +14,7 @@ _ASIDE = 10.0  # times the left-over force at its begin, at first: what is soft 
 _FALLS = 0.5  # times that after each look
 _SLIGHT = 0.1  # of the left-over force that is enough: less is no sign of going astray
 _SHORTER = 64.0  # times shorter than usual, at most, where cloth is about to buckle
+_PAUSE = 4  # looks with the usual stiffness where the shortest steps were of no use; twice as many after each time
 _FEW = 3  # of these steps to a look: it is the way that matters there, not the time it takes
 
 
@@ -28,6 +29,8 @@ class StableNewtonSteps:
 
     Where the system is not positive definite in steps as long as usual, they are shorter until it is. The usual
     stiffness leaves out what makes cloth buckle: with it, a fold that is about to only creeps, and never comes to rest.
+    Where it is not in the shortest ones either, as in cloth that buckles within an edge, time would stand still: so the
+    usual stiffness goes on for a while.
 
     Args:
         stepper: The cloth among its colliders, prepared; its steps are changed.
@@ -40,6 +43,7 @@ class StableNewtonSteps:
         self._enough = enough
         self._most = np.inf
         self._tried = False
+        self._wait, self._pause = 0, _PAUSE
 
     @property
     def span(self) -> float:
@@ -79,6 +83,10 @@ class StableNewtonSteps:
             self._shorten()
         else:
             self._most = _ASIDE * max(residual, _SLIGHT * self._enough)
+            if self._tried and stepper.substeps >= _SHORTER * self._usual:  # not even so: there is no end to that way
+                self._wait, self._pause = self._pause, 2 * self._pause
+            near = near and self._wait == 0
+            self._wait = max(self._wait - 1, 0)
             if not near:
                 stepper.substeps = self._usual
             elif self._tried:
