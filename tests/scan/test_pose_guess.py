@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scan_scene import render
 from scipy.spatial.transform import Rotation
 
 from vto_pipeline.model.camera import Intrinsics
@@ -48,6 +49,20 @@ def test_what_the_solver_refuses_is_no_motion(spread):
     source, target = seen(points, descriptors), seen(points, descriptors)
     motion = guess_motion(source, target, CAMERA)
     assert motion is None or np.isfinite(motion).all()
+
+
+def test_a_faint_print_tells_the_motion(scene, walk):
+    """Colours as of an overexposed pastel print: a quarter of the contrast, rounded to whole levels."""
+    camera = walk[0].intrinsics
+    seen = []
+    for pose in walk[1][:2]:
+        color, depth = render(scene, camera, pose)
+        seen.append(find_features(np.round(200 + 0.25 * (color.astype(float) - 140)).astype(np.uint8), depth, camera))
+    motion = guess_motion(*seen, camera)
+    assert motion is not None
+    truth = np.linalg.inv(walk[1][1]) @ walk[1][0]
+    assert_allclose(motion[:3, 3], truth[:3, 3], rtol=0, atol=0.01)  # of 280 mm
+    assert_allclose(motion[:3, :3], truth[:3, :3], rtol=0, atol=0.02)
 
 
 def test_frames_without_colour_or_texture_have_no_features():
