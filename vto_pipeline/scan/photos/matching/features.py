@@ -121,7 +121,9 @@ def match(photos: PhotoSet, database: Path, config: FeatureConfig, job: Job) -> 
             verification,
             device=pycolmap.Device.cpu,
         )
-        if _drop_background(database, photos, job):
+        moving = _drop_background(database, photos, job)
+        if moving is not None:  # only these: COLMAP would match again what has no matches
+            pairs.write_text("".join(f"{one} {other}\n" for one, other in moving))
             pycolmap.verify_matches(database, pairs, verification)
     except COLMAP_ERRORS as error:
         problem = f"the features of {len(photos.paths)} photos could not be matched: {library_message(error)}"
@@ -137,8 +139,12 @@ def match(photos: PhotoSet, database: Path, config: FeatureConfig, job: Job) -> 
     return kept
 
 
-def _drop_background(database: Path, photos: PhotoSet, job: Job) -> bool:
-    """Take the matches of a background that stays out of the database; return whether there were any."""
+def _drop_background(database: Path, photos: PhotoSet, job: Job) -> list[Pair] | None:
+    """Take the matches of a background that stays out of the database.
+
+    Returns:
+        The pairs of photos that still match; None where the camera moved, and nothing was changed.
+    """
     import pycolmap
 
     with pycolmap.Database.open(str(database)) as opened:
@@ -149,17 +155,19 @@ def _drop_background(database: Path, photos: PhotoSet, job: Job) -> bool:
         for pair, rows in zip(*opened.read_all_matches(), strict=True):
             one, other = pycolmap.pair_id_to_image_pair(pair)
             matches[names[one], names[other]] = rows
-        found = still_features(places, matches, max(max(read_image_size(path)) for path in photos.paths))
+        longer_side = float(max(max(read_image_size(path)) for path in photos.paths))
+        found = still_features(places, matches, longer_side)
         job.measure(still_share=round(found.share, 3))
         if not found.fixed_camera:
-            return False
+            return None
         job.note(f"the camera did not move: {100 * found.share:.0f} % of the features are background, and left out")
         opened.clear_two_view_geometries()
         opened.clear_matches()
-        for (first, second), moving in moving_matches(matches, found.still).items():
+        left = moving_matches(places, matches, found.still, longer_side)
+        for (first, second), moving in left.items():
             if len(moving):
                 opened.write_matches(numbers[first], numbers[second], moving)
-    return True
+    return [pair for pair, moving in left.items() if len(moving)]
 
 
 def _groups(photos: PhotoSet) -> dict[tuple[int, int, Intrinsics | None], list[str]]:

@@ -22,6 +22,8 @@ LEAST_PHOTOS = 4
 """A feature of the background stays in its place in so many other photos at least ..."""
 LEAST_SHARE = 0.5
 """... and in this share of those that it is matched in. What turns goes elsewhere in most."""
+MOVING_SHARE = 0.006
+"""What turns moves by more than this share of the longer side, from one photo to the next."""
 FIXED_SHARE = 0.1
 """The camera is fixed when more than this share of the matched features, over all photos, stay."""
 
@@ -67,10 +69,23 @@ def still_features(
 
 
 def moving_matches(
-    matches: Mapping[Pair, NDArray[np.integer]], still: Mapping[str, NDArray[np.bool_]]
+    places: Mapping[str, FloatArray],
+    matches: Mapping[Pair, NDArray[np.integer]],
+    still: Mapping[str, NDArray[np.bool_]],
+    longer_side: float,
 ) -> dict[Pair, NDArray[np.integer]]:
-    """Return the matches none of whose features belongs to the background, shape (M, 2) each."""
-    return {
-        (one, other): rows[~still[one][rows[:, 0]] & ~still[other][rows[:, 1]]]
-        for (one, other), rows in matches.items()
-    }
+    """Return the matches that move and none of whose features belongs to the background, shape (M, 2) each.
+
+    Faint features of the background are found in too few photos to be told by their number: whatever all but stays in
+    its place is left out, and with it a few of the object's near its outline.
+
+    Args:
+        places, matches, longer_side: As `still_features` takes them.
+        still: What it found.
+    """
+    moving = {}
+    for (one, other), rows in matches.items():
+        moved = np.linalg.norm(places[one][rows[:, 0]] - places[other][rows[:, 1]], axis=1)
+        kept = ~still[one][rows[:, 0]] & ~still[other][rows[:, 1]] & (moved > MOVING_SHARE * longer_side)
+        moving[one, other] = rows[kept]
+    return moving
