@@ -69,14 +69,16 @@ def align_to_mannequin(surface: TriangleMesh, mannequin: TriangleMesh, config: A
 
     def best_of(starts: list[FloatArray]) -> MannequinAlignment:
         rough = [refined(start, COARSE_BANDS, few) for start in starts]
+        rough = [one for one in rough if one.bare.mean() >= config.enough_bare] or rough[:1]
         best = max(rough, key=_worth)
         rivals = [one for one in rough if _worth(one) > config.rival_merit * _worth(best)]
         apart = max((abs(np.log(one.scale / best.scale)) for one in rivals), default=0.0)
         if apart > SAME_SCALE:
             other = max(rivals, key=lambda one: abs(np.log(one.scale / best.scale)))
             raise GarmentError(
-                f"the scan fits the mannequin in two sizes, one {100 * (other.scale / best.scale - 1):+.0f} % larger",
-                hint="give the scan a scale: a printed board in the photos, or a known length (scale.lengths)",
+                f"the scan fits the mannequin in two sizes, {other.scale / best.scale:.2f} to 1: too little is bare",
+                hint="give the scan a scale: a printed board in the photos, or a known length (scale.lengths); or show "
+                "more of the bare mannequin",
             )
         bands = np.geomspace(COARSE_BANDS[-1], config.widest_band_mm * 1e-3, FINE_BANDS)
         placed = refined(best.mannequin_from_surface, bands)
@@ -88,7 +90,8 @@ def align_to_mannequin(surface: TriangleMesh, mannequin: TriangleMesh, config: A
 
     if free:
         job.progress(0.1, "trying sizes")
-        placed = best_of(scaled_starts(points[few], mannequin, distance, 2 * config.candidates))
+        sized = scaled_starts(points[few], mannequin, distance, 2 * config.candidates, config.enough_bare)
+        placed = best_of(sized or [np.eye(4)])
         return _accept(placed, surface, config, job)
     search = PlacementSearch(points, mannequin, distance, COARSE_CELL)
 

@@ -1,8 +1,8 @@
 """Coarse placements of a scan whose scale is unknown: all translations, many turns, on a ladder of scales.
 
 A share of the scan that lies on the mannequin says nothing about scale: it is largest for a scan that has shrunk to a
-point of the surface. What counts is the area of the mannequin that the scan explains, which grows with the scale until
-the shapes no longer agree.
+point of the surface. The area that it explains would be largest for one that is blown up and touches along a line. The
+share times the scale is largest in between, where the shapes agree.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ MANNEQUIN_SAMPLES = 4000
 
 
 def scaled_starts(
-    points: FloatArray, mannequin: TriangleMesh, distance: SurfaceDistance, count: int
+    points: FloatArray, mannequin: TriangleMesh, distance: SurfaceDistance, count: int, least_share: float
 ) -> list[FloatArray]:
     """Return the placements of the scan that explain most of the mannequin, best first, each of another scale.
 
@@ -34,9 +34,11 @@ def scaled_starts(
         mannequin: In metres.
         distance: Its distance queries.
         count: Largest number of placements.
+        least_share: Placements with a smaller share of the scan on the mannequin are left out: of a scan that is far
+            too large, a few points touch it by chance, and stand for much area.
 
     Returns:
-        mannequin_from_surface with its scale, each (4, 4).
+        mannequin_from_surface with its scale, each (4, 4); there may be none.
     """
     on_mannequin, _, _ = sample_surface(mannequin, MANNEQUIN_SAMPLES, seed=0)
     usual = _spread(on_mannequin) / _spread(points)
@@ -44,7 +46,9 @@ def scaled_starts(
     for scale in usual * np.exp(np.arange(np.log(RANGE[0]), np.log(RANGE[1]), STEP)):
         search = PlacementSearch(scale * points, mannequin, distance, CELL, LARGEST_GRID)
         score, placement = max((search.best(turn) for turn in upright_rotations(YAWS)), key=lambda one: one[0])
-        found.append((score * scale**2, placement @ np.diag([scale, scale, scale, 1.0])))
+        if score < least_share:
+            continue
+        found.append((score * scale, placement @ np.diag([scale, scale, scale, 1.0])))
     return [placement for _, placement in sorted(found, key=lambda one: -one[0])[:count]]
 
 
