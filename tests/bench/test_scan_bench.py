@@ -43,7 +43,7 @@ def test_a_garment_half_of_which_is_missing_is_incomplete_and_not_inaccurate(vas
 
 
 def test_a_scan_that_takes_too_long_is_ended(tmp_path):
-    ended = run_vto(["--help"], tmp_path / "log", 0.01)
+    ended = run_vto(["schema"], tmp_path / "log", 0.01)  # it loads every domain, which takes seconds
     assert ended.code is None
     assert run_vto(["--help"], tmp_path / "log", 60.0).code == 0
 

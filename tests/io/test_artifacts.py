@@ -41,6 +41,7 @@ VALUES: dict[str, Any] = {
     "garment_depth_maps": DepthMaps(CAMERAS.names, LENSES, POSES, DEPTH),
     "garment_trajectory": POSES,
     "garment_surface": TriangleMesh(POINTS, FACES, COLORS),
+    "garment_scan_report": {"metric": True, "scale": {"source": "board", "error_percent": 0.01}},
     "garment_placement": POSES[0],
     "labels": SurfaceLabels(RNG.random(8) > 0.5, RNG.random(8)),
     "garment_shell": MESH,

@@ -19,7 +19,7 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.scan.fuse import FuseConfig, PhotoFuseConfig, check_coverage, fuse_depth_maps
 from vto_pipeline.scan.library_message import library_message
 from vto_pipeline.scan.photos.board import detect_board
-from vto_pipeline.scan.photos.scale import ScaleConfig, apply_board
+from vto_pipeline.scan.photos.scale import ScaleConfig, apply_scale
 from vto_pipeline.scan.photos.sfm import SfmConfig, estimate_cameras
 from vto_pipeline.scan.photos.stereo import StereoConfig, estimate_depth_maps
 
@@ -40,7 +40,7 @@ def good(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> list[bytes]:
 def reconstruct(folder: Path, job: Job) -> int:
     """Take a folder all the way; the number of triangles."""
     found = read_photos(folder, job=job)
-    cameras, cloud = apply_board(found, *estimate_cameras(found, SfmConfig(), job), ScaleConfig(), job)
+    cameras, cloud = apply_scale(found, *estimate_cameras(found, SfmConfig(), job), ScaleConfig(), job)
     maps = estimate_depth_maps(found, cameras, cloud, StereoConfig(), job)
     surface = fuse_depth_maps(found, cameras, maps, FuseConfig(), job)
     check_coverage(surface, maps, cloud, PhotoFuseConfig(), job)
