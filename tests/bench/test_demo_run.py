@@ -73,10 +73,11 @@ def table(pytestconfig: pytest.Config) -> Iterator[list[str]]:
     """Lines for the end of the session: a row for each bar, and one for each run's time."""
     lines: list[str] = []
     yield lines
-    reporter = pytestconfig.pluginmanager.get_plugin("terminalreporter")
-    reporter.write_sep("=", "whole runs on the sample data")
-    for line in lines:
-        reporter.write_line(line, red=line.startswith("MISSED"))
+    reporter, capture = map(pytestconfig.pluginmanager.get_plugin, ("terminalreporter", "capturemanager"))
+    with capture.global_and_fixture_disabled():  # or nobody would see it
+        reporter.write_sep("=", "whole runs on the sample data")
+        for line in lines:
+            reporter.write_line(line, red=line.startswith("MISSED"))
 
 
 @pytest.fixture(scope="module")
