@@ -62,7 +62,10 @@ def make_finals_again(folder: Path, catalogue: Catalogue) -> list[Path]:
         except InputError:
             continue  # moved since: the page does without
     out = OutputFolder(folder / "out", catalogue)
-    planned = {stage["name"] for stage in run_record["stages"] if stage["status"] != "left_out"}
+    try:
+        planned = {stage["name"] for stage in run_record["stages"] if stage["status"] != "left_out"}
+    except (KeyError, TypeError):
+        raise InputError("not the record of a run", where=str(folder / RECORD)) from None
     written, lacking = [], []
     with locked_run_folder(folder):
         for stage in catalogue.stages:
