@@ -224,8 +224,9 @@ def test_levels_of_a_small_child() -> None:
     body = true_body()
     share = 0.55
     floor = body.bind_vertices[:, 1].min()
-    tall, small = find_levels(body.bind_vertices - [0, floor, 0], body), find_levels(
-        share * (body.bind_vertices - [0, floor, 0]), body
+    tall, small = (
+        find_levels(body.bind_vertices - [0, floor, 0], body),
+        find_levels(share * (body.bind_vertices - [0, floor, 0]), body),
     )
     assert {"knee", "ankle", "hip"} <= small.keys() & tall.keys()
     for row in small.keys() & tall.keys():
