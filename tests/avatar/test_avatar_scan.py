@@ -222,7 +222,7 @@ def test_levels_are_the_extremes_of_slices() -> None:
 def test_levels_of_a_small_child() -> None:
     """A similar body has its levels at the same shares of its height; the ankle's reach ends below the floor."""
     body = true_body()
-    share = 0.55
+    share = 0.45
     floor = body.bind_vertices[:, 1].min()
     tall, small = (
         find_levels(body.bind_vertices - [0, floor, 0], body),
@@ -230,7 +230,7 @@ def test_levels_of_a_small_child() -> None:
     )
     assert {"knee", "ankle", "hip"} <= small.keys() & tall.keys()
     for row in small.keys() & tall.keys():
-        assert_allclose(small[row], share * tall[row], rtol=0, atol=0.015, err_msg=row)
+        assert_allclose(small[row], share * tall[row], rtol=0, atol=0.005, err_msg=row)
 
 
 def test_rows_come_to_their_levels() -> None:

@@ -48,6 +48,15 @@ def test_a_tshirt_is_a_garment() -> None:
         refuse_garment(make_shirt(someone).mesh, SPACE, someone.avatar.vertices)
 
 
+def test_a_garment_whose_faces_are_turned_against_each_other_is_one_too() -> None:
+    someone = wearer("average")
+    shirt = make_shirt(someone).mesh
+    faces = shirt.faces.copy()
+    faces[::7] = faces[::7, ::-1]
+    with pytest.raises(AvatarError, match="open in 4 places"):
+        refuse_garment(TriangleMesh(shirt.vertices, faces), SPACE, someone.avatar.vertices)
+
+
 @pytest.mark.parametrize("shown", ["head", "wrist", "ankle"])
 def test_one_end_of_a_person_is_enough(shown: str) -> None:
     ends = tuple({"head", "wrist", "ankle"} - {shown})

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from vto_pipeline.avatar.measuring.population import population
 from vto_pipeline.avatar.model.shape import ShapeSpace
 from vto_pipeline.avatar.template.template import JOINT_KINDS
 from vto_pipeline.errors import AvatarError
 from vto_pipeline.geometry.closest import closest_points
-from vto_pipeline.geometry.remeshing.remesh import perimeter
 from vto_pipeline.geometry.sampling import sample_surface
-from vto_pipeline.geometry.topology import boundary_loops, face_area_vectors
+from vto_pipeline.geometry.topology import edge_face_counts, face_area_vectors
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Measurements
 from vto_pipeline.model.job import Job
@@ -112,11 +113,11 @@ def refuse_garment(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray) 
     between_legs = closest_points(crotch, scan.vertices, scan.faces)[2][0] < _CROTCH_M
     if between_legs or any(_shown(scan, vertices[own]) > _NO_END for own in ends):
         return
-    cuffs = [length for loop in boundary_loops(scan) if (length := perimeter(scan, loop)) > _CUFF_M]
-    if len(cuffs) >= _CUFFS:
+    cuffs = int((_rims(scan) > _CUFF_M).sum())
+    if cuffs >= _CUFFS:
         raise AvatarError(
             "this looks like a garment, not a body: it shows neither crotch nor head, hands or feet, and is open in "
-            f"{len(cuffs)} places",
+            f"{cuffs} places",
             hint="scan the legs, the head or a hand too; a dress form may also have its neck and arms closed",
         )
 
@@ -192,6 +193,16 @@ def _limbs(space: ShapeSpace) -> dict[str, NDArray[np.bool_]]:
         for side in ("left", "right")
         for limb, joints in {"arm": ("shoulder", "elbow"), "leg": ("hip", "knee")}.items()
     }
+
+
+def _rims(mesh: TriangleMesh) -> FloatArray:
+    """Return the length of each connected piece of the boundary [m]; faces may be turned against each other."""
+    edges, faces = edge_face_counts(mesh)
+    rim = edges[faces == 1]
+    links = coo_matrix((np.ones(len(rim)), rim.T), shape=(len(mesh.vertices),) * 2)
+    piece = connected_components(links, directed=False)[1][rim[:, 0]]
+    sides = np.linalg.norm(np.diff(mesh.vertices[rim], axis=1)[:, 0], axis=1)
+    return np.asarray(np.bincount(piece, sides), dtype=float)
 
 
 def _trunk_covered(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray) -> float:

@@ -1,1 +1,1 @@
-"""One file a command: batch, bench, doctor, drape, fit, plan, report, run, scan, schema, stages, status."""
+"""One file a command: batch, bench, doctor, drape, fit, info, plan, prune, report, run, scan, schema, stages, status."""
