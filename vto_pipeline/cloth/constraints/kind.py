@@ -19,6 +19,7 @@ For kinds whose stencils share what is found for all of them at once, in arrays 
 
 * `prepare(x, data)`: find it at positions x. Called once before `force`, `linearise` or `stiffness` are for each, and
   before each sweep of `project`.
+* `prepare_rates(x, v, data)`: find it such that `force` gives -∇Cᵀ α⁻¹ ∇C v, with velocities v, for damping.
 
 And for kinds that remember, whose data have a `slider`, shape (N, ...):
 
@@ -42,7 +43,7 @@ class Kind:
         data: Its NamedTuple of arrays, with at least `vertices` (N, S), `damping` [s], `starts` and `colours` (see
             `numerics.blocks.Blocks`).
         rows: Scalar constraints per stencil, B.
-        project, force, linearise, geometric, stiffness, slip, prepare: See above.
+        project, force, linearise, geometric, stiffness, slip, prepare, prepare_rates: See above.
     """
 
     data: type
@@ -54,3 +55,4 @@ class Kind:
     stiffness: Callable[..., None] | None = None
     slip: Callable[..., None] | None = None
     prepare: Callable[..., None] | None = None
+    prepare_rates: Callable[..., None] | None = None

@@ -257,7 +257,13 @@ def add_damping_forces(x, v, constraints, forces):  # type: ignore[no-untyped-de
         forces: [N], shape (V, 3), changed in place.
     """
     for data in constraints:
-        if data.damping > 0.0:
+        rates = kind_of(data).prepare_rates
+        if data.damping > 0.0 and rates is not None:
+            rates(x, v, data)
+            drag = np.zeros_like(forces)
+            _force_kind(x, data, drag)
+            forces += data.damping * drag
+        elif data.damping > 0.0:
             _damp_kind(x, v, data, forces)
 
 

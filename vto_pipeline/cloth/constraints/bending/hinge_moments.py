@@ -8,7 +8,7 @@ plain hinges. In its place stands ∇θᵀ W ∇θ, with the sums of a row's abs
 never more than those sums (Gershgorin), the true stiffness is at most 1/0.6 of it in any direction, on any mesh; on
 grids and irregular meshes it is at least 0.3 of it. So Newton's method with it contracts, and comes to rest where the
 forces of the true energy are zero. So does a method that goes from hinge to hinge: until its next sweep, a moment
-changes with its own angle only.
+changes with its own angle only, and such a sweep damps by W.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.numerics.linear.coloured_blocks import blocks
 from vto_pipeline.numerics.mechanics.bending import dihedral
 from vto_pipeline.numerics.mechanics.xpbd_row import multiplier_step
-from vto_pipeline.numerics.vector import load, store_at
+from vto_pipeline.numerics.vector import dot, load, store_at
 
 _PARALLEL_FROM = 7500  # hinges; under it, starting the threads costs more than they save
 _SHARE = 0.6  # of the sum of a row of M; above a half, so that no direction is twice as stiff as what stands for it
@@ -117,7 +117,8 @@ def _along_triangles(stencils: NDArray[np.int32], count: int) -> FloatArray:
 @njit(cache=True, error_model="numpy")
 def _prepare(x, data):
     if len(data.vertices) >= _PARALLEL_FROM:
-        _find_moments_threaded(x, data)
+        _bend_threaded(x, data)
+        _sum_moments_threaded(data)
     else:
         for i in range(len(data.vertices)):
             _bend(i, x, data)
@@ -125,10 +126,26 @@ def _prepare(x, data):
             _sum_moment(i, data)
 
 
+@njit(cache=True, error_model="numpy")
+def _prepare_rates(x, v, data):
+    for i in range(len(data.vertices)):
+        _, slopes = hinge_angle_gradients(i, x, data)
+        rate = 0.0
+        for s in range(4):
+            rate += dot(slopes[s], load(v, data.vertices[i, s]))
+        data.bent[i] = rate
+    _sum_moments_threaded(data)
+
+
+# apart from the sums: two loops over the same range are fused, and sums would meet what is not bent yet
 @njit(cache=True, error_model="numpy", parallel=True)
-def _find_moments_threaded(x, data):
+def _bend_threaded(x, data):
     for i in prange(len(data.vertices)):
         _bend(i, x, data)
+
+
+@njit(cache=True, error_model="numpy", parallel=True)
+def _sum_moments_threaded(data):
     for i in prange(len(data.vertices)):
         _sum_moment(i, data)
 
@@ -177,4 +194,4 @@ def _project(i, x, start, inverse_mass, data, multipliers, h):
     apply_hinge_multiplier(i, x, inverse_mass, data, slopes, shift)
 
 
-KIND = Kind(HingeMoments, 1, _project, _force, _linearise, prepare=_prepare)
+KIND = Kind(HingeMoments, 1, _project, _force, _linearise, prepare=_prepare, prepare_rates=_prepare_rates)
