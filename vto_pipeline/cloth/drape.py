@@ -97,7 +97,6 @@ def drape(
             energy=elastic_energy(model, state.positions),
             residual=stepper.residual(state),
             fabric=fabric if covers_all_energies(config) else None,
-            bending=config.bending,
             friction=config.friction,
             skin=stepper.skin,
         ),
