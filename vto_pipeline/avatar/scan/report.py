@@ -89,8 +89,8 @@ def refuse_shape_of_no_body(scan: TriangleMesh, space: ShapeSpace, posed: FloatA
     share = float((distance[core] < EXPLAINED_M).mean()) if core.any() else 0.0
     if share < _LIKE_A_BODY:
         raise AvatarError(
-            f"this is not a body: no build and pose comes near its shape; {share:.0%} of it lies within "
-            f"{1e3 * EXPLAINED_M:.0f} mm of the nearest one (at least {_LIKE_A_BODY:.0%})",
+            f"this is not a body: no build and pose comes near its shape. Within {1e3 * EXPLAINED_M:.0f} mm of the "
+            f"nearest one lies {share:.0%} of it (at least {_LIKE_A_BODY:.0%})",
             hint="set clothed: true when the person wears loose clothes",
         )
 

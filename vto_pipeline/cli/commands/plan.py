@@ -19,7 +19,7 @@ from vto_pipeline.cli.session import Session, pass_session
 def plan_command(session: Session, document: Path, output: Path | None, overrides: tuple[str, ...]) -> None:
     """Show which stages a document would run and which it leaves out, with the reason. Nothing is run.
 
-    What is stored in the run's folder is told, and what each other stage took there the last time.
+    Results in the run's folder are named as stored; beside each other stage stands what it took there the last time.
 
     \b
     vto plan configs/demo.yaml

@@ -61,6 +61,9 @@ class Limbs:
         self._graph, self._band = _graph(body), _BAND * height
         self._area = laplacian(body)[1]
         self._belt = self._middle_belt(body, _BELT * height)
+        self.limbs: list[Limb] = []
+        if len(self._belt) == 0:  # as coarse as a box: nothing stands out
+            return
         away = distance_from(body, self._belt, np.inf)
         away = np.where(np.isfinite(away), away, -1.0)
         levels = np.arange(away.max(), 0.0, -self._band)
@@ -88,6 +91,8 @@ class Limbs:
         """Return the vertices of the largest piece of a level slice through the body's middle."""
         heights = body.vertices[:, 1]
         level = np.flatnonzero(np.abs(heights - 0.5 * (heights.min() + heights.max()) - half) <= half)
+        if len(level) == 0:
+            return level.astype(np.int32)
         _, piece = connected_components(self._graph[level][:, level], directed=False)
         return level[piece == np.bincount(piece, self._area[level]).argmax()].astype(np.int32)
 
@@ -97,6 +102,8 @@ class Limbs:
         Args:
             thin: The same triangles, of a body so thin that the skin runs along the middle of each limb.
         """
+        if not self.limbs:
+            return []
         graph, x = self._graph, thin.vertices
         length = np.linalg.norm(x[graph.indices] - np.repeat(x, np.diff(graph.indptr), axis=0), axis=1)
         graph = csr_matrix((np.maximum(length, 1e-9), graph.indices, graph.indptr), graph.shape)

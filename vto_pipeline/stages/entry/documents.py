@@ -26,7 +26,7 @@ class Order:
     Args:
         document: Its relative paths start from the working directory.
         folder: For the run, where no other is named.
-        notes: What was found out about the input, in words.
+        notes: What the input is, and why it is taken for that, in words.
         copies: Name in RUN/out -> the file there that it is a copy of, where one is made.
     """
 
@@ -175,7 +175,7 @@ def _is_avatar(path: Path | None) -> bool:
 
 
 def _captured_kind(path: Path) -> tuple[str, str]:
-    """Return the kind of a capture, and how it was told, in words.
+    """Return the kind of a capture, and the reason, in words.
 
     Raises:
         InputError: it is none.
