@@ -13,12 +13,12 @@ from vto_pipeline.bench.docs.__main__ import faults
 from vto_pipeline.bench.docs.pages import FIGURES, RESULTS, SOURCES, render_pages
 from vto_pipeline.bench.docs.prose import LONGEST, count_words, long_sentences, typed_figures
 from vto_pipeline.bench.docs.results import Results
-from vto_pipeline.cli.work import catalogue, planned
 from vto_pipeline.errors import ConfigError, InputError
 from vto_pipeline.io.bodies.measurements import read_measurements
 from vto_pipeline.io.captures.photos import read_board
 from vto_pipeline.io.fabrics import read_fabric
 from vto_pipeline.pipeline.batch.order import read_order
+from vto_pipeline.stages.entry.planning import catalogue, planned
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]

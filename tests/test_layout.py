@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from vto_pipeline import errors
-from vto_pipeline.cli.work import catalogue, planned
+from vto_pipeline.stages.entry.planning import catalogue, planned
 
 ROOT = Path(__file__).parents[1]
 MODULES = sorted((ROOT / "vto_pipeline").rglob("*.py"))

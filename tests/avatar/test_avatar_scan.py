@@ -124,12 +124,6 @@ def test_registered_body_is_sound(form: tuple[trimesh.Trimesh, Avatar, Avatar, J
     assert abs(fitted.bind_vertices[:, 1].min()) < 1e-9
 
 
-def test_a_ball_is_not_a_body() -> None:
-    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.6)
-    with pytest.raises(AvatarError, match="not a body"):
-        fit_scan(TriangleMesh(ball.vertices, ball.faces), ScanConfig(probes=500, iterations=5, rounds=1))
-
-
 def test_a_size_of_no_unit_is_told() -> None:
     body = true_body()
     with pytest.raises(AvatarError, match="no unit of"):
@@ -223,6 +217,20 @@ def test_levels_are_the_extremes_of_slices() -> None:
     back = body.bind_vertices[band]
     at_level = np.abs(back[:, 1] - found["hip"]) < 0.012
     assert back[at_level, 2].min() < back[:, 2].min() + 1e-3
+
+
+def test_levels_of_a_small_child() -> None:
+    """A similar body has its levels at the same shares of its height; the ankle's reach ends below the floor."""
+    body = true_body()
+    share = 0.45
+    floor = body.bind_vertices[:, 1].min()
+    tall, small = (
+        find_levels(body.bind_vertices - [0, floor, 0], body),
+        find_levels(share * (body.bind_vertices - [0, floor, 0]), body),
+    )
+    assert {"knee", "ankle", "hip"} <= small.keys() & tall.keys()
+    for row in small.keys() & tall.keys():
+        assert_allclose(small[row], share * tall[row], rtol=0, atol=0.005, err_msg=row)
 
 
 def test_rows_come_to_their_levels() -> None:

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import pytest
 from toy_tables import CALLS, TOY
 
-from vto_pipeline.cli import work
 from vto_pipeline.cli.main import main
+from vto_pipeline.stages.entry import planning
 
 
 class Said(NamedTuple):
@@ -31,7 +31,7 @@ class Said(NamedTuple):
 def vto(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Callable[..., Said]:
     """Call `vto` with the toy tables, in a folder with toy.yaml, left.txt (3) and right.txt (4)."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(work, "catalogue", lambda: TOY)
+    monkeypatch.setattr(planning, "catalogue", lambda: TOY)
     (tmp_path / "left.txt").write_text("3")
     (tmp_path / "right.txt").write_text("4")
     (tmp_path / "toy.yaml").write_text(

@@ -12,8 +12,9 @@ from vto_pipeline.cli.commands import batch
 
 TESTS = str(Path(__file__).parents[1])
 TOY_PROGRAM = (
-    f"import sys; sys.path.insert(0, {TESTS!r}); from vto_pipeline.cli import work; from toy_tables import TOY; "
-    "work.catalogue = lambda: TOY; from vto_pipeline.cli.main import main; sys.exit(main())"
+    f"import sys; sys.path.insert(0, {TESTS!r}); from toy_tables import TOY; "
+    "from vto_pipeline.stages.entry import planning; planning.catalogue = lambda: TOY; "
+    "from vto_pipeline.cli.main import main; sys.exit(main())"
 )
 TABLE = "name,given.left.number,stages.add.offset,stages.add.fail\na,left.txt,1,\nb,right.txt,2,\nc,left.txt,,true\n"
 ORDER = """\

@@ -25,8 +25,8 @@ def test_plain_lines_are_throttled(monkeypatch, capsys):
     lines.ended(3, 12, StageRecord("add", "ran", seconds=12.0, warnings=["poor"]))
     assert capsys.readouterr().err.splitlines() == [
         "[ 3/12] add  the sum",
-        "[ 3/12] add   42 %  pair 5 of 12",
-        "[ 3/12] add   83 %  pair 10 of 12",
+        "[ 3/12] add   42 %  pair 5 of 12  (about 7 s left)",
+        "[ 3/12] add   83 %  pair 10 of 12  (about 2 s left)",
         "[ 3/12] add  done in 12.0 s",
         "         warning: poor",
     ]

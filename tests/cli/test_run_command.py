@@ -10,11 +10,12 @@ from pathlib import Path
 import pytest
 from toy_tables import CALLS, STAGES, TOY
 
-from vto_pipeline.cli import work
 from vto_pipeline.cli.results import result_lines
 from vto_pipeline.errors import DivergedError, MissingDependencyError
 from vto_pipeline.model.body import Measurements
 from vto_pipeline.stages import CATALOGUE
+from vto_pipeline.stages.entry import planning
+from vto_pipeline.stages.entry.outcome import Outcome
 
 
 def test_run_says_where_things_are(vto):
@@ -108,11 +109,11 @@ def test_exit_codes(vto, monkeypatch, raised, code, message):
         raise raised
 
     stages = [replace(stage, run=stop) if stage.name == "add" else stage for stage in STAGES]
-    monkeypatch.setattr(work, "catalogue", lambda: replace(TOY, stages=tuple(stages)))
+    monkeypatch.setattr(planning, "catalogue", lambda: replace(TOY, stages=tuple(stages)))
     said = vto("run", "toy.yaml")
     assert said.code == code
     assert message in said.err
-    monkeypatch.setattr(work, "catalogue", lambda: TOY)
+    monkeypatch.setattr(planning, "catalogue", lambda: TOY)
     assert vto("run", "toy.yaml").code == 0
     assert CALLS == ["add", "square", "parity", "label", "page"]  # what was done before is not done again
 
@@ -121,7 +122,7 @@ def test_our_own_bugs_keep_their_traceback(vto, monkeypatch):
     def stop(*_):
         raise ZeroDivisionError
 
-    monkeypatch.setattr(work, "catalogue", lambda: replace(TOY, stages=(replace(STAGES[0], run=stop), *STAGES[1:])))
+    monkeypatch.setattr(planning, "catalogue", lambda: replace(TOY, stages=(replace(STAGES[0], run=stop), *STAGES[1:])))
     with pytest.raises(ZeroDivisionError):
         vto("run", "toy.yaml")
 
@@ -133,13 +134,66 @@ def test_plan_runs_nothing_and_reads_like_a_table(vto):
     assert not Path("runs").exists()
     lines = said.out.splitlines()
     assert lines[0] == "given: left.number, right.number"
-    assert any(line.split() == ["3", "add", "left_doubled,", "right_doubled", "total"] for line in lines)
-    assert any(line.split() == ["guess", "word", "not", "given"] for line in lines)
+    assert any(line.split() == ["3", "add", "-", "-", "left_doubled,", "right_doubled", "total"] for line in lines)
+    assert "and 1 stages that work on what is not given; -v lists them" in lines
+    told = vto("plan", "toy.yaml", "-v").out.splitlines()
+    assert any(line.split() == ["guess", "word", "not", "given"] for line in told)
     assert max(map(len, lines)) <= 100
     data = vto("plan", "toy.yaml", "--json").data
     assert [stage["name"] for stage in data["stages"]][2] == "add"
     assert data["stages"][2]["settings"] == {"offset": 0, "fail": False}
     assert data["left_out"] == [{"name": "guess", "reason": "word not given"}]
+
+
+def test_plan_knows_what_is_stored_and_what_the_rest_took(vto):
+    vto("run", "toy.yaml")
+    costs = {stage["name"]: stage["expected"] for stage in vto("plan", "toy.yaml", "--json").data["stages"]}
+    assert [name for name, cost in costs.items() if not cost["stored"]] == ["page"]  # written anew each time
+    record = json.loads(Path("runs/toy/run.json").read_text())
+    took = {stage["name"]: stage["seconds"] for stage in record["stages"]}
+    assert costs["add"]["seconds"] == took["add"]
+    changed = vto("plan", "toy.yaml", "--json", "--set", "add.offset=1").data["stages"]
+    assert {stage["name"] for stage in changed if stage["expected"]["stored"]} == {"left.double", "right.double"}
+    assert next(stage["expected"]["seconds"] for stage in changed if stage["name"] == "add") == took["add"]
+    lines = vto("plan", "toy.yaml", "-o", "elsewhere").out
+    assert "their time is not known" in lines
+    assert not CALLS
+
+
+def test_until_stops_after_a_stage(vto):
+    said = vto("run", "toy.yaml", "--until", "add")
+    assert said.code == 0
+    assert Path("runs/toy/out/total.txt").is_file()
+    assert not Path("runs/toy/out/squared.txt").exists()
+    said = vto("run", "toy.yaml", "--until", "ad")
+    assert (said.code, "did you mean add?" in said.err) == (2, True)
+    said = vto("run", "toy.yaml", "--until", "guess")
+    assert (said.code, "guess is left out: word not given" in said.err) == (2, True)
+
+
+def test_from_makes_a_stage_and_what_depends_on_it_anew(vto):
+    vto("run", "toy.yaml")
+    first = Path("runs/toy/out/squared.txt").read_bytes()
+    said = vto("run", "toy.yaml", "--from", "add", "--json")
+    states = {stage["name"]: stage["status"] for stage in said.data["stages"]}
+    assert (states["left.double"], states["add"], states["square"]) == ("cached", "ran", "ran")
+    assert Path("runs/toy/out/squared.txt").read_bytes() == first
+    assert vto("run", "toy.yaml", "--from", "nothing").code == 2
+
+
+def test_quiet_and_a_log(vto):
+    said = vto("run", "toy.yaml", "-q", "--log", "log.jsonl")
+    assert said.err == ""
+    assert "squared" in said.out
+    events = [json.loads(line) for line in Path("log.jsonl").read_text().splitlines()]
+    assert next(event["stage"] for event in events if event["event"] == "started") == "left.double"
+    ended = {event["name"]: event for event in events if event["event"] == "ended"}
+    assert ended["add"]["status"] == "ran"
+    assert events[-1]["event"] == "done"
+    assert vto("run", "toy.yaml", "--set", "add.fail=true", "-q", "--log", "log.jsonl").code == 4
+    last = json.loads(Path("log.jsonl").read_text().splitlines()[-1])
+    assert (last["event"], last["exit_code"]) == ("error", 4)
+    assert vto("run", "toy.yaml", "--log", "no/such/folder/log").code == 2
 
 
 def test_report_makes_the_page_again(vto):
@@ -170,9 +224,10 @@ def test_a_run_folder_that_cannot_be_made_is_bad_usage(vto):
 
 def test_results_are_told_in_words_and_json_stays_alone(tmp_path):
     body = Measurements({"stature": 1.72, "waist_girth": 0.813, "knee_height": 0.48}, {"waist_girth": 0.0051})
-    CATALOGUE.kind("measurements").write(tmp_path / "measurements.json", body)
-    CATALOGUE.kind("fit_report").write(tmp_path / "fit_report.json", {"verdict": "Chest tight (+3.3 cm)."})
-    lines = list(result_lines(["avatar", "measurements", "fit_report"], tmp_path, CATALOGUE))
+    (tmp_path / "out").mkdir()
+    CATALOGUE.kind("measurements").write(tmp_path / "out" / "measurements.json", body)
+    CATALOGUE.kind("fit_report").write(tmp_path / "out" / "fit_report.json", {"verdict": "Chest tight (+3.3 cm)."})
+    lines = list(result_lines(Outcome(tmp_path, {"wanted": ["avatar", "measurements", "fit_report"]}, CATALOGUE)))
     assert [line.split() for line in lines if "waist" in line] == [["waist", "81.3", "1.0"]]  # 1.96 times 0.51 cm
     assert [line.split() for line in lines if "stature" in line] == [["stature", "172.0", "-"]]
     assert not any("knee" in line for line in lines)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import click
 import pytest
 
-from vto_pipeline.cli import work
+from vto_pipeline.cli import results
 
 PLY = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
 CLOUD = PLY + "end_header\n0 0 0\n1 0 0\n0 1 0\n"
@@ -18,10 +19,11 @@ def typed(vto, monkeypatch):
     """Call `vto`; returns exit code, document, run folder, stderr."""
     caught = {}
 
-    def note(document, base, output, overrides, force_all, session, tables):
-        caught.update(data=document.data, output=output, overrides=overrides, force_all=force_all)
+    def note(order, output, overrides, force_all, **_):
+        caught.update(data=order.document.data, output=output or order.folder, overrides=overrides, force_all=force_all)
+        raise click.exceptions.Exit(0)
 
-    monkeypatch.setattr(work, "run_document", note)
+    monkeypatch.setattr(results, "run_order", note)
     Path("cloud.ply").write_text(CLOUD)
     Path("mesh.ply").write_text(MESH)
 

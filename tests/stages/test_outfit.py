@@ -8,13 +8,13 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from vto_pipeline.cli.commands.drape import drape_command
-from vto_pipeline.cli.work import planned
 from vto_pipeline.errors import ConfigError, PlanError
 from vto_pipeline.io.documents import load_yaml
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.render import GlbPart
 from vto_pipeline.stages import CATALOGUE
+from vto_pipeline.stages.entry.planning import planned
 from vto_pipeline.stages.outfit import document_schema, expand_document, garment_names, names_in_run, outfit_tables
 
 HEAD = "schema: 1\n"
@@ -176,19 +176,20 @@ def report(verdict: str) -> dict[str, object]:
         (["--garment", "a.ply", "--fabric", "denim", "--fabric", "jersey"], "2 fabrics for 1 garments"),
     ],
 )
-def test_what_a_command_line_gives_twice_or_too_often(arguments: list[str], problem: str) -> None:
-    from click.testing import CliRunner
+def test_what_a_command_line_gives_twice_or_too_often(
+    arguments: list[str], problem: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from vto_pipeline.cli.main import main
 
-    said = CliRunner().invoke(drape_command, [*arguments, "--body", "b.ply"])
-    assert said.exit_code == 2
-    assert problem in said.output
+    assert main(["drape", *arguments, "--body", "b.ply"]) == 2
+    assert problem in capsys.readouterr().err
 
 
 def test_one_fabric_serves_all_garments_of_a_command_line(monkeypatch: pytest.MonkeyPatch) -> None:
     from click.testing import CliRunner
 
     asked = []
-    monkeypatch.setattr("vto_pipeline.cli.work.run_document", lambda document, *_: asked.append(document.data))
+    monkeypatch.setattr("vto_pipeline.cli.results.perform", lambda _, order, **__: asked.append(order.document.data))
     line = ["--garment", "My-trousers.ply", "--garment", "shirt.ply", "--fabric", "denim", "--body", "b.ply"]
     assert CliRunner().invoke(drape_command, line).exit_code == 0
     assert asked[0]["given"]["garments"] == {

@@ -26,8 +26,10 @@ from vto_pipeline.avatar.scan.registration import covariance, initial_fit, refin
 from vto_pipeline.avatar.scan.report import (
     CORE,
     extremity_weights,
+    refuse_garment,
     refuse_implausible_build,
     refuse_non_body,
+    refuse_shape_of_no_body,
     report_registration,
 )
 from vto_pipeline.avatar.scan.tangential_slide import slide_along_surface
@@ -81,7 +83,7 @@ def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | No
             hands, feet), and of the explained ones (nearer than 10 mm: no stand, floor or hair), and their share.
 
     Raises:
-        AvatarError: the scan is not a body, with what is missing; or it is bent and cannot be reconstructed.
+        AvatarError: the scan is no body, or a garment, with what is missing; or it is bent and cannot be reconstructed.
     """
     config, job = config or ScanConfig(), job or Job()
     job.progress(0.0, "finding the body's facing and size")
@@ -93,8 +95,11 @@ def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | No
     fit = _pose_and_shape(space, target, tries[int(np.argmin(scores))], config, job, steps=config.iterations)
     job.progress(0.6, "fitting the surface to the scan")
     posed = separate_thighs(space, fit, posed_vertices(space, fit))
+    if not config.clothed:
+        refuse_shape_of_no_body(kept, space, posed)
     vertices, softest = _displaced(space, fit, target, posed, config.stiffness, config.rounds)
     refuse_non_body(kept, space, vertices, config.max_mean_mm)
+    refuse_garment(kept, space, vertices)
     stands = stance(space, fit)
     caveats = []
     if config.clothed:

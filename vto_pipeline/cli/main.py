@@ -24,6 +24,8 @@ COMMANDS = {
     "run": "Run a pipeline document.",
     "batch": "Run a document many times, with the changes of a table.",
     "status": "Show what has become of every row of a batch.",
+    "info": "Describe a run, or a file or folder that may be given.",
+    "prune": "Remove stored results that a run or a batch no longer needs.",
     "plan": "Show what a document would run, without running it.",
     "bench": "Measure error against run time and plot it.",
     "report": "Rebuild the page of a run.",

@@ -6,9 +6,10 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from vto_pipeline.cli.session import Session
 from vto_pipeline.pipeline.execution.listener import Listener
@@ -17,12 +18,14 @@ from vto_pipeline.pipeline.stage import Stage
 
 _SILENCE = 5.0
 """Least time between two plain lines of one stage [s]."""
+_GUESSABLE = 0.02
+"""So much must be done before the time left is guessed."""
 
 
 @contextmanager
 def show_progress(session: Session) -> Iterator[Listener]:
     """Yield the listener that suits stderr."""
-    if not sys.stderr.isatty():
+    if session.quiet or not sys.stderr.isatty():
         yield LineProgress(session)
         return
     columns = (
@@ -30,6 +33,8 @@ def show_progress(session: Session) -> Iterator[Listener]:
         BarColumn(bar_width=24),
         TextColumn("{task.percentage:3.0f} %"),
         TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
         TextColumn("{task.fields[text]}", style="dim", markup=False),
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
@@ -41,18 +46,33 @@ class LineProgress(Listener):
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._head, self._last = "", 0.0
+        self._head, self._began, self._last = "", 0.0, 0.0
 
     def started(self, number: int, count: int, stage: Stage) -> None:
-        self._head, self._last = head(number, count, stage.name), time.monotonic()
-        self.say(f"{self._head}  {stage.about}")
+        self._head, self._began = head(number, count, stage.name), time.monotonic()
+        self._last = self._began
+        self._session.enter("started", stage=stage.name, number=number, count=count)
+        self.show_start(stage)
 
     def progress(self, fraction: float, text: str) -> None:
-        if time.monotonic() - self._last >= _SILENCE:
-            self._last = time.monotonic()
-            self.say(f"{self._head}  {100 * fraction:3.0f} %  {text}")
+        now = time.monotonic()
+        if now - self._last >= _SILENCE:
+            self._last = now
+            left = (now - self._began) * (1 / fraction - 1) if fraction > _GUESSABLE else None
+            self._session.enter("progress", fraction=round(fraction, 4), doing=text, left_s=left and round(left, 1))
+            self.show_progress(fraction, text, left)
+
+    def show_start(self, stage: Stage) -> None:
+        """Show that a stage has started."""
+        self.say(f"{self._head}  {stage.about}")
+
+    def show_progress(self, fraction: float, text: str, left: float | None) -> None:
+        """Show how far the stage is, and how long it will take if it goes on like that [s]."""
+        until = f"  (about {left:.0f} s left)" if left is not None else ""
+        self.say(f"{self._head}  {100 * fraction:3.0f} %  {text}{until}")
 
     def ended(self, number: int, count: int, record: StageRecord) -> None:
+        self._session.enter("ended", **asdict(record))
         self.say(f"{head(number, count, record.name)}  {end_of(record)}")
         fresh = record.status == "ran"
         for text in record.notes if fresh or self._session.verbose else ():
@@ -75,12 +95,16 @@ class BarProgress(LineProgress):
         self._progress = progress
         self._task: TaskID | None = None
 
-    def started(self, number: int, count: int, stage: Stage) -> None:
-        self._task = self._progress.add_task(head(number, count, stage.name), total=1.0, text=stage.about)
+    def show_start(self, stage: Stage) -> None:
+        self._task = self._progress.add_task(self._head, total=1.0, text=stage.about)
 
     def progress(self, fraction: float, text: str) -> None:
         if self._task is not None:
             self._progress.update(self._task, completed=fraction, text=text)
+        super().progress(fraction, text)
+
+    def show_progress(self, fraction: float, text: str, left: float | None) -> None:
+        """The bar shows it already."""
 
     def ended(self, number: int, count: int, record: StageRecord) -> None:
         if self._task is not None:

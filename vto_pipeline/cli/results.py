@@ -1,42 +1,66 @@
-"""What a run found, in words: girths with their uncertainty, and how a garment fits."""
+"""What a run found, in words: its files, girths with their uncertainty, and how a garment fits."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from pathlib import Path
+from collections.abc import Iterator, Mapping
+from itertools import chain
+from typing import Any
 
+from vto_pipeline.cli.progress import show_progress
+from vto_pipeline.cli.session import Session
 from vto_pipeline.cli.tables import table_lines
 from vto_pipeline.model.body import Measurements
-from vto_pipeline.pipeline.catalogue import Catalogue
+from vto_pipeline.stages.entry.commands import run_order
+from vto_pipeline.stages.entry.documents import Order
+from vto_pipeline.stages.entry.outcome import Outcome
 
 _COVERED = 1.96
 """Standard deviations on either side that hold 95 % of a normal distribution."""
 
 
-def result_lines(wanted: Iterable[str], out: Path, tables: Catalogue) -> Iterator[str]:
-    """Yield the result of each wanted artifact that has one in words.
+def perform(session: Session, order: Order, **options: Any) -> None:
+    """Run a document, and print the outcome to stdout.
 
     Args:
-        wanted: Artifacts.
-        out: RUN/out.
-        tables: For their files.
+        session: Of the command line.
+        order: What to run.
+        options: As `run_order` takes them.
+
+    Raises:
+        VtoError: of whatever kind.
     """
-    for artifact in wanted:
-        kind = tables.kind(artifact)
-        if artifact == "measurements":
-            yield from table_lines(("girth", "cm", "± cm (95 %)"), _girths(kind.read(out / kind.filename)))
-    yield from verdicts(wanted, out, tables)
+    for note in order.notes:
+        session.say(note)
+    with show_progress(session) as listener:
+        outcome = run_order(order, listener=listener, **options)
+    session.enter("done", run=str(outcome.folder), seconds=outcome.seconds, verdicts=outcome.verdicts)
+    session.answer({**outcome.record, "run": str(outcome.folder)}, chain(outcome_lines(outcome), result_lines(outcome)))
 
 
-def verdicts(wanted: Iterable[str], out: Path, tables: Catalogue) -> Iterator[str]:
-    """Yield how each garment fits, in words.
+def outcome_lines(outcome: Outcome) -> Iterator[str]:
+    """Yield what became of the stages, where the wanted files are, and all warnings."""
+    record = outcome.record
+    yield f"done in {outcome.seconds:.1f} s; {stage_counts(record)}"
+    width = max(len(artifact) for artifact in record["wanted"])
+    for artifact in record["wanted"]:
+        path = outcome.folder / "out" / outcome.tables.kind(artifact).filename
+        yield f"  {artifact:<{width}}  {path if path.is_file() else 'as given'}"
+    for name, text in outcome.warnings:
+        yield f"  warning from {name.replace('_', ' ')}: {text}"
 
-    Args: See `result_lines`.
-    """
-    for artifact in wanted:
-        if artifact.endswith("fit_report"):
-            kind, garment = tables.kind(artifact), artifact.removesuffix("fit_report").rstrip("_")
-            yield f"fit{f' of {garment}' if garment else ''}: {kind.read(out / kind.filename)['verdict']}"
+
+def stage_counts(record: Mapping[str, Any]) -> str:
+    """Return how many stages ended which way, in words."""
+    states = [stage["status"] for stage in record["stages"]]
+    words = {"ran": "ran", "cached": "from the cache", "left_out": "left out"}
+    return "stages: " + ", ".join(f"{states.count(state)} {text}" for state, text in words.items())
+
+
+def result_lines(outcome: Outcome) -> Iterator[str]:
+    """Yield the result of each wanted artifact that has one in words."""
+    if "measurements" in outcome.record["wanted"]:
+        yield from table_lines(("girth", "cm", "± cm (95 %)"), _girths(outcome.read("measurements")))
+    yield from outcome.verdicts
 
 
 def _girths(measured: Measurements) -> Iterator[tuple[str, str, str]]:

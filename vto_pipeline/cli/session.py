@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import click
@@ -19,10 +22,14 @@ class Session:
     Args:
         json: One JSON document on stdout, and nothing else there.
         verbose: Say more.
+        quiet: Say nothing but results and errors.
+        log: File that receives each event as a line of JSON, or None.
     """
 
     json: bool = False
     verbose: bool = False
+    quiet: bool = False
+    log: Path | None = None
 
     def answer(self, data: Any, lines: Iterable[str]) -> None:
         """Print the command's result to stdout, as JSON if requested, else as plain lines."""
@@ -34,19 +41,36 @@ class Session:
 
     def say(self, text: str) -> None:
         """Print a message to stderr."""
-        click.echo(text, err=True)
+        if not self.quiet:
+            click.echo(text, err=True)
+
+    def enter(self, event: str, **fields: Any) -> None:
+        """Append an event to the log, with its time in UTC.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        if self.log is not None:
+            now = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
+            with self.log.open("a", encoding="utf-8") as stream:
+                stream.write(json.dumps({"time": now, "event": event, **fields}, ensure_ascii=False) + "\n")
 
     def fail(self, error: VtoError) -> int:
         """Report an error; returns its exit code."""
-        self.say(str(error))
+        click.echo(str(error), err=True)
         self.answer_error(error)
+        with suppress(OSError):  # the log may be what is at fault
+            self.enter("error", **_fields(error), exit_code=error.exit_code)
         return error.exit_code
 
     def answer_error(self, error: VtoError) -> None:
         """Print an error to stdout, if JSON was requested."""
         if self.json:
-            fields = {"kind": type(error).__name__, "problem": error.problem, "where": error.where, "hint": error.hint}
-            self.answer({"error": fields, "exit_code": error.exit_code}, ())
+            self.answer({"error": _fields(error), "exit_code": error.exit_code}, ())
+
+
+def _fields(error: VtoError) -> dict[str, Any]:
+    return {"kind": type(error).__name__, "problem": error.problem, "where": error.where, "hint": error.hint}
 
 
 pass_session = click.make_pass_decorator(Session, ensure=True)

@@ -59,7 +59,8 @@ def drape(
     Raises:
         ConfigError: an unknown setting or a value out of range.
         InputError: the garment is none for a body of this size, in whatever unit, or the fabric no material.
-        IntersectingError: triangles still cross; `partial` holds the mesh as "draped", "audit" and "trace".
+        IntersectingError: triangles still cross; `partial` holds the mesh as "draped", "audit" and "trace". Or a limb
+            goes through cloth from the start; it holds the start as "draped".
         DivergedError, FallenError: positions are no longer finite, or it fell off the body; `partial` holds the mesh as
             it began, as "draped".
     """
@@ -96,6 +97,7 @@ def drape(
             energy=elastic_energy(model, state.positions),
             residual=stepper.residual(state),
             fabric=fabric if covers_all_energies(config) else None,
+            bending=config.bending,
             friction=config.friction,
             skin=stepper.skin,
         ),

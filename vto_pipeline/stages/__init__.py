@@ -3,6 +3,7 @@
 scan, garment, avatar, cloth, scan_report, output: the rows, by subject
 roles: rows that serve garment, mannequin and body alike
 outfit, outfit_page: several garments in one document
+entry: the ways in to the tables
 """
 
 from __future__ import annotations

@@ -140,7 +140,10 @@ def _profile(
     middle = floor + (float(upright[body.loops[row], 1].mean()) - floor) / (1 + level.above)
     span = level.reach + _BEYOND * level.width
     at = middle + np.arange(-span, span + _STEP_M / 2, _STEP_M)
-    return at, np.array([_value(_cut(upright, links, y), level.extreme) for y in at])
+    # a small child's ankle is nearer to the floor than the span: beyond its end a part goes on as it ends
+    ends = upright[links, 1]
+    inside = np.clip(at, ends.min() + _STEP_M, ends.max() - _STEP_M)
+    return at, np.array([_value(_cut(upright, links, y), level.extreme) for y in inside])
 
 
 def with_rows_at_levels(

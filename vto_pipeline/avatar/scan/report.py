@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from vto_pipeline.avatar.measuring.population import population
 from vto_pipeline.avatar.model.shape import ShapeSpace
@@ -11,7 +13,7 @@ from vto_pipeline.avatar.template.template import JOINT_KINDS
 from vto_pipeline.errors import AvatarError
 from vto_pipeline.geometry.closest import closest_points
 from vto_pipeline.geometry.sampling import sample_surface
-from vto_pipeline.geometry.topology import face_area_vectors
+from vto_pipeline.geometry.topology import edge_face_counts, face_area_vectors
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Measurements
 from vto_pipeline.model.job import Job
@@ -25,6 +27,13 @@ CORE = 0.3
 """A vertex belongs to trunk and limbs when it belongs less than this to head, hands and feet."""
 _TRUNK = 0.8
 _MIN_TRUNK, _MIN_LIMB = 0.3, 0.5
+_LIKE_A_BODY = 2 / 3
+"""So much of a person lies near the model's body: of people 94 % and more, of a dress form on its stand 89 %."""
+_ENDS = ("head", "wrist", "ankle")
+"""Joints of a person's ends: the head, the hands and the feet."""
+_NO_END, _CROTCH_M = 0.05, 0.03
+_CUFF_M, _CUFFS = 0.15, 3
+"""Girth of what an arm or a neck goes through; a garment of the upper body has three: for the neck and both arms."""
 _STRAY = 0.25
 """Of a limb's surface: so much that lies elsewhere and faces inwards is that limb, inside out; some of it lies near."""
 _POINTS = 5000
@@ -61,6 +70,56 @@ def refuse_non_body(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray,
             raise AvatarError(
                 f"the surface of the {limb} is inside out", hint="flip its faces, so that normals point outwards"
             )
+
+
+def refuse_shape_of_no_body(scan: TriangleMesh, space: ShapeSpace, posed: FloatArray) -> None:
+    """Refuse a solid as tall as a person that no pose and build explains.
+
+    Args:
+        scan: Its surface [m].
+        space: The model.
+        posed: The model's body that fits it best, not yet displaced onto it [m], shape (V, 3).
+
+    Raises:
+        AvatarError: too little of the scan lies near that body.
+    """
+    points, _, _ = sample_surface(scan, _POINTS, 0)
+    face, _, distance = closest_points(points, posed, space.base.faces)
+    core = extremity_weights(space)[space.base.faces].mean(axis=1)[face] < CORE
+    share = float((distance[core] < EXPLAINED_M).mean()) if core.any() else 0.0
+    if share < _LIKE_A_BODY:
+        raise AvatarError(
+            f"this is not a body: no build and pose comes near its shape; {share:.0%} of it lies within "
+            f"{1e3 * EXPLAINED_M:.0f} mm of the nearest one (at least {_LIKE_A_BODY:.0%})",
+            hint="set clothed: true when the person wears loose clothes",
+        )
+
+
+def refuse_garment(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray) -> None:
+    """Refuse what goes round a trunk: it has its shape, but opens for neck, arms and legs and shows none of their ends.
+
+    Args:
+        scan: In metres.
+        space: The model.
+        vertices: The body registered to the scan [m], shape (V, 3).
+
+    Raises:
+        AvatarError: the scan shows neither crotch nor head, hands or feet, and is open for neck and arms. A trunk that
+            was cropped so has the same shape, and is refused with it. What has legs, as a suit, is taken for a body.
+    """
+    joints = [k for k, kind in enumerate(JOINT_KINDS) if kind in _ENDS]
+    ends = (space.base.weights[:, joint] > _TRUNK for joint in joints)
+    crotch = vertices[[space.base.landmarks["crotch_point"]]]
+    between_legs = closest_points(crotch, scan.vertices, scan.faces)[2][0] < _CROTCH_M
+    if between_legs or any(_shown(scan, vertices[own]) > _NO_END for own in ends):
+        return
+    cuffs = int((_rims(scan) > _CUFF_M).sum())
+    if cuffs >= _CUFFS:
+        raise AvatarError(
+            "this looks like a garment, not a body: it shows neither crotch nor head, hands or feet, and is open in "
+            f"{cuffs} places",
+            hint="scan the legs, the head or a hand too; a dress form may also have its neck and arms closed",
+        )
 
 
 def refuse_implausible_build(read: Measurements, lean: float) -> None:
@@ -120,7 +179,7 @@ def report_registration(scan: TriangleMesh, space: ShapeSpace, vertices: FloatAr
 
 def extremity_weights(space: ShapeSpace) -> FloatArray:
     """Return how much each vertex belongs to head, hands and feet, 0 to 1, shape (V,)."""
-    ends = np.flatnonzero(np.isin(JOINT_KINDS, ("head", "wrist", "ankle")))
+    ends = np.flatnonzero(np.isin(JOINT_KINDS, _ENDS))
     share: FloatArray = space.base.weights[:, ends].sum(axis=1)
     return share
 
@@ -134,6 +193,16 @@ def _limbs(space: ShapeSpace) -> dict[str, NDArray[np.bool_]]:
         for side in ("left", "right")
         for limb, joints in {"arm": ("shoulder", "elbow"), "leg": ("hip", "knee")}.items()
     }
+
+
+def _rims(mesh: TriangleMesh) -> FloatArray:
+    """Return the length of each connected piece of the boundary [m]; faces may be turned against each other."""
+    edges, faces = edge_face_counts(mesh)
+    rim = edges[faces == 1]
+    links = coo_matrix((np.ones(len(rim)), rim.T), shape=(len(mesh.vertices),) * 2)
+    piece = connected_components(links, directed=False)[1][rim[:, 0]]
+    sides = np.linalg.norm(np.diff(mesh.vertices[rim], axis=1)[:, 0], axis=1)
+    return np.asarray(np.bincount(piece, sides), dtype=float)
 
 
 def _trunk_covered(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray) -> float:

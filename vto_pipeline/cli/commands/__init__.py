@@ -1,1 +1,6 @@
-"""One file a command: batch, bench, doctor, drape, fit, plan, report, run, scan, schema, stages, status."""
+"""One file a command.
+
+scan, fit, drape, run, batch: what makes something
+status, info, plan, stages, schema, doctor: what only looks
+report, prune, bench: the page again, room on the disk, measurements
+"""

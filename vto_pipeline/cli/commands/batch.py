@@ -93,13 +93,13 @@ def _check_all(rows: Sequence[Row]) -> None:
     Raises:
         VtoError: of the first row that is wrong.
     """
-    from vto_pipeline.cli import work
     from vto_pipeline.io.documents import Document
+    from vto_pipeline.stages.entry import planning
 
-    tables = work.catalogue()
+    tables = planning.catalogue()
     for row in rows:
         try:
-            work.planned_document(Document(row.data, Path(row.where)), Path("/"), (), tables)
+            planning.planned_document(Document(row.data, Path(row.where)), Path("/"), (), tables)
         except VtoError as error:
             error.where = f"row {row.name}, {error.where or row.where}"
             raise
@@ -134,13 +134,9 @@ def _task(row: Row, key: str, folder: Path, force_all: bool, workers: int, limit
 
 def _found(run: Path) -> str:
     """Return what a row found in words: its verdicts."""
-    from vto_pipeline.cli import work
-    from vto_pipeline.cli.results import verdicts
-    from vto_pipeline.io.documents import read_json
-    from vto_pipeline.pipeline.execution.folder import RECORD
+    from vto_pipeline.stages.entry.outcome import open_run
 
-    record = read_json(run / RECORD)
-    return "; ".join(verdicts(record["wanted"], run / "out", work.run_tables(run, work.catalogue())))
+    return "; ".join(open_run(run).verdicts)
 
 
 def _answer(session: Session, folder: Path, ledger: Ledger) -> None:

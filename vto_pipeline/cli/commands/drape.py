@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +9,6 @@ import click
 
 from vto_pipeline.cli.options import PATH, pipeline_options
 from vto_pipeline.cli.session import Session, pass_session
-
-_WANT = ("draped", "audit", "trace", "render_mesh", "fit_report", "page")
 
 
 @click.command("drape")
@@ -52,9 +49,7 @@ def drape_command(
     source_body: Path | None,
     fabrics: tuple[str, ...],
     regraded: bool,
-    output: Path | None,
-    overrides: tuple[str, ...],
-    force_all: bool,
+    **options: Any,
 ) -> None:
     """Drape one garment, or several in layers, on a body.
 
@@ -63,47 +58,8 @@ def drape_command(
     vto drape --garment shirt.ply --source-body form.ply --body customer.ply --regraded -o runs/shirt
     vto drape --garment trousers.ply --fabric denim --garment shirt.ply --fabric cotton_poplin --body customer.ply
     """
-    from vto_pipeline.cli.work import catalogue, run_document, typed_document
-    from vto_pipeline.io.files import resolved
+    from vto_pipeline.cli.results import perform
+    from vto_pipeline.stages.entry.documents import drape_order
 
-    if (body is None) == (measurements is None):
-        raise click.UsageError("give either --body or --measurements")
-    given = {
-        **_garments(garments, fabrics),
-        f"mannequin.{'avatar' if _is_avatar(source_body) else 'surface'}": source_body,
-        f"body.{'avatar' if _is_avatar(body) else 'mesh'}": body,
-        "body.measurements": measurements,
-    }
-    document = typed_document("the command line", given, _WANT, {"grade": {"mode": "regraded"}} if regraded else {})
-    name = Path("runs") / f"drape_{'_'.join(resolved(garment).stem for garment in garments)}"
-    run_document(document, Path.cwd(), output or name, overrides, force_all, session, catalogue())
-
-
-def _garments(garments: tuple[Path, ...], fabrics: tuple[str, ...]) -> dict[str, Any]:
-    """Return the `given` section of the garments; several are named by their files.
-
-    Raises:
-        click.UsageError: two have the same, or the fabrics are neither one nor as many.
-    """
-    if len(fabrics) not in (1, len(garments)):
-        raise click.UsageError(
-            f"{len(fabrics)} fabrics for {len(garments)} garments: give one for all, or one per garment"
-        )
-    if len(garments) == 1:
-        return {"garment.mesh": garments[0], "fabric": fabrics[0]}
-    found: dict[str, Any] = {}
-    for garment, fabric in zip(garments, fabrics * (len(garments) // len(fabrics)), strict=True):
-        name = re.sub(r"[^a-z0-9]+", "_", garment.stem.lower()).strip("_")
-        if name in found:
-            raise click.UsageError(f"two garments are named {name}: rename a file, or name them in a document")
-        found[name] = {"mesh": str(garment), "fabric": fabric}
-    return {"garments": found}
-
-
-def _is_avatar(path: Path | None) -> bool:
-    """Return whether a file is our own avatar; a body of another model counts as a mesh."""
-    from vto_pipeline.io.sniff import find_kind
-
-    if path is None or path.suffix.lower() != ".npz":
-        return False
-    return not path.is_file() or find_kind(path)[0] == "avatar"  # what is missing is told later
+    order = drape_order(garments, fabrics, body, measurements, source_body, regraded, "the command line")
+    perform(session, order, **options)

@@ -28,9 +28,7 @@ def fit_command(
     side: Path | None,
     stature: float | None,
     sex: str | None,
-    output: Path | None,
-    overrides: tuple[str, ...],
-    force_all: bool,
+    **options: Any,
 ) -> None:
     """Fit an avatar to a body scan, to measurements, or to a front and a side photo.
 
@@ -39,24 +37,7 @@ def fit_command(
     vto fit --scan customer.ply --sex female
     vto fit --front front.png --side side.png --stature 1.72
     """
-    from vto_pipeline.cli.work import captured_kind, catalogue, run_document, typed_document
-    from vto_pipeline.io.files import resolved
+    from vto_pipeline.cli.results import perform
+    from vto_pipeline.stages.entry.documents import fit_order
 
-    photos = (front, side, stature)
-    if any(part is not None for part in photos) and None in photos:
-        raise click.UsageError("--front, --side and --stature must be given together")
-    ways = [way for way in (scan, measurements, front) if way is not None]
-    if len(ways) != 1:
-        raise click.UsageError("give one of --scan, --measurements, or --front with --side and --stature")
-    given: dict[str, Any] = {"body.measurements": measurements}
-    if scan is not None:
-        given[f"body.{captured_kind(scan, session)}"] = scan
-    if front is not None:
-        given["body.silhouettes"] = {"front": str(front), "side": str(side), "stature": stature}
-    tables = catalogue()
-    settings = {name: {"sex": sex} for name, kind in tables.sections.items() if sex and "sex" in kind.model_fields}
-    if sex and not settings:
-        raise click.UsageError("--sex does not apply to this input; write `sex:` in the measurements file")
-    document = typed_document("the command line", given, ["avatar", "measurements", "landmarks", "page"], settings)
-    name = Path("runs") / f"fit_{resolved(ways[0]).stem}"
-    run_document(document, Path.cwd(), output or name, overrides, force_all, session, tables)
+    perform(session, fit_order(scan, measurements, front, side, stature, sex, "the command line"), **options)

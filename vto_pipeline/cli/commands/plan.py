@@ -6,26 +6,35 @@ from pathlib import Path
 
 import click
 
-from vto_pipeline.cli.options import PATH, message_options, set_option
+from vto_pipeline.cli.options import PATH, message_options, output_option, set_option
 from vto_pipeline.cli.session import Session, pass_session
 
 
 @click.command("plan")
 @click.argument("document", metavar="FILE.yaml", type=PATH)
+@output_option
 @set_option
 @message_options
 @pass_session
-def plan_command(session: Session, document: Path, overrides: tuple[str, ...]) -> None:
+def plan_command(session: Session, document: Path, output: Path | None, overrides: tuple[str, ...]) -> None:
     """Show which stages a document would run and which it leaves out, with the reason. Nothing is run.
+
+    What is stored in the run's folder is told, and what each other stage took there the last time.
 
     \b
     vto plan configs/demo.yaml
     vto plan configs/demo.yaml --json
     """
+    from dataclasses import asdict
+
     from vto_pipeline.cli.tables import plan_lines
-    from vto_pipeline.cli.work import catalogue, planned
+    from vto_pipeline.pipeline.execution.forecast import forecast
+    from vto_pipeline.pipeline.execution.store import Store
+    from vto_pipeline.stages.entry.planning import catalogue, planned
 
     request, plan = planned(document, overrides, catalogue())
+    store = Store((output or Path("runs") / document.stem) / "cache")
+    expected = forecast(request, plan, store)
     data = {
         "given": {artifact: one.key for artifact, one in request.given.items()},
         "want": list(request.want),
@@ -35,9 +44,10 @@ def plan_command(session: Session, document: Path, overrides: tuple[str, ...]) -
                 "takes": list(step.inputs),
                 "makes": list(step.stage.makes),
                 "settings": step.settings.model_dump(mode="json"),
+                "expected": asdict(expected[step.stage.name]),
             }
             for step in plan.steps
         ],
         "left_out": [{"name": name, "reason": reason} for name, reason in plan.left_out.items()],
     }
-    session.answer(data, plan_lines(request, plan))
+    session.answer(data, plan_lines(request, plan, expected, session.verbose))

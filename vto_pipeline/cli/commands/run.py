@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -15,14 +16,7 @@ from vto_pipeline.cli.session import Session, pass_session
 @click.option("--cache", type=PATH, metavar="DIR", help="Folder of results to share with other runs.")
 @pipeline_options
 @pass_session
-def run_command(
-    session: Session,
-    document: Path,
-    cache: Path | None,
-    output: Path | None,
-    overrides: tuple[str, ...],
-    force_all: bool,
-) -> None:
+def run_command(session: Session, document: Path, **options: Any) -> None:
     """Run a pipeline document: make the wanted artifacts from the given inputs.
 
     Results of an earlier run in the same folder are reused if nothing they depend on has changed.
@@ -31,17 +25,11 @@ def run_command(
     \b
     vto run configs/demo.yaml
     vto run configs/demo.yaml -o runs/fine --set drape.target_error_mm=0.2
+    vto run configs/demo.yaml --from drape --log run.jsonl
     """
-    from vto_pipeline.cli.work import catalogue, run_document
+    from vto_pipeline.cli.results import perform
     from vto_pipeline.io.documents import load_yaml
+    from vto_pipeline.stages.entry.documents import Order
 
-    run_document(
-        load_yaml(document),
-        document.resolve().parent,
-        output or Path("runs") / document.stem,
-        overrides,
-        force_all,
-        session,
-        catalogue(),
-        cache,
-    )
+    order = Order(load_yaml(document), Path("runs") / document.stem)
+    perform(session, order, base=document.resolve().parent, **options)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from shutil import copyfile
 from typing import Any
 
 import click
@@ -35,9 +34,7 @@ def scan_command(
     role: str,
     mannequin: Path | None,
     distances: tuple[tuple[str, str, float], ...],
-    output: Path | None,
-    overrides: tuple[str, ...],
-    force_all: bool,
+    **options: Any,
 ) -> None:
     """Reconstruct a garment, or the surface of a body or mannequin, from INPUT.
 
@@ -48,34 +45,11 @@ def scan_command(
     vto scan photos/ --role mannequin --distance a.jpg:410,95+b.jpg:388,97 a.jpg:402,640+b.jpg:395,633 0.62
     vto scan customer.ply --role body
     """
-    from vto_pipeline.cli.work import captured_kind, catalogue, run_document, typed_document
-    from vto_pipeline.io.captures.photos import BOARD_FILE
-    from vto_pipeline.io.files import replacing, resolved
+    from vto_pipeline.cli.results import perform
+    from vto_pipeline.stages.entry.documents import scan_order
 
-    if mannequin is not None and role != "garment":
-        raise click.UsageError("--mannequin is only valid with --role garment")
-    kind = captured_kind(source, session)
-    if distances and kind != "photos":
-        raise click.UsageError("--distance is only valid with photos")
-    unscaled = kind == "photos" and not distances and not (source / BOARD_FILE).is_file()
-    wanted = [f"{role}_surface"]
-    if role == "garment" and mannequin is not None:
-        wanted = ["garment", "openings", "labels"]
-    elif role == "garment" and unscaled:
-        session.say("no mannequin, board or distance is given: the surface has no scale, and no garment is cut out")
-    elif role == "garment":
-        wanted = ["garment", "openings"]
-    given = {"mannequin.surface": mannequin, f"{role}.{kind}": source}
     lengths = [{"one": _marks(one), "other": _marks(other), "metres": metres} for one, other, metres in distances]
-    settings: dict[str, Any] = {"scale": {"lengths": lengths}} if lengths else {}
-    document = typed_document("the command line", given, [*wanted, f"{role}_scan_report", "page"], settings)
-    run = output or Path("runs") / f"scan_{resolved(source).stem}"
-    run_document(document, Path.cwd(), run, overrides, force_all, session, catalogue())
-    for name in () if role == "garment" else ("surface.ply", "scan_report.json"):
-        scanned = run / "out" / f"{role}_{name}"
-        if scanned.is_file():
-            with replacing(run / "out" / name) as beside:  # what a scan makes has one name, whatever was scanned
-                copyfile(scanned, beside)
+    perform(session, scan_order(source, role, mannequin, lengths, "the command line"), **options)
 
 
 def _marks(text: str) -> dict[str, list[float]]:

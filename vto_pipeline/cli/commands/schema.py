@@ -19,7 +19,7 @@ def schema_command(session: Session) -> None:
     \b
     vto schema > vto.schema.json
     """
-    from vto_pipeline.cli.work import catalogue
+    from vto_pipeline.stages.entry.planning import catalogue
     from vto_pipeline.stages.outfit import document_schema
 
     schema = document_schema(catalogue())

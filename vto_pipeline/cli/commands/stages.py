@@ -14,7 +14,7 @@ from vto_pipeline.cli.session import Session, pass_session
 def stages_command(session: Session) -> None:
     """List all stages: what each does, needs and makes. With -v, their settings too."""
     from vto_pipeline.cli.tables import table_lines
-    from vto_pipeline.cli.work import catalogue
+    from vto_pipeline.stages.entry.planning import catalogue
 
     tables = catalogue()
     data = [

@@ -15,6 +15,12 @@ And where the general way to the stiffness, ∇Cᵀ α⁻¹ ∇C + geometric, is
 
 * `stiffness(i, x, data, material, stress, blocks)`: write material ∇Cᵀ α⁻¹ ∇C + stress geometric into blocks.
 
+For kinds whose stencils share what is found for all of them at once, in arrays of their data that are overwritten:
+
+* `prepare(x, data)`: find it at positions x. Called once before `force`, `linearise` or `stiffness` are for each, and
+  before each sweep of `project`.
+* `prepare_rates(x, v, data)`: find it such that `force` gives -∇Cᵀ α⁻¹ ∇C v, with velocities v, for damping.
+
 And for kinds that remember, whose data have a `slider`, shape (N, ...):
 
 * `slip(i, x, data)`: at the end of a step, let the slider of stencil i give way; see `cloth.model.internal_friction`.
@@ -37,7 +43,7 @@ class Kind:
         data: Its NamedTuple of arrays, with at least `vertices` (N, S), `damping` [s], `starts` and `colours` (see
             `numerics.blocks.Blocks`).
         rows: Scalar constraints per stencil, B.
-        project, force, linearise, geometric, stiffness, slip: See above.
+        project, force, linearise, geometric, stiffness, slip, prepare, prepare_rates: See above.
     """
 
     data: type
@@ -48,3 +54,5 @@ class Kind:
     geometric: Callable[..., None] | None = None
     stiffness: Callable[..., None] | None = None
     slip: Callable[..., None] | None = None
+    prepare: Callable[..., None] | None = None
+    prepare_rates: Callable[..., None] | None = None

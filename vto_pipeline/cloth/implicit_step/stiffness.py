@@ -6,12 +6,21 @@ one, indefinite where the cloth is about to buckle, is made of differences of th
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit, prange
 
-from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM, force_one, stiffness_one, stiffness_scratch
+from vto_pipeline.cloth.constraints.sweep import (
+    PARALLEL_FROM,
+    force_one,
+    kind_of,
+    prepare,
+    stiffness_one,
+    stiffness_scratch,
+)
 from vto_pipeline.cloth.model.build import ClothModel
-from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.numerics.linear.block_matrix import BlockMatrix, pattern
 
 _STEP = 1e-5  # of an edge: the error of central differences is its square, rounding a hundred-thousandth of an angle
@@ -57,23 +66,29 @@ class Stiffness:
 
         The matrix is overwritten by the next call.
         """
-        matrix = self._matrix
-        _clear(matrix, self._held, mass_factor * self._model.mass)
+        _clear(self._matrix, self._held, mass_factor * self._model.mass)
         for data, places in zip(self._model.constraints, self._places, strict=True):
-            material = stiffness_factor + damping_factor * data.damping
-            _assemble(x, data, places, self._held, material, stiffness_factor, matrix.blocks)
-        return matrix
+            self._add(x, data, places, stiffness_factor, damping_factor, stiffness_factor)
+        return self._matrix
 
     def assemble_exact(self, x: FloatArray, mass_factor: float = 0.0, damping_factor: float = 0.0) -> BlockMatrix:
         """Return m M - ∂f/∂x + d Σ β ∇Cᵀ α⁻¹ ∇C at positions x [m], shape (V, 3); symmetric but for rounding.
 
+        Of a kind whose stencils share something, ∇Cᵀ α⁻¹ ∇C stands for what changes with that.
+
         The matrix is overwritten by the next call.
         """
-        matrix = self.assemble(x, mass_factor, 0.0, damping_factor)
-        here, forces = x.copy(), np.empty_like(x)
+        _clear(self._matrix, self._held, mass_factor * self._model.mass)
+        here, forces, step = x.copy(), np.empty_like(x), _STEP * self._model.edge_length
         for data, places in zip(self._model.constraints, self._places, strict=True):
-            _differ(here, data, places, self._held, _STEP * self._model.edge_length, forces, matrix.blocks)
-        return matrix
+            shares = kind_of(data).prepare is not None  # differences leave out what changes with what is shared
+            self._add(x, data, places, 1.0 if shares else 0.0, damping_factor, 0.0)
+            _differ(here, data, places, self._held, step, forces, self._matrix.blocks)
+        return self._matrix
+
+    def _add(self, x: FloatArray, data: Any, places: IntArray, factor: float, damping: float, stress: float) -> None:
+        prepare(x, data)
+        _assemble(x, data, places, self._held, factor + damping * data.damping, stress, self._matrix.blocks)
 
 
 @njit(cache=True, error_model="numpy")

@@ -11,10 +11,16 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse import diags
+from scipy.sparse.linalg import splu
 
 from vto_pipeline.cloth.placement.flexible_escape import escape_flexibly
+from vto_pipeline.cloth.placement.limb_lead import lead_onto_limbs
+from vto_pipeline.cloth.placement.limb_openings import Piece, pieces_with_limbs
+from vto_pipeline.cloth.placement.limbs import Limbs
 from vto_pipeline.cloth.placement.rigid_escape import escape_rigidly
 from vto_pipeline.cloth.placement.voxel_fit import close_openings
+from vto_pipeline.errors import IntersectingError
 from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.geometry.laplace import laplacian
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
@@ -24,6 +30,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 _STEP = 1e-3  # m²: a limb of radius r shrinks by exp(-1e-3 / r²) a step, a wrist of 30 mm to a third
 _MOST = 12  # steps: an arm is a line long before, and a torso still two thirds
+_LINES = 6  # steps after which limbs are lines
 _LED_BY = (0, 3, 6)  # steps of thinning after which the garment is led about the body: the thin one leaves room
 _STILL_WORN = 0.8  # of the body's surface in the garment: with less, it has been led off the body
 
@@ -35,19 +42,49 @@ class BodyGrowth(NamedTuple):
         garment: Where it is when the body begins to grow.
         body: From thin to full.
         crossing: Pairs of triangles of both that meet at the begin.
+        pieces: Of the garment, with what the limbs do there.
+        names: Of the limbs.
     """
 
     garment: TriangleMesh
     body: MovingBody
     crossing: int
+    pieces: list[Piece]
+    names: list[str]
+
+    @property
+    def fault(self) -> tuple[int, int]:
+        """What is wrong with the begin: pairs that cross, and limbs that go where they are not meant to."""
+        return self.crossing, sum(len(piece.astray()) for piece in self.pieces)
+
+    def refuse_pierced(self) -> None:
+        """Raise an error if a limb goes through cloth: nothing that moves cloth a little can free it.
+
+        Raises:
+            IntersectingError: with the limbs and places; `partial` holds the garment there as "draped".
+        """
+        found = []
+        for piece in self.pieces:
+            for limb, places in enumerate(piece.pierced):
+                if len(places):
+                    at = ", ".join(f"{x:.2f}" for x in places[0])
+                    found.append(f"the {self.names[limb]} goes through the cloth at ({at}){piece.missed(limb)}")
+        if found:
+            raise IntersectingError(
+                f"the garment cannot be put on: {'; '.join(found)}",
+                hint="are its openings open, and is it meant for this body? drape.place=as_it_stands keeps a place "
+                "that was chosen by hand",
+                partial={"draped": self.garment},
+            )
 
 
 def plan_body_growth(body: TriangleMesh, garment: TriangleMesh, job: Job) -> BodyGrowth:
     """Return the body's growth, from the least thinning at which it no longer crosses the garment.
 
-    Where it crosses however thin, the garment is not about the body, and is led there if that helps: as a whole, then
-    part by part about the body, and about thinner ones. Of all that was tried and is still worn, the least crossing is
-    taken.
+    Where it crosses however thin, or a limb goes through another opening than is there for it, the garment is not about
+    the body, and is led there: sleeve by sleeve onto the limbs, as a whole, part by part about the body, and about
+    thinner ones. Of all that was tried and is still worn, the one with the least crossing and the fewest limbs astray
+    is taken.
 
     Args:
         body: Closed or with holes [m].
@@ -55,14 +92,14 @@ def plan_body_growth(body: TriangleMesh, garment: TriangleMesh, job: Job) -> Bod
         job: Warned when the garment is led, or no thinning gets the body clear of it.
     """
     thinning = _Thinning(body)
-    first = thinning.growth(garment)
-    if first.crossing == 0:
+    first = best = thinning.growth(garment)
+    if first.fault == (0, 0):
         return first
-    enough, best = _STILL_WORN * _enclosed(garment, body), first
-    for led in _led(garment, thinning):
+    enough = _STILL_WORN * _enclosed(garment, body)
+    for led in _led(first, thinning):
         if _enclosed(led, body) >= enough:
-            best = min(best, thinning.growth(led), key=lambda one: one.crossing)
-        if best.crossing == 0:
+            best = min(best, thinning.growth(led), key=lambda one: one.fault)
+        if best.fault == (0, 0):
             break
     if best is not first:
         way = 1e3 * np.linalg.norm(best.garment.vertices - garment.vertices, axis=1)
@@ -77,11 +114,15 @@ def plan_body_growth(body: TriangleMesh, garment: TriangleMesh, job: Job) -> Bod
     return best
 
 
-def _led(garment: TriangleMesh, thinning: _Thinning) -> Iterator[TriangleMesh]:
-    """Yield the garment led as a whole, then part by part, from where it is and from there."""
-    whole = TriangleMesh(escape_rigidly(thinning.after(0), garment), garment.faces)
+def _led(first: BodyGrowth, thinning: _Thinning) -> Iterator[TriangleMesh]:
+    """Yield the garment led onto the limbs, as a whole, and each of these and itself part by part."""
+    garment, body = first.garment, thinning.after(0)
+    onto = lead_onto_limbs(garment, body, thinning.limbs, thinning.after(_LINES), first.pieces)
+    whole = TriangleMesh(escape_rigidly(body, garment), garment.faces)
+    yield onto
     yield whole
-    for led in (garment, whole):
+    astray = first.fault[1] > 0
+    for led in (onto, garment, whole) if astray else (garment, whole, onto):
         for steps in _LED_BY:
             led = TriangleMesh(escape_flexibly(thinning.after(steps), led), garment.faces)
             yield led
@@ -94,22 +135,26 @@ def _enclosed(garment: TriangleMesh, body: TriangleMesh) -> float:
 
 
 class _Thinning:
-    """A body and its thinner ones, made as they are asked for."""
+    """A body and its thinner ones, made as they are asked for.
+
+    The flow lets the webs of armpits and crotch sag out of the body, onto cloth that lies close there: what would leave
+    it is put back onto its skin.
+    """
 
     def __init__(self, body: TriangleMesh) -> None:
-        import igl
-        from scipy.sparse.linalg import splu
-
-        faces = body.faces.astype("i8")
-        self._mass = igl.massmatrix(body.vertices, faces, igl.MASSMATRIX_TYPE_BARYCENTRIC)
-        self._flow = splu((self._mass - _STEP * igl.cotmatrix(body.vertices, faces)).tocsc())
+        matrix, self._area = laplacian(body)
+        self._flow = splu((diags(self._area) + _STEP * matrix).tocsc())
         self._faces = body.faces
         self._frames = [body.vertices]
+        self._skin = SurfaceDistance(body)
+        self.limbs = Limbs(body)
 
     def after(self, steps: int) -> TriangleMesh:
         """Return the body after so many steps of the flow."""
         while len(self._frames) <= steps:
-            self._frames.append(self._flow.solve(self._mass @ self._frames[-1]))
+            thinner = self._flow.solve(self._area[:, None] * self._frames[-1])
+            out = self._skin.signed(thinner)
+            self._frames.append(np.where((out.distance > 0.0)[:, None], out.point, thinner))
         return TriangleMesh(self._frames[steps], self._faces)
 
     def growth(self, garment: TriangleMesh) -> BodyGrowth:
@@ -118,4 +163,6 @@ class _Thinning:
         while crossing[-1] and len(crossing) <= _MOST:
             crossing.append(len(intersecting_faces(garment, self.after(len(crossing)))))
         least = int(np.argmin(crossing))
-        return BodyGrowth(garment, MovingBody(np.stack(self._frames[least::-1]), self._faces), crossing[least])
+        grown = MovingBody(np.stack(self._frames[least::-1]), self._faces)
+        pieces = pieces_with_limbs(garment, self.limbs, self.after(least))
+        return BodyGrowth(garment, grown, crossing[least], pieces, [limb.name for limb in self.limbs.limbs])

@@ -2,25 +2,20 @@
 
 Legs that stand wider than those of trousers, or arms lower than sleeves, are not reached by moving the garment as one
 piece. So its parts go their own ways: cloth in the body asks to come out (`way_out`), and what it is part of follows as
-rigidly as possible (Sorkine & Alexa 2007, "As-rigid-as-possible surface modeling"), a sleeve as a whole, bent at the
-shoulder.
+rigidly as possible (`rigidity`), a sleeve as a whole, bent at the shoulder.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags
-from scipy.sparse.linalg import splu
 
-from vto_pipeline.cloth.placement.transfer import divergence, nearest_rotations
+from vto_pipeline.cloth.placement.rigidity import Rigidity
 from vto_pipeline.cloth.placement.way_out import WayOut
-from vto_pipeline.geometry.laplace import laplacian
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 
 _ROUNDS = 30
 _STILL = 5e-4  # m: no vertex moves farther in the last round
-_FIRM = 0.05  # m: over this length along the cloth, coming out outweighs keeping shape
 _HELD = 1e-3  # of the weight of cloth in the body: what nothing asks for stays where it is
 _CLEAR = 5e-3  # m: how far outside it is to come, or it would only ever come nearer to the surface
 
@@ -33,7 +28,7 @@ def escape_flexibly(body: TriangleMesh, garment: TriangleMesh) -> FloatArray:
         garment: Oriented throughout, outward or inward [m].
     """
     way_out = WayOut(body, garment)
-    matrix, area = laplacian(garment)
+    rigidity = Rigidity(garment)
     x = garment.vertices
     for _ in range(_ROUNDS):
         buried, way, depth = way_out.wanted(x)
@@ -41,23 +36,9 @@ def escape_flexibly(body: TriangleMesh, garment: TriangleMesh) -> FloatArray:
             break
         weight = np.full(len(x), _HELD)
         weight[buried] = 1.0
-        weight *= area / _FIRM**2
         target = x.copy()
         target[buried] += (depth + _CLEAR)[:, None] * way
-        turned = divergence(garment, matrix, _turns(garment, matrix, x))
-        before, x = x, np.asarray(splu((matrix + diags(weight)).tocsc()).solve(turned + weight[:, None] * target))
+        before, x = x, rigidity.follow(x, target, weight)
         if np.abs(x - before).max() < _STILL:
             break
     return x
-
-
-def _turns(garment: TriangleMesh, matrix: csr_matrix, positions: FloatArray) -> FloatArray:
-    """Return how the surroundings of each vertex are turned from the garment to positions [m], shape (V, 3, 3)."""
-    edges = matrix.tocoo()
-    i, j, weight = edges.row, edges.col, -edges.data
-    apart = i != j
-    i, j, weight = i[apart], j[apart], weight[apart]
-    now, was = positions[i] - positions[j], garment.vertices[i] - garment.vertices[j]
-    spread = np.zeros((len(positions), 3, 3))
-    np.add.at(spread, i, weight[:, None, None] * now[:, :, None] * was[:, None, :])
-    return nearest_rotations(spread)

@@ -22,7 +22,7 @@ from vto_pipeline.cloth.rest.convergence import SettlingResult
 from vto_pipeline.cloth.rest.phases import PLACED, REST, ROUGH, Phases
 from vto_pipeline.cloth.rest.true_distance import some_positions, with_true_distances
 from vto_pipeline.cloth.simulation import default_skin
-from vto_pipeline.errors import GarmentError, InputError
+from vto_pipeline.errors import GarmentError, InputError, IntersectingError
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.cloth import TraceRow
@@ -69,6 +69,7 @@ def come_to_rest(
     Raises:
         InputError, ConfigError: as `build_cloth` and `Stepper.prepare`.
         DivergedError: positions are no longer finite.
+        IntersectingError: a limb goes through cloth, wherever the garment is led; `partial` holds it as "draped".
     """
     model = build_cloth(garment.mesh, garment.rest, fabric, materials=config, job=job)
     return _CoarseToFine(garment, model, fabric, config, job).run(body, deadline)
@@ -143,7 +144,14 @@ class _CoarseToFine:
         first = TriangleMesh(body.keyframes[0], body.faces)
         state = phases.resolve_crossings(at_rest(garment.mesh.vertices))
         if fresh:  # the others start outside the body, but for corners that edges have cut
-            state = phases.resolve_crossings(phases.grow_body(state, first), first)
+            try:
+                grown = phases.grow_body(state, first)
+            except IntersectingError as error:
+                if level == 0:
+                    raise
+                self._leave_out(model, f"its openings are too coarse: {error.problem}")
+                return None
+            state = phases.resolve_crossings(grown, first)
             if level > 0 and phases.crossings_left > 0:
                 left = f"{phases.crossings_left} pairs of triangles still intersect"
                 self._leave_out(model, f"too coarse to clear the body: {left}")

@@ -105,7 +105,11 @@ class Phases:
         return made
 
     def grow_body(self, state: ClothState, body: TriangleMesh) -> ClothState:
-        """Return the cloth outside the body."""
+        """Return the cloth outside the body.
+
+        Raises:
+            IntersectingError: a limb goes through cloth, wherever the garment is led.
+        """
         mesh = TriangleMesh(state.positions, self._model.faces)
         depth = -float(SurfaceDistance(body).signed(mesh.vertices).distance.min())
         what = "growing the body inside the garment"
@@ -114,6 +118,7 @@ class Phases:
             return state
         self._job.progress(0.05, what)
         growth = plan_body_growth(body, mesh, self._job)
+        growth.refuse_pierced()
         state = at_rest(growth.garment.vertices)
         collider = self.collider(growth.body, growth.garment)
         stepper = self.stepper(without_gravity(self._model), collider, _CALM)

@@ -9,6 +9,7 @@ of them. Near rest, where what is left out to keep it so is what cloth waits for
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import exp
 from typing import NamedTuple
 
@@ -29,6 +30,7 @@ from vto_pipeline.cloth.collision.response.contact_springs import (
 from vto_pipeline.cloth.collision.response.step_response import resolve_plane_contacts
 from vto_pipeline.cloth.collision.self_collision.pairs import no_pairs
 from vto_pipeline.cloth.collision.self_collision.self_contact import SelfContact
+from vto_pipeline.cloth.constraints.bending.hinge_moments import by_hinges
 from vto_pipeline.cloth.constraints.rigid import refuse_rigid
 from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM, add_damping_forces, add_forces
 from vto_pipeline.cloth.implicit_step.linear_system import LinearSystem
@@ -92,7 +94,8 @@ class Newton:
     """
 
     def __init__(self, model: ClothModel, *, sweeps: int = 1, damping: float = 0.0, max_speed: float = np.inf) -> None:
-        self._model = model = with_own_sliders(model)
+        model = with_own_sliders(model)
+        self._model = model = replace(model, constraints=by_hinges(model.constraints))
         self._sweeps = sweeps
         self._damping = damping
         self._max_speed = max_speed

@@ -6,7 +6,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from vto_pipeline.errors import ComputationError, VtoError
+from vto_pipeline.errors import ComputationError, ConfigError, VtoError
+from vto_pipeline.io.documents import suggest
 from vto_pipeline.model.job import Job
 from vto_pipeline.pipeline.catalogue import Catalogue
 from vto_pipeline.pipeline.execution.cost import Meter
@@ -31,6 +32,7 @@ def run(
     force_all: bool = False,
     listener: Listener | None = None,
     cache: Path | None = None,
+    afresh: str | None = None,
 ) -> dict[str, Any]:
     """Run a plan in a folder, resuming from the results of earlier runs.
 
@@ -42,19 +44,34 @@ def run(
         force_all: Leave nothing out, for comparing.
         listener: Receives how it goes.
         cache: Where results are kept, which several runs may share; None: in the run's folder.
+        afresh: Stage that is made anew, with all that depends on it, though results are stored.
 
     Returns:
         What run.json holds.
 
     Raises:
-        ConfigError: the folder is in use, or is no run's folder.
+        ConfigError: the folder is in use, or is no run's folder; or the plan has no stage `afresh`.
         InputError: something given cannot be read.
         ComputationError: a stage failed; its partial result is under RUN/out/partial.
     """
+    renewed = _dependents(afresh, plan) if afresh is not None else frozenset()
     with locked_run_folder(folder, [path for one in request.given.values() for path in one.paths]):
         store = Store(folder / "cache" if cache is None else cache)
-        runner = _Run(request, plan, catalogue, folder, store, force_all, listener or Listener())
+        runner = _Run(request, plan, catalogue, folder, store, force_all, listener or Listener(), renewed)
         return runner.run_all()
+
+
+def _dependents(name: str, plan: Plan) -> frozenset[str]:
+    """Return a stage of the plan and all stages that what it makes leads to."""
+    if name not in [step.stage.name for step in plan.steps]:
+        left_out = f"it is left out: {plan.left_out[name]}" if name in plan.left_out else ""
+        hint = left_out or suggest(name, [step.stage.name for step in plan.steps])
+        raise ConfigError(f"the document does not run {name!r}", hint=hint)
+    found = {name}
+    for step in plan.steps:  # each after the makers of its inputs
+        if any(plan.makers.get(artifact) in found for artifact in step.inputs):
+            found.add(step.stage.name)
+    return frozenset(found)
 
 
 class _Run:
@@ -69,9 +86,10 @@ class _Run:
         store: Store,
         force_all: bool,
         listener: Listener,
+        renewed: frozenset[str],
     ) -> None:
         self.request, self.plan, self.catalogue = request, plan, catalogue
-        self.force_all, self.listener = force_all, listener
+        self.force_all, self.listener, self.renewed = force_all, listener, renewed
         self.store = store
         self.out = OutputFolder(folder / "out", catalogue)
         self.record = RunRecord(folder / RECORD, request, plan)
@@ -117,7 +135,7 @@ class _Run:
         digests = {artifact: self._digest(artifact) for artifact in step.inputs}
         record.key = result_key(step, digests, self.request.seed, self.force_all)
         with self.store.claimed(name, record.key):
-            result = self.store.find(name, record.key)
+            result = None if name in self.renewed else self.store.find(name, record.key)
             if result is None:
                 self.listener.started(number, len(self.plan.steps), step.stage)
                 result = self._make(step, record)

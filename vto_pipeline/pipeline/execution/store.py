@@ -11,7 +11,7 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +20,7 @@ from typing import Any
 from vto_pipeline.io.documents import write_json
 from vto_pipeline.pipeline.execution.digest import digest_file
 
-_MANIFEST = "manifest.json"
+MANIFEST = "manifest.json"
 _UNFINISHED = ".unfinished-"
 
 
@@ -59,7 +59,7 @@ class Store:
         """A finished result, or None."""
         folder = self.folder / stage / key
         try:
-            manifest = json.loads((folder / _MANIFEST).read_text(encoding="utf-8"))
+            manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
             whole = all((folder / name).stat().st_size == size for name, size in manifest["sizes"].items())
         except (FileNotFoundError, ValueError):
             return None
@@ -94,12 +94,33 @@ class Store:
         digests = {path.name: digest_file(path) for path in files}
         sizes = {path.name: path.stat().st_size for path in files}
         manifest = {"outputs": dict(outputs), "digests": digests, "sizes": sizes, "record": dict(record)}
-        write_json(unfinished / _MANIFEST, manifest)
+        write_json(unfinished / MANIFEST, manifest)
         folder = self.folder / stage / key
         folder.parent.mkdir(exist_ok=True)
         shutil.rmtree(folder, ignore_errors=True)  # what `find` did not accept
         os.replace(unfinished, folder)
         return Result(folder, dict(outputs), digests, dict(record))
+
+    def remove_others(self, keys: Collection[tuple[str, str]], keep: bool = False) -> tuple[int, int]:
+        """Remove every result but some, none that a run at work is making or has claimed.
+
+        Args:
+            keys: Stage and key of each result that stays.
+            keep: Only count.
+
+        Returns:
+            How many results were removed, and how many bytes they held.
+        """
+        count = size = 0
+        for folder in sorted(self.folder.glob("*/*")):
+            if not folder.is_dir() or folder.parent.name.startswith(".") or (folder.parent.name, folder.name) in keys:
+                continue
+            with (folder.parent / f".{folder.name}.lock").open("w") as lock, suppress(BlockingIOError):
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                count, size = count + 1, size + sum(p.stat().st_size for p in folder.rglob("*") if p.is_file())
+                if not keep:
+                    shutil.rmtree(folder, ignore_errors=True)
+        return count, size
 
     def sweep(self) -> None:
         """Remove what interrupted runs left, and nothing that a run at work is making."""

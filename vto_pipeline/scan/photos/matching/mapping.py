@@ -63,6 +63,9 @@ def _global(database: Path, folder: Path, seed: int) -> list[Any]:
     options = pycolmap.GlobalPipelineOptions(num_threads=1, random_seed=seed, min_model_size=MIN_PHOTOS)
     options.mapper.num_threads = 1
     options.mapper.random_seed = seed
+    for part in (options.mapper.rotation_averaging, options.mapper.global_positioning, options.mapper.retriangulation):
+        part.random_seed = seed
+    options.mapper.bundle_adjustment.ceres.solver_options.num_threads = 1
     models = pycolmap.global_mapping(database, folder, database.parent, options)
     return [models[key] for key in sorted(models)]
 

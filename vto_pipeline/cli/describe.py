@@ -1,0 +1,105 @@
+"""What a file or folder holds that may be given: counts, and lengths in metres."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from vto_pipeline.model.job import Job
+
+
+def _surface(path: Path, job: Job) -> dict[str, Any]:
+    import numpy as np
+
+    from vto_pipeline.geometry.topology import edge_face_counts, face_area_vectors, face_components
+    from vto_pipeline.io.meshes import read_mesh
+
+    mesh = read_mesh(path, job=job)
+    faces = edge_face_counts(mesh)[1]
+    return {
+        "vertices": len(mesh.vertices),
+        "triangles": len(mesh.faces),
+        "size_m": [float(side) for side in mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)],
+        "area_m2": float(np.linalg.norm(face_area_vectors(mesh), axis=1).sum()),
+        "pieces": face_components(mesh)[0],
+        "closed": bool((faces != 1).all()),
+        "edges_of_more_than_two_faces": int((faces > 2).sum()),
+    }
+
+
+def _cloud(path: Path, job: Job) -> dict[str, Any]:
+    from vto_pipeline.io.clouds import read_cloud
+
+    cloud = read_cloud(path, job=job)
+    return {
+        "points": len(cloud.points),
+        "size_m": [float(side) for side in cloud.points.max(axis=0) - cloud.points.min(axis=0)],
+        "normals": cloud.normals is not None,
+        "colours": cloud.colors is not None,
+    }
+
+
+def _photos(path: Path, job: Job) -> dict[str, Any]:
+    from vto_pipeline.io.captures.photos import read_photos
+
+    photos = read_photos(path, job=job)
+    return {
+        "photos": len(photos.paths),
+        "with_a_focal_length": sum(one is not None for one in photos.intrinsics),
+        "board": photos.board is not None,
+    }
+
+
+def _depth(path: Path, job: Job) -> dict[str, Any]:
+    from vto_pipeline.io.captures.depth import read_depth_frames
+
+    frames = read_depth_frames(path, job=job)
+    return {
+        "frames": len(frames.depth_paths),
+        "pixels": [frames.intrinsics.width, frames.intrinsics.height],
+        "colours": bool(frames.color_paths),
+        "poses": frames.world_from_cam is not None,
+    }
+
+
+def _avatar(path: Path, job: Job) -> dict[str, Any]:
+    from vto_pipeline.avatar.measure import measure
+    from vto_pipeline.io.bodies.avatars import receive_avatar
+
+    avatar = receive_avatar(path)
+    measured = measure(avatar).values
+    return {"vertices": len(avatar.vertices), **{f"{key}_m": value for key, value in measured.items() if key != "mass"}}
+
+
+def _measurements(path: Path, job: Job) -> dict[str, Any]:
+    from vto_pipeline.io.bodies.measurements import read_measurements
+
+    read = read_measurements(path)
+    return {"sex": read.sex, **{f"{key}_m": value for key, value in read.values.items() if key != "mass"}}
+
+
+def _silhouettes(path: Path, job: Job) -> dict[str, Any]:
+    from vto_pipeline.io.bodies.measurements import read_silhouettes
+
+    return {"stature_m": read_silhouettes(path).stature}
+
+
+def _video(path: Path, job: Job) -> dict[str, Any]:
+    from vto_pipeline.io.captures.video import read_video
+
+    video = read_video(path, job=job)
+    return {"pixels": [video.width, video.height], "board": video.board is not None}
+
+
+DESCRIPTIONS: dict[str, Callable[[Path, Job], dict[str, Any]]] = {
+    "surface": _surface,
+    "cloud": _cloud,
+    "photos": _photos,
+    "depth": _depth,
+    "avatar": _avatar,
+    "measurements": _measurements,
+    "silhouettes": _silhouettes,
+    "video": _video,
+}
+"""Kind of what may be given, as `find_kind` has it -> a function that reads it and returns what it holds."""

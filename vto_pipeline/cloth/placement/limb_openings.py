@@ -1,0 +1,131 @@
+"""Through which openings of a garment the limbs of a body are to go, and through what they do go.
+
+Every opening is there for a limb. So of all ways to send the limbs through the openings, with none left idle where
+there are limbs enough, the nearest is taken. A line from a limb's end inward crosses that opening's lid where all is
+well; where it meets cloth, an arm goes through a panel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise, product
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.distance import cdist
+
+from vto_pipeline.cloth.placement.limbs import Limb, Limbs
+from vto_pipeline.cloth.placement.voxel_fit import close_openings
+from vto_pipeline.geometry.topology import boundary_loops, face_components, submesh
+from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.mesh import TriangleMesh
+
+_MOST_OPENINGS = 7  # of a piece: more are slits and lace, and which limb is whose is anybody's guess
+_PASSES = 0.1  # m: round an opening that a hand gets through
+_IDLE = 10.0  # m: as far as that may a limb be from an opening that had none
+
+
+class Piece(NamedTuple):
+    """A connected piece of a garment, and the limbs' ways through it.
+
+    Args:
+        mesh: Its triangles.
+        vertices: Which vertices of the garment are its own, shape (P,).
+        openings: Vertices of the piece around each opening, in order.
+        meant: Index of the opening that each limb is to go through; -1 where that is open.
+        through: Indices of the openings whose lids each limb crosses, on the whole; none where it ends inside.
+        pierced: Where each limb meets cloth [m], shape (N, 3) each.
+    """
+
+    mesh: TriangleMesh
+    vertices: IntArray
+    openings: list[IntArray]
+    meant: list[int]
+    through: list[set[int]]
+    pierced: list[FloatArray]
+
+    def astray(self) -> list[int]:
+        """Return the limbs that go through cloth, or not through the opening that is there for them alone."""
+        alone = [self.meant.count(opening) == 1 for opening in self.meant]
+        return [
+            limb
+            for limb, (meant, through) in enumerate(zip(self.meant, self.through, strict=True))
+            if len(self.pierced[limb]) > 0 or (meant >= 0 and alone[limb] and len(through) > 0 and meant not in through)
+        ]
+
+    def missed(self, limb: int) -> str:
+        """Return in words how far from its opening a limb goes through cloth; nothing where that is unknown."""
+        if self.meant[limb] < 0:
+            return ""
+        loop = self.mesh.vertices[self.openings[self.meant[limb]]]
+        far = cdist(self.pierced[limb], loop).min()
+        return f", {1e3 * far:.0f} mm from the opening about ({', '.join(f'{x:.2f}' for x in loop.mean(axis=0))})"
+
+
+def pieces_with_limbs(garment: TriangleMesh, limbs: Limbs, thin: TriangleMesh) -> list[Piece]:
+    """Return the pieces of a garment with what the limbs do there.
+
+    Args:
+        garment: In its place about the body [m].
+        limbs: Of the body.
+        thin: The body as it is inside the garment, so thin that its limbs are lines [m].
+    """
+    count, piece = face_components(garment)
+    ways = limbs.ways_in(thin)
+    return [_piece(*submesh(garment, piece == number), limbs.limbs, ways) for number in range(count)]
+
+
+def _piece(mesh: TriangleMesh, vertices: IntArray, limbs: Sequence[Limb], ways: Sequence[FloatArray]) -> Piece:
+    """Return one piece, given as a mesh of its own and which vertices of the garment these are."""
+    openings = boundary_loops(mesh)
+    solid = close_openings(mesh)
+    lid_of = np.repeat(np.arange(len(openings)), [len(loop) for loop in openings])
+    through, pierced = [], []
+    for way in ways:
+        at, face = _crossings(way, solid)
+        on_lid = face >= len(mesh.faces)
+        pierced.append(at[~on_lid])
+        crossed = np.bincount(lid_of[face[on_lid] - len(mesh.faces)], minlength=len(openings))
+        through.append(set(np.flatnonzero(crossed % 2).tolist()))
+    return Piece(mesh, vertices, openings, _nearest_ways(mesh, openings, limbs), through, pierced)
+
+
+def _nearest_ways(mesh: TriangleMesh, openings: Sequence[IntArray], limbs: Sequence[Limb]) -> list[int]:
+    """Return the opening that each limb is to go through: the nearest, with none left idle; -1 where unknown."""
+    loops = [mesh.vertices[loop] for loop in openings]
+    wide = [
+        k for k, loop in enumerate(loops) if np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1).sum() > _PASSES
+    ]
+    if not wide or len(wide) > _MOST_OPENINGS or not limbs:
+        return [-1] * len(limbs)
+    middles = np.array([loops[k].mean(axis=0) for k in wide])
+    outside = [limb.axis[limb.along <= limb.joins] for limb in limbs]
+    far = np.array([cdist(line, middles).min(axis=0) for line in outside])
+    ways = np.array(list(product(range(len(wide)), repeat=len(limbs))), np.int64)
+    idle = len(wide) - np.array([(ways == k).any(axis=1) for k in range(len(wide))]).sum(axis=0)
+    best = ways[int(np.argmin(far[range(len(limbs)), ways].sum(axis=1) + _IDLE * idle))]
+    return [wide[k] for k in best]
+
+
+def _crossings(line: FloatArray, mesh: TriangleMesh) -> tuple[FloatArray, IntArray]:
+    """Return where a line of segments meets faces, in order along it [m], shape (N, 3), and which faces, shape (N,).
+
+    Möller & Trumbore 1997, "Fast, minimum storage ray/triangle intersection", all segments with all triangles.
+    """
+    a, b, c = mesh.vertices[mesh.faces].transpose(1, 0, 2)
+    one, two = b - a, c - a
+    where, faces = [np.zeros((0, 3))], [np.zeros(0, np.int64)]
+    for start, end in pairwise(line):
+        way = end - start
+        across = np.cross(way, two)
+        size = np.einsum("fd,fd->f", one, across)
+        size = np.where(np.abs(size) > 1e-30, size, np.inf)
+        from_a = start - a
+        u = np.einsum("fd,fd->f", from_a, across) / size
+        other = np.cross(from_a, one)
+        v, t = other @ way / size, np.einsum("fd,fd->f", two, other) / size
+        hit = np.flatnonzero((u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (t >= 0.0) & (t < 1.0) & np.isfinite(size))
+        hit = hit[np.argsort(t[hit], kind="stable")]
+        where.append(start + t[hit, None] * way)
+        faces.append(hit)
+    return np.vstack(where), np.concatenate(faces)

@@ -1,0 +1,69 @@
+"""What a run would do: which results are stored, and how long and large the others were the last time."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from vto_pipeline.pipeline.execution.digest import digest_path, digest_value
+from vto_pipeline.pipeline.execution.key import result_key
+from vto_pipeline.pipeline.execution.store import MANIFEST, Store
+from vto_pipeline.pipeline.plan import Plan
+from vto_pipeline.pipeline.request import Request
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What is known of a stage before it runs.
+
+    Args:
+        stored: Whether its result is there already.
+        seconds, peak_mb: Of its latest result in the store, whatever that was made from; None if there is none.
+    """
+
+    stored: bool
+    seconds: float | None
+    peak_mb: float | None
+
+
+def forecast(request: Request, plan: Plan, store: Store, force_all: bool = False) -> dict[str, Expected]:
+    """Return stage -> what is known of it, for each stage of a plan.
+
+    Args:
+        request: What is given; its files are read for their digests.
+        plan: What would be done.
+        store: Where earlier results are.
+        force_all: Of the run.
+    """
+    digests = {
+        artifact: digest_path(one.source) if isinstance(one.source, Path) else digest_value(one.source)
+        for artifact, one in request.given.items()
+    }
+    found = {}
+    for step in plan.steps:
+        stage = step.stage
+        result = None
+        if not stage.final and all(artifact in digests for artifact in step.inputs):
+            inputs = {artifact: digests[artifact] for artifact in step.inputs}
+            result = store.find(stage.name, result_key(step, inputs, request.seed, force_all))
+        if result is not None:
+            mine = [a for a in stage.makes if plan.makers.get(a) == stage.name]
+            digests |= {artifact: result.digest(artifact) for artifact in mine}
+        record = result.record if result is not None else _latest(store.folder / stage.name)
+        found[stage.name] = Expected(result is not None, record.get("seconds"), record.get("peak_mb"))
+    return found
+
+
+def _latest(folder: Path) -> Mapping[str, Any]:
+    """Return the record of the newest result in a stage's folder that was not skipped, or an empty one."""
+    newest: tuple[float, Mapping[str, Any]] = (0.0, {})
+    for manifest in sorted(folder.glob(f"*/{MANIFEST}")):
+        with suppress(OSError, ValueError, KeyError):  # gone meanwhile, or not ours
+            record = json.loads(manifest.read_text(encoding="utf-8"))["record"]
+            if not record["reason"]:
+                newest = max(newest, (manifest.stat().st_mtime, record), key=lambda one: one[0])
+    return newest[1]

@@ -1,0 +1,7 @@
+"""The ways in to the tables, for the command line and for Python.
+
+commands: scan, fit, drape and run
+documents: the pipeline document that each of them stands for
+planning: the tables, and the request and the plan of a document
+outcome: what a run made, and what it says
+"""

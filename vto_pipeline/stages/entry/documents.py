@@ -1,0 +1,210 @@
+"""The pipeline document that a scan, a fit or a drape stands for."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from vto_pipeline.errors import ConfigError, InputError
+from vto_pipeline.io.captures.photos import BOARD_FILE
+from vto_pipeline.io.documents import Document
+from vto_pipeline.io.files import resolved
+from vto_pipeline.io.sniff import find_kind
+from vto_pipeline.stages.entry import planning
+
+_CAPTURES = ("photos", "video", "depth", "cloud", "surface")
+_DRAPED = ("draped", "audit", "trace", "render_mesh", "fit_report", "page")
+
+
+@dataclass(frozen=True)
+class Order:
+    """A document, and what goes with it.
+
+    Args:
+        document: Its relative paths start from the working directory.
+        folder: For the run, where no other is named.
+        notes: What was found out about the input, in words.
+        copies: Name in RUN/out -> the file there that it is a copy of, where one is made.
+    """
+
+    document: Document
+    folder: Path
+    notes: tuple[str, ...] = ()
+    copies: Mapping[str, str] = field(default_factory=dict)
+
+
+def scan_order(
+    source: Path, role: str, mannequin: Path | None, lengths: Sequence[Mapping[str, Any]], name: str
+) -> Order:
+    """Return the order of a scan.
+
+    Args:
+        source: Folder of photos or of depth frames, video, point cloud or mesh.
+        role: "garment", "body" or "mannequin".
+        mannequin: Surface of the mannequin that a garment was scanned on.
+        lengths: Known distances in photos, each with `one`, `other` (photo -> pixel) and `metres`.
+        name: Stands where a file's name stands in messages.
+
+    Raises:
+        ConfigError: arguments that do not go together; InputError: the source is no capture.
+    """
+    if role not in ("garment", "body", "mannequin"):
+        raise ConfigError(f"no such role: {role!r}", hint="one of garment, body, mannequin")
+    if mannequin is not None and role != "garment":
+        raise ConfigError("a mannequin is only valid with the role garment")
+    kind, note = _captured_kind(source)
+    if lengths and kind != "photos":
+        raise ConfigError("a distance is only valid with photos")
+    unscaled = kind == "photos" and not lengths and not (source / BOARD_FILE).is_file()
+    notes = [note]
+    wanted = [f"{role}_surface"]
+    if role == "garment" and mannequin is not None:
+        wanted = ["garment", "openings", "labels"]
+    elif role == "garment" and unscaled:
+        notes.append("no mannequin, board or distance is given: the surface has no scale, and no garment is cut out")
+    elif role == "garment":
+        wanted = ["garment", "openings"]
+    given = {"mannequin.surface": mannequin, f"{role}.{kind}": source}
+    settings = {"scale": {"lengths": [dict(length) for length in lengths]}} if lengths else {}
+    # what a scan makes of a body or a form has one name, whichever it was
+    copies = {} if role == "garment" else {own: f"{role}_{own}" for own in ("surface.ply", "scan_report.json")}
+    document = _document(name, given, [*wanted, f"{role}_scan_report", "page"], settings)
+    return Order(document, Path("runs") / f"scan_{resolved(source).stem}", tuple(notes), copies)
+
+
+def fit_order(
+    scan: Path | None,
+    measurements: Path | None,
+    front: Path | None,
+    side: Path | None,
+    stature: float | None,
+    sex: str | None,
+    name: str,
+) -> Order:
+    """Return the order of a fit, from one of a scan, measurements, or two photos and a stature [m].
+
+    Raises:
+        ConfigError: not exactly one way is given, or `sex` does not apply to it; InputError: the scan is no capture.
+    """
+    photos = (front, side, stature)
+    if any(part is not None for part in photos) and None in photos:
+        raise ConfigError("front, side and stature must be given together")
+    ways = [way for way in (scan, measurements, front) if way is not None]
+    if len(ways) != 1:
+        raise ConfigError("give one of: a scan; measurements; front and side photos with the stature")
+    given: dict[str, Any] = {"body.measurements": measurements}
+    notes = []
+    if scan is not None:
+        kind, note = _captured_kind(scan)
+        notes.append(note)
+        given[f"body.{kind}"] = scan
+    if front is not None:
+        given["body.silhouettes"] = {"front": str(front), "side": str(side), "stature": stature}
+    sections = planning.catalogue().sections
+    settings = {section: {"sex": sex} for section, kind in sections.items() if sex and "sex" in kind.model_fields}
+    if sex and not settings:
+        raise ConfigError("a sex does not apply to this input", hint="write `sex:` in the measurements file")
+    document = _document(name, given, ["avatar", "measurements", "landmarks", "page"], settings)
+    return Order(document, Path("runs") / f"fit_{resolved(ways[0]).stem}", tuple(notes))
+
+
+def drape_order(
+    garments: Sequence[Path],
+    fabrics: Sequence[str],
+    body: Path | None,
+    measurements: Path | None,
+    source_body: Path | None,
+    regraded: bool,
+    name: str,
+) -> Order:
+    """Return the order of a drape.
+
+    Args:
+        garments: Mesh files, innermost first.
+        fabrics: Presets or files: one for all garments, or one for each.
+        body: Avatar, skinned body of another model, or mesh.
+        measurements: To build the body from, instead of `body`.
+        source_body: Avatar or mesh that the garments were scanned on.
+        regraded: Whether the garment is shown in the customer's size, not whether it fits.
+        name: Stands where a file's name stands in messages.
+
+    Raises:
+        ConfigError: arguments that do not go together.
+    """
+    if (body is None) == (measurements is None):
+        raise ConfigError("give either a body or measurements")
+    given = {
+        **_garments(garments, fabrics),
+        f"mannequin.{'avatar' if _is_avatar(source_body) else 'surface'}": source_body,
+        f"body.{'avatar' if _is_avatar(body) else 'mesh'}": body,
+        "body.measurements": measurements,
+    }
+    document = _document(name, given, _DRAPED, {"grade": {"mode": "regraded"}} if regraded else {})
+    return Order(document, Path("runs") / f"drape_{'_'.join(resolved(garment).stem for garment in garments)}")
+
+
+def _garments(garments: Sequence[Path], fabrics: Sequence[str]) -> dict[str, Any]:
+    """Return the `given` section of the garments; several are named by their files.
+
+    Raises:
+        ConfigError: there is none, two have the same name, or the fabrics are neither one nor as many.
+    """
+    if not garments:
+        raise ConfigError("give a garment")
+    if len(fabrics) not in (1, len(garments)):
+        raise ConfigError(f"{len(fabrics)} fabrics for {len(garments)} garments: give one for all, or one per garment")
+    if len(garments) == 1:
+        return {"garment.mesh": garments[0], "fabric": fabrics[0]}
+    found: dict[str, Any] = {}
+    for garment, fabric in zip(garments, [*fabrics] * (len(garments) // len(fabrics)), strict=True):
+        name = re.sub(r"[^a-z0-9]+", "_", garment.stem.lower()).strip("_")
+        if name in found:
+            raise ConfigError(f"two garments are named {name}: rename a file, or name them in a document")
+        found[name] = {"mesh": str(garment), "fabric": fabric}
+    return {"garments": found}
+
+
+def _is_avatar(path: Path | None) -> bool:
+    """Return whether a file is our own avatar; a body of another model counts as a mesh."""
+    if path is None or path.suffix.lower() != ".npz":
+        return False
+    return not path.is_file() or find_kind(path)[0] == "avatar"  # what is missing is told later
+
+
+def _captured_kind(path: Path) -> tuple[str, str]:
+    """Return the kind of a capture, and how it was told, in words.
+
+    Raises:
+        InputError: it is none.
+    """
+    kind, reason = find_kind(path)
+    if kind not in _CAPTURES:
+        raise InputError(
+            f"this looks like {kind} ({reason}); expected photos, a video, depth frames, a cloud or a mesh",
+            where=str(path),
+        )
+    return kind, f"{path}: {kind}, because {reason}"
+
+
+def _document(name: str, given: Mapping[str, Any], want: Sequence[str], stages: Mapping[str, Any]) -> Document:
+    """Return the document of some inputs, without those that were not given.
+
+    Args:
+        name: Stands where a file's name stands in messages.
+        given: Section or "section.kind" -> value or None.
+        want: Artifacts.
+        stages: Settings by section.
+    """
+    sections: dict[str, Any] = {}
+    for key, value in given.items():
+        if value is not None:
+            section, _, kind = key.partition(".")
+            plain = str(value) if isinstance(value, Path) else value
+            if kind:
+                sections.setdefault(section, {})[kind] = plain
+            else:
+                sections[section] = plain
+    return Document({"schema": 1, "given": sections, "want": list(want), "stages": dict(stages)}, Path(name))

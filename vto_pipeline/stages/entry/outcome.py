@@ -1,0 +1,81 @@
+"""What a run made, and what it says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from vto_pipeline.errors import InputError
+from vto_pipeline.io.documents import read_json
+from vto_pipeline.pipeline.catalogue import Catalogue
+from vto_pipeline.pipeline.execution.folder import RECORD, existing_run
+from vto_pipeline.stages.entry import planning
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A finished run.
+
+    Args:
+        folder: RUN.
+        record: What its run.json holds.
+        tables: That it was made with.
+    """
+
+    folder: Path
+    record: Mapping[str, Any]
+    tables: Catalogue
+
+    @property
+    def seconds(self) -> float:
+        """Wall time of the whole run [s]."""
+        return float(self.record["seconds"])
+
+    @property
+    def warnings(self) -> list[tuple[str, str]]:
+        """Stage and text of each verdict on a poor result."""
+        return [(stage["name"], text) for stage in self.record["stages"] for text in stage["warnings"]]
+
+    @property
+    def verdicts(self) -> list[str]:
+        """How each garment fits, in words."""
+        found = []
+        for artifact in self.record["wanted"]:
+            if artifact.endswith("fit_report"):
+                garment = artifact.removesuffix("fit_report").rstrip("_")
+                found.append(f"fit{f' of {garment}' if garment else ''}: {self.read(artifact)['verdict']}")
+        return found
+
+    def path(self, artifact: str) -> Path:
+        """Return the file of an artifact.
+
+        Raises:
+            InputError: the run made none.
+        """
+        path = self.folder / "out" / self.tables.kind(artifact).filename
+        if not path.is_file():
+            raise InputError(f"this run made no {artifact}", where=str(self.folder))
+        return path
+
+    def read(self, artifact: str) -> Any:
+        """Return the value of an artifact: a mesh, an avatar, measurements, a report.
+
+        Raises:
+            InputError: the run made none.
+        """
+        return self.tables.kind(artifact).read(self.path(artifact))
+
+
+def open_run(folder: Path | str) -> Outcome:
+    """Return what an earlier run made.
+
+    Args:
+        folder: RUN.
+
+    Raises:
+        InputError: it is not the folder of a run.
+    """
+    folder = Path(folder)
+    return Outcome(folder, read_json(existing_run(folder) / RECORD), planning.run_tables(folder, planning.catalogue()))
