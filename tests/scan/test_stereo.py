@@ -279,7 +279,7 @@ def test_subpixel_refinement_finds_a_slanted_shift():
     left = np.clip(np.round(1.2 * sample(u - truth) - 10), 0, 255).astype(np.uint8)  # another exposure, too
     start = np.round(truth)
     start[:, :30] = np.nan
-    refined = refine_disparity(left, right, start, 0, 2, 3, 0.5)
+    refined = refine_disparity(left, right, start, 0, 2, 6, 3, 0.5, 0.1)
     known = ~np.isnan(refined)
     assert known[:, :28].sum() == 0
     assert known[4:-4, 40:-4].mean() > 0.95
@@ -290,8 +290,29 @@ def test_subpixel_refinement_finds_a_slanted_shift():
 
 def test_refinement_drops_what_does_not_match():
     noise = np.random.default_rng(4).integers(0, 255, (2, 40, 80), dtype=np.uint8)
-    refined = refine_disparity(noise[0], noise[1], np.full((40, 80), 5.0, np.float32), 0, 2, 3, 0.5)
+    refined = refine_disparity(noise[0], noise[1], np.full((40, 80), 5.0, np.float32), 0, 2, 6, 3, 0.5, 0.1)
     assert (~np.isnan(refined)).mean() < 0.1
+
+
+def test_a_print_lost_in_noise_is_measured_over_wider_windows():
+    height, width, noise = 80, 200, 2.0
+    rng = np.random.default_rng(8)
+    blobs = cv2.GaussianBlur(rng.normal(size=(height, width + 20)).astype(np.float32), (0, 0), 3.0)
+    blobs *= 4.0 / blobs.std()  # but little of it within five pixels
+    u, v = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
+    right = cv2.remap(blobs, u + 10, v, cv2.INTER_CUBIC)
+    left = cv2.remap(blobs, u + 10 - np.float32(6.3), v, cv2.INTER_CUBIC)
+    left, right = (np.rint(120 + x + rng.normal(0, noise, x.shape)).astype(np.uint8) for x in (left, right))
+    start = np.full((height, width), 6.0, np.float32)
+    share, error = {}, {}
+    for widest in (2, 6):
+        refined = refine_disparity(left, right, start, 0, 2, widest, 3, 0.5, 0.1)[10:-10, 20:-10]
+        share[widest] = (~np.isnan(refined)).mean()
+        error[widest] = np.nanmedian(np.abs(refined - 6.3))
+    assert share[6] > 0.85
+    assert share[2] < 0.6
+    assert error[6] < 0.7 * error[2]
+    assert error[6] < 0.3
 
 
 def test_disparity_is_carried_to_the_second_view_and_the_nearest_wins():

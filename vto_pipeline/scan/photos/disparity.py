@@ -22,7 +22,13 @@ class MatchConfig(Config):
     uniqueness_percent: int = Field(
         default=8, ge=0, le=50, description="By how much the best match must beat the second [%]"
     )
-    refine_radius: int = Field(default=2, ge=1, le=10, description="Half side of the window of the refinement [px]")
+    refine_radius: int = Field(default=2, ge=1, le=10, description="Half side of the refinement's first window [px]")
+    widest_radius: int = Field(
+        default=6, ge=1, le=20, description="Half side of its widest window, for faint prints [px]"
+    )
+    precision_px: float = Field(
+        default=0.1, gt=0, le=1, description="A disparity's standard error above which the window grows [px]"
+    )
     refine_steps: int = Field(default=3, ge=0, le=20, description="Steps of the refinement; 0 leaves it out")
     min_correlation: float = Field(default=0.5, ge=-1, le=1, description="Windows that correlate less do not match")
     speckle_px: int = Field(
@@ -65,8 +71,9 @@ def match_pair(
     seen = (fixed >= 0) & (left > 0)
     forward = np.where(seen, fixed / np.float32(16) + np.float32(frame.min_disparity), np.float32(np.nan))
     if config.refine_steps:
-        radius, steps = config.refine_radius, config.refine_steps
-        forward = refine_disparity(left, right, forward, frame.min_disparity, radius, steps, config.min_correlation)
+        radius, widest = config.refine_radius, max(config.refine_radius, config.widest_radius)
+        limits = (config.refine_steps, config.min_correlation, config.precision_px)
+        forward = refine_disparity(left, right, forward, frame.min_disparity, radius, widest, *limits)
     backward = _in_second(forward, frame.min_disparity)
     return depth_in_view(first, frame, forward, second=False), depth_in_view(second, frame, backward, second=True)
 

@@ -13,46 +13,58 @@ MAX_SHIFT = 1.0
 
 
 @njit(cache=True, nogil=True)
-def refine_disparity(left, right, disparity, shift, radius, steps, min_correlation):  # type: ignore[no-untyped-def]  # Numba
+def refine_disparity(  # type: ignore[no-untyped-def]  # typed by Numba
+    left, right, disparity, shift, radius, widest, steps, min_correlation, precision
+):
     """Refine each known disparity by least squares of brightness over a window that follows the surface's slant.
 
     Gruen 1985 (adaptive least-squares correlation), reduced to one unknown per pixel: the slant is that of the plane
-    through the neighbouring disparities, brightness may differ by gain and offset.
+    through the neighbouring disparities, brightness may differ by gain and offset. Where what is left over says that
+    the window's texture does not fix the disparity well enough, the window grows.
 
     Args:
         left, right: Windows of the two rectified views, shape (H, W), uint8.
         disparity: Shape (H, W), float32; NaN where unknown.
         shift: Disparity at which the two windows coincide [px].
-        radius: Of the window [px].
-        steps: Gauss-Newton steps.
-        min_correlation: Matches whose windows correlate less are dropped.
+        radius, widest: Of the first window and of the last [px]; each is twice as wide as the one before.
+        steps: Gauss-Newton steps in each window.
+        min_correlation: Matches whose last windows correlate less are dropped.
+        precision: Standard error of a disparity that is good enough [px].
 
     Returns:
         Shape (H, W), float32; NaN where unknown or refused.
     """
     height, width = disparity.shape
     refined = np.full((height, width), np.float32(np.nan), dtype=np.float32)
-    side = 2 * radius + 1
+    side = 2 * widest + 1
     a, b, slope = np.empty(side * side), np.empty(side * side), np.empty(side * side)
     for row in range(radius, height - radius):
         for column in range(radius, width - radius):
             start = disparity[row, column]
             if np.isnan(start):
                 continue
+            best, reach = np.inf, radius
             d, dx, dy = _plane(disparity, row, column, radius)
-            moved, known, correlation = d, True, 0.0
-            for step in range(steps + 1):
-                known = _sample(left, right, row, column, moved - shift, dx, dy, radius, a, b, slope)
-                if not known:
-                    break
-                change, correlation = _solve(a, b, slope)
-                if step < steps:
-                    moved += change
-                    if not abs(moved - start) <= MAX_SHIFT:
-                        known = False
+            while best > precision and reach <= min(row, column, height - 1 - row, width - 1 - column):
+                if reach > radius:
+                    d, dx, dy = _plane(disparity, row, column, reach)
+                count = (2 * reach + 1) ** 2
+                moved, error, correlation = d, np.inf, 0.0
+                for step in range(steps + 1):
+                    if not _sample(left, right, row, column, moved - shift, dx, dy, reach, a, b, slope):
+                        correlation = 0.0
                         break
-            if known and correlation >= min_correlation:
-                refined[row, column] = moved
+                    change, correlation, error = _solve(a[:count], b[:count], slope[:count])
+                    if step < steps:
+                        moved += change
+                        if not abs(moved - start) <= MAX_SHIFT:
+                            correlation = 0.0
+                            break
+                if correlation >= min_correlation and error < best:
+                    best, refined[row, column] = error, moved
+                if reach == widest:
+                    break
+                reach = min(2 * reach, widest)
     return refined
 
 
@@ -107,7 +119,8 @@ def _sample(left, right, row, column, offset, dx, dy, radius, a, b, slope):  # t
 
 @njit(cache=True, nogil=True)
 def _solve(a, b, slope):  # type: ignore[no-untyped-def]  # typed by Numba
-    """Change of disparity that brings b, up to gain and offset, to a; and how well they correlate now."""
+    """Change of disparity that brings b, up to gain and offset, to a; how well they correlate now; its standard error
+    from what is left over [px]."""
     ma, mb, ms = a.mean(), b.mean(), slope.mean()
     aa = ab = bb = bs = ss = rs = 0.0
     for k in range(len(a)):
@@ -115,7 +128,7 @@ def _solve(a, b, slope):  # type: ignore[no-untyped-def]  # typed by Numba
         bb += (b[k] - mb) ** 2
         ab += (a[k] - ma) * (b[k] - mb)
     if aa < 1e-9 or bb < 1e-9:
-        return 0.0, 0.0
+        return 0.0, 0.0, np.inf
     gain = ab / bb
     for k in range(len(a)):
         s, u = gain * (slope[k] - ms), b[k] - mb
@@ -123,4 +136,8 @@ def _solve(a, b, slope):  # type: ignore[no-untyped-def]  # typed by Numba
         ss += s * s
         rs += s * (gain * u - (a[k] - ma))
     ss -= bs * bs / bb  # the gain is an unknown, too
-    return (rs / ss if ss > 1e-6 * aa else 0.0), ab / np.sqrt(aa * bb)
+    correlation = ab / np.sqrt(aa * bb)
+    if ss <= 1e-6 * aa:
+        return 0.0, correlation, np.inf
+    left_over = aa * (1.0 - correlation * correlation) / (len(a) - 3)
+    return rs / ss, correlation, np.sqrt(left_over / ss)
