@@ -232,3 +232,6 @@ def test_results_are_told_in_words_and_json_stays_alone(tmp_path):
     assert [line.split() for line in lines if "stature" in line] == [["stature", "172.0", "-"]]
     assert not any("knee" in line for line in lines)
     assert lines[-1] == "fit: Chest tight (+3.3 cm)."
+    (tmp_path / "out" / "fit_report.json").unlink()  # as after an interrupted run
+    lines = list(result_lines(Outcome(tmp_path, {"wanted": ["measurements", "fit_report"]}, CATALOGUE)))
+    assert not any("fit:" in line for line in lines)

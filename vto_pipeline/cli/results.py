@@ -43,8 +43,7 @@ def outcome_lines(outcome: Outcome) -> Iterator[str]:
     yield f"done in {outcome.seconds:.1f} s; {stage_counts(record)}"
     width = max(len(artifact) for artifact in record["wanted"])
     for artifact in record["wanted"]:
-        path = outcome.folder / "out" / outcome.tables.kind(artifact).filename
-        yield f"  {artifact:<{width}}  {path if path.is_file() else 'as given'}"
+        yield f"  {artifact:<{width}}  {outcome.path(artifact) if outcome.made(artifact) else 'as given'}"
     for name, text in outcome.warnings:
         yield f"  warning from {name.replace('_', ' ')}: {text}"
 
@@ -58,7 +57,7 @@ def stage_counts(record: Mapping[str, Any]) -> str:
 
 def result_lines(outcome: Outcome) -> Iterator[str]:
     """Yield the result of each wanted artifact that has one in words."""
-    if "measurements" in outcome.record["wanted"]:
+    if "measurements" in outcome.record["wanted"] and outcome.made("measurements"):
         yield from table_lines(("girth", "cm", "± cm (95 %)"), _girths(outcome.read("measurements")))
     yield from outcome.verdicts
 

@@ -37,8 +37,8 @@ def info_command(session: Session, path: Path) -> None:
             for stage in outcome.record["stages"]
             if stage["status"] == "failed"
         ]
-        results = [] if failed else list(result_lines(outcome))
-        session.answer({**outcome.record, "run": str(path)}, [*outcome_lines(outcome), *failed, *results])
+        lines = [*outcome_lines(outcome), *failed, *result_lines(outcome)]
+        session.answer({**outcome.record, "run": str(path)}, lines)
         return
     kind, reason = find_kind(path)
     job = Job()

@@ -39,7 +39,7 @@ def prune_command(session: Session, folder: Path, dry_run: bool) -> None:
         used = {(stage["name"], stage["key"]) for record in records for stage in read_json(record)["stages"]}
         store = Store(folder / "cache")
         store.sweep()
-        count, size = store.remove_others(used, keep=dry_run)
+        count, size = store.remove_others(used, dry_run=dry_run)
     word = "would be removed" if dry_run else "removed"
     session.answer(
         {"results": count, "bytes": size, "removed": not dry_run}, [f"{count} results {word}, {size / 1e6:.1f} MB"]

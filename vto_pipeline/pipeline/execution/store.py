@@ -101,12 +101,12 @@ class Store:
         os.replace(unfinished, folder)
         return Result(folder, dict(outputs), digests, dict(record))
 
-    def remove_others(self, keys: Collection[tuple[str, str]], keep: bool = False) -> tuple[int, int]:
+    def remove_others(self, keys: Collection[tuple[str, str]], dry_run: bool = False) -> tuple[int, int]:
         """Remove every result but some, none that a run at work is making or has claimed.
 
         Args:
             keys: Stage and key of each result that stays.
-            keep: Only count.
+            dry_run: Only count.
 
         Returns:
             How many results were removed, and how many bytes they held.
@@ -118,7 +118,7 @@ class Store:
             with (folder.parent / f".{folder.name}.lock").open("w") as lock, suppress(BlockingIOError):
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 count, size = count + 1, size + sum(p.stat().st_size for p in folder.rglob("*") if p.is_file())
-                if not keep:
+                if not dry_run:
                     shutil.rmtree(folder, ignore_errors=True)
         return count, size
 

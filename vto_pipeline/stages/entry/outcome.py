@@ -43,10 +43,14 @@ class Outcome:
         """How each garment fits, in words."""
         found = []
         for artifact in self.record["wanted"]:
-            if artifact.endswith("fit_report"):
+            if artifact.endswith("fit_report") and self.made(artifact):
                 garment = artifact.removesuffix("fit_report").rstrip("_")
                 found.append(f"fit{f' of {garment}' if garment else ''}: {self.read(artifact)['verdict']}")
         return found
+
+    def made(self, artifact: str) -> bool:
+        """Whether there is a file of an artifact; a run that was interrupted or failed has not made all it should."""
+        return (self.folder / "out" / self.tables.kind(artifact).filename).is_file()
 
     def path(self, artifact: str) -> Path:
         """Return the file of an artifact.
@@ -54,10 +58,9 @@ class Outcome:
         Raises:
             InputError: the run made none.
         """
-        path = self.folder / "out" / self.tables.kind(artifact).filename
-        if not path.is_file():
+        if not self.made(artifact):
             raise InputError(f"this run made no {artifact}", where=str(self.folder))
-        return path
+        return self.folder / "out" / self.tables.kind(artifact).filename
 
     def read(self, artifact: str) -> Any:
         """Return the value of an artifact: a mesh, an avatar, measurements, a report.
