@@ -69,16 +69,19 @@ def test_a_long_step_that_leads_away_is_not_taken():
     assert not stepper.exact
 
 
+MOVED = 1e-4  # m: far from standing still
+
+
 def test_steps_grow_while_the_force_falls():
     stepper = Steps()
-    polish = StableNewtonSteps(stepper, enough=0.01)
-    polish.choose(True, 5e-3)
+    polish = StableNewtonSteps(stepper, enough=0.01, still=1e-6)
+    polish.choose(True, 5e-3, MOVED)
     assert stepper.exact
     stepper.was_positive_definite = True
     lengths, residual = [], 5e-3
     while not polish.took_full_step:
-        assert not polish.diverged(residual)
-        polish.choose(True, residual)
+        assert not polish.diverged(residual, MOVED)
+        polish.choose(True, residual, MOVED)
         lengths.append(stepper.step)
         residual *= 0.5
     assert_allclose(lengths, [4 / 30, 16 / 30, LONGEST])
@@ -86,24 +89,53 @@ def test_steps_grow_while_the_force_falls():
 
 def test_what_leaves_more_force_is_tried_in_shorter_steps_until_they_are_as_usual():
     stepper = Steps()
-    polish = StableNewtonSteps(stepper, enough=0.01)
-    polish.choose(True, 5e-3)
+    polish = StableNewtonSteps(stepper, enough=0.01, still=1e-6)
+    polish.choose(True, 5e-3, MOVED)
     stepper.was_positive_definite = True
-    assert not polish.diverged(0.04)  # what is soft comes first
-    polish.choose(True, 0.04)
+    assert not polish.diverged(0.04, MOVED)  # what is soft comes first
+    polish.choose(True, 0.04, MOVED)
     assert stepper.step == pytest.approx(1 / 30)  # no longer steps before forces are all but in balance
-    polish.choose(True, 5e-3)
+    polish.choose(True, 5e-3, MOVED)
     assert stepper.step == pytest.approx(4 / 30)
-    assert polish.diverged(0.04)  # but it has to fall
+    assert polish.diverged(0.04, MOVED)  # but it has to fall
     assert stepper.exact
     assert stepper.step == pytest.approx(1 / 30)
-    assert not polish.diverged(0.4)
-    polish.choose(True, 0.4)
+    assert not polish.diverged(0.4, MOVED)
+    polish.choose(True, 0.4, MOVED)
     assert stepper.exact
     assert stepper.step == pytest.approx(1 / 30)  # it is on its way: no longer steps yet
-    assert not polish.diverged(5e-3)
-    polish.choose(True, 5e-3)
+    assert not polish.diverged(5e-3, MOVED)
+    polish.choose(True, 5e-3, MOVED)
     assert stepper.step == pytest.approx(4 / 30)
+
+
+def test_where_cloth_all_but_stands_still_steps_grow_whatever_force_a_micrometre_of_stretch_makes():
+    stepper = Steps()
+    polish = StableNewtonSteps(stepper, enough=0.01, still=1e-5)
+    polish.choose(True, 0.1, 1e-6)
+    stepper.was_positive_definite = True
+    lengths = []
+    for residual in (2.4, 0.02, 3.2):
+        assert not polish.diverged(residual, 1e-6)
+        polish.choose(True, residual, 1e-6)
+        lengths.append(stepper.step)
+    assert_allclose(lengths, [4 / 30, 16 / 30, LONGEST])
+    assert polish.diverged(3.2, 1e-4)  # it went somewhere
+
+
+def test_short_steps_that_tear_cloth_are_taken_back_and_the_usual_ones_go_on():
+    stepper = Steps()
+    polish = StableNewtonSteps(stepper, enough=0.01, still=1e-6)
+    assert not polish.diverged(0.17, MOVED)
+    polish.choose(True, 0.17, MOVED)
+    polish.choose(True, 0.17, MOVED)
+    assert stepper.substeps > 0.5
+    assert not polish.diverged(50.0, MOVED)  # cloth that snaps has forces above its weight for a while
+    assert polish.diverged(1000.0, MOVED)
+    assert stepper.substeps == 0.5
+    assert not stepper.exact
+    polish.choose(True, 0.17, MOVED)
+    assert not stepper.exact  # and no other try at once
 
 
 class Buckling(Steps):
@@ -173,9 +205,9 @@ class Indefinite(Steps):
 
     def choices(self, count):
         """Steps per frame and whether they are exact, in so many looks, the cloth all but still."""
-        chooser, chosen = StableNewtonSteps(self, 0.01), []
+        chooser, chosen = StableNewtonSteps(self, 0.01, 1e-6), []
         for _ in range(count):
-            chooser.choose(near=True, residual=1.0)
+            chooser.choose(near=True, residual=1.0, moved=MOVED)
             chosen.append((self.substeps, self.exact))
         return chosen
 

@@ -18,6 +18,7 @@ from vto_pipeline.model.cloth import TraceRow
 _QUIET = 3  # looks in a row under the bound: an oscillating cloth stands still for an instant at each turn
 _COARSE = 2.0  # times the bound: waiting longer for a coarse answer, itself in error by more, is waste
 _STILL, _LONG = 1e-4, 10  # m, looks in a row: what stays within that is waited for no longer, in balance or not
+_SLIGHT = 0.02  # of the bound: a move from look to look that is none
 _VAGUE = 3e-3  # m: what is not known to be stable may still buckle by as much, as dresses of `vto bench drape` do
 _NEAR = 1e-3  # m a look: slow enough to ask whether it is
 _JAMMED = 100.0  # weights left over: cloth on its way to rest has forces of the order of its weight
@@ -129,7 +130,7 @@ def relax_to_rest(
     coarse: FloatArray | None = None
     quiet = still = 0
     stepper.prepare(state.positions)
-    exact, newton_steps = stepper.has_exact_rest, StableNewtonSteps(stepper, limits.residual)
+    exact, newton_steps = stepper.has_exact_rest, StableNewtonSteps(stepper, limits.residual, _SLIGHT * limits.error)
     looks, share = 0, 0.0
     while share < 1.0 and time.perf_counter() < limits.deadline:
         before, known = result.state.positions, stepper.contact_memory
@@ -138,7 +139,8 @@ def relax_to_rest(
         residual = stepper.residual(after)
         looks += 1
         share = looks * LOOK / limits.seconds
-        if newton_steps.diverged(residual):
+        moved, brief = _rms(after.positions - before), span < LOOK
+        if newton_steps.diverged(residual, moved):
             stepper.contact_memory = known
             continue
         result.state, result.residual = after, residual
@@ -147,7 +149,6 @@ def relax_to_rest(
                 "the garment has fallen off the body: nothing holds it",
                 hint="does it go around the body, right way up, and is it small enough?",
             )
-        moved, brief = _rms(after.positions - before), span < LOOK
         if not brief:  # a shorter time tells nothing about rest
             moves.append(moved)
             drifts.append(0.5 * _rms(after.positions - earlier) if len(moves) > 1 else moved)
@@ -167,7 +168,7 @@ def relax_to_rest(
         if result.caught or result.jammed:
             break
         if brief:
-            newton_steps.choose(moved < _STILL, residual)
+            newton_steps.choose(moved < _STILL, residual, moved)
             continue
         first = coarse is None and not exact
         bound = _COARSE * limits.error if first else (1.0 if exact else 0.5) * limits.error
@@ -176,7 +177,7 @@ def relax_to_rest(
         over = balanced or still >= _LONG
         quiet = quiet + 1 if to_come < bound and over and (whole or not stepper.was_positive_definite) else 0
         if stepper.can_use_exact_stiffness and limits.error < _VAGUE:
-            newton_steps.choose(moved < (_NEAR if over else _STILL), residual)
+            newton_steps.choose(moved < (_NEAR if over else _STILL), residual, moved)
         if quiet < (1 if exact and residual < limits.residual else _QUIET):  # at a turn of its way forces are large
             continue
         if result.error <= limits.error:

@@ -15,6 +15,7 @@ _FALLS = 0.5  # times that after each look
 _SLIGHT = 0.1  # of the left-over force that is enough: less is no sign of going astray
 _SHORTER = 64.0  # times shorter than usual, at most, where cloth is about to buckle
 _PAUSE = 4  # looks with the usual stiffness where the shortest steps were of no use; twice as many after each time
+_TORN = 100.0  # weights left over: what comes to that in a few short steps has snapped into a place to be torn out of
 _FEW = 3  # of these steps to a look: it is the way that matters there, not the time it takes
 
 
@@ -30,18 +31,21 @@ class StableNewtonSteps:
     Where the system is not positive definite in steps as long as usual, they are shorter until it is. The usual
     stiffness leaves out what makes cloth buckle: with it, a fold that is about to only creeps, and never comes to rest.
     Where it is not in the shortest ones either, as in cloth that buckles within an edge, time would stand still: so the
-    usual stiffness goes on for a while.
+    usual stiffness goes on for a while. So it does where short steps snap cloth into a place that it is torn out of.
 
     Args:
         stepper: The cloth among its colliders, prepared; its steps are changed.
         enough: Left-over force, as a share of weight, at which cloth counts as in balance.
+        still: A move from look to look that is none, rms over vertices [m]. Thread hardly stretches: what has moved by
+            a micrometre may pull with many times its weight, and is no farther from rest for that.
     """
 
-    def __init__(self, stepper: Stepper, enough: float) -> None:
+    def __init__(self, stepper: Stepper, enough: float, still: float) -> None:
         self._stepper = stepper
         self._usual = stepper.substeps
         self._enough = enough
-        self._most = np.inf
+        self._still = still
+        self._most = self._before = np.inf
         self._tried = False
         self._wait, self._pause = 0, _PAUSE
 
@@ -58,33 +62,47 @@ class StableNewtonSteps:
         """Whether the last step went all the way there was to go, of a cloth that is stable there."""
         return self._stepper.was_positive_definite and self._stepper.step >= LONGEST
 
-    def diverged(self, residual: float) -> bool:
-        """Return whether the last step was a long one, and led away from rest; if so the next ones are shorter."""
-        if not self._stepper.was_positive_definite or residual <= self._most or self._stepper.substeps >= self._usual:
-            return False
-        self._shorten()
-        return True
+    def diverged(self, residual: float, moved: float) -> bool:
+        """Return whether the last steps are to be taken back, and others chosen: they led away from rest.
 
-    def choose(self, near: bool, residual: float) -> None:
+        Long ones may, and short ones in which cloth that buckles has snapped into a place that it is torn out of.
+
+        Args:
+            residual: Left-over force after it.
+            moved: How far it went, rms over vertices [m].
+        """
+        stable, steps = self._stepper.was_positive_definite, self._stepper.substeps
+        strays = stable and steps < self._usual and residual > self._most and moved > self._still
+        tears = not stable and steps > self._usual and residual > max(_TORN, _ASIDE * self._before)
+        if strays:
+            self._shorten()
+        elif tears:
+            self._give_up()
+        else:
+            self._before = residual
+        return strays or tears
+
+    def choose(self, near: bool, residual: float, moved: float) -> None:
         """Choose the next steps: with the exact stiffness, longer while that will do, else shorter.
 
         Args:
             near: Whether it is worth trying.
             residual: Left-over force now.
+            moved: How far the last look's steps went, rms over vertices [m].
         """
-        stepper = self._stepper
-        if stepper.was_positive_definite and residual > self._most:
+        stepper, stands = self._stepper, moved <= self._still
+        if stepper.was_positive_definite and residual > self._most and not stands:
             self._most = _ASIDE * residual
         elif stepper.was_positive_definite:
             self._most = max(_FALLS * self._most, _SLIGHT * self._enough)
-            if residual < self._enough or stepper.substeps > self._usual:
+            if residual < self._enough or stands or stepper.substeps > self._usual:
                 stepper.substeps = max(stepper.substeps / _LONGER, FRAME / LONGEST)
         elif stepper.substeps < self._usual:
             self._shorten()
         else:
             self._most = _ASIDE * max(residual, _SLIGHT * self._enough)
             if self._tried and stepper.substeps >= _SHORTER * self._usual:  # not even so: there is no end to that way
-                self._wait, self._pause = self._pause, 2 * self._pause
+                self._give_up()
             near = near and self._wait == 0
             self._wait = max(self._wait - 1, 0)
             if not near:
@@ -93,6 +111,12 @@ class StableNewtonSteps:
                 stepper.substeps = min(_LONGER * stepper.substeps, _SHORTER * self._usual)
             self._tried = near
             stepper.use_exact_stiffness(near)
+
+    def _give_up(self) -> None:
+        """Go on with the usual steps for a while, longer each time."""
+        self._wait, self._pause = self._pause, 2 * self._pause
+        self._tried = False
+        self.end()
 
     def _shorten(self) -> None:
         self._stepper.substeps = min(_LONGER * self._stepper.substeps, self._usual)
