@@ -8,6 +8,7 @@ import statistics
 import subprocess
 import sys
 from importlib import import_module
+from pathlib import Path
 
 import click
 import pytest
@@ -73,3 +74,23 @@ def test_the_table_of_commands_is_the_folder(request):
     files = {path.stem for path in (request.config.rootpath / "vto_pipeline" / "cli" / "commands").glob("*.py")}
     assert set(COMMANDS) == files - {"__init__"}
     assert main_module.vto.list_commands(click.Context(main_module.vto)) == list(COMMANDS)
+
+
+def test_sigterm_ends_a_command_like_ctrl_c(tmp_path):
+    """A termination removes temporary files, as a kill cannot."""
+    program = (
+        "import time; from vto_pipeline.cli import main; from vto_pipeline.io.files import process_folder\n"
+        "def wait(*_, **__): print(process_folder(), flush=True); time.sleep(60)\n"
+        "main.vto.main = wait; raise SystemExit(main.main([]))"
+    )
+    environment = {**os.environ, "TMPDIR": str(tmp_path)}
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+    ) as process:
+        assert process.stdout is not None
+        folder = Path(process.stdout.readline().strip())
+        assert folder.is_dir()
+        process.terminate()
+        _, said = process.communicate()
+    assert (process.returncode, said) == (130, "interrupted; run the same command again to resume\n")
+    assert not folder.exists()

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from vto_pipeline.pipeline.execution.digest import digest_path, digest_value
+from vto_pipeline.pipeline.execution.digest import digest_given
 from vto_pipeline.pipeline.execution.key import result_key
 from vto_pipeline.pipeline.execution.store import MANIFEST, Store
 from vto_pipeline.pipeline.plan import Plan
@@ -39,10 +39,7 @@ def forecast(request: Request, plan: Plan, store: Store, force_all: bool = False
         store: Where earlier results are.
         force_all: Of the run.
     """
-    digests = {
-        artifact: digest_path(one.source) if isinstance(one.source, Path) else digest_value(one.source)
-        for artifact, one in request.given.items()
-    }
+    digests = {artifact: digest_given(one) for artifact, one in request.given.items()}
     found = {}
     for step in plan.steps:
         stage = step.stage

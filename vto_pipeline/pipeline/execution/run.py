@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from vto_pipeline.errors import ComputationError, ConfigError, VtoError
+from vto_pipeline.errors import ComputationError, ConfigError, InputError, VtoError
 from vto_pipeline.io.documents import suggest
 from vto_pipeline.model.job import Job
 from vto_pipeline.pipeline.catalogue import Catalogue
 from vto_pipeline.pipeline.execution.cost import Meter
-from vto_pipeline.pipeline.execution.digest import digest_path, digest_value
+from vto_pipeline.pipeline.execution.digest import digest_given
 from vto_pipeline.pipeline.execution.final import make_final
 from vto_pipeline.pipeline.execution.folder import RECORD, locked_run_folder
 from vto_pipeline.pipeline.execution.key import result_key
@@ -126,6 +128,9 @@ class _Run:
             if isinstance(error, ComputationError) and error.partial:
                 self.out.put_partial(error.partial)
             raise
+        except OSError as error:  # a full disk, say; what can no longer be recorded is still told
+            record.status, record.reason = "failed", str(error.strerror)
+            raise
         finally:
             self.record.save()
             self.listener.ended(number, len(self.plan.steps), record)
@@ -156,7 +161,8 @@ class _Run:
         with self.store.making(name) as unfinished, self.store.making(name) as scratch:
             job = Job(self.listener.progress, scratch, self.request.seed, self.force_all)
             try:
-                outputs, reason = self._call(step, job)
+                with self._unchanged(step):
+                    outputs, reason = self._call(step, job)
             finally:
                 record.take(job, meter)
             for artifact in step.stage.makes:
@@ -176,6 +182,28 @@ class _Run:
         if set(outputs) != set(step.stage.makes):
             raise TypeError(f"stage {step.stage.name} returned {sorted(outputs)}, promised {sorted(step.stage.makes)}")
         return outputs, ""
+
+    @contextmanager
+    def _unchanged(self, step: Step) -> Iterator[None]:
+        """Refuse what a stage makes, or says, of given files that have changed since their digest was taken."""
+        try:
+            yield
+        except Exception:
+            self._check_given(step)
+            raise
+        self._check_given(step)
+
+    def _check_given(self, step: Step) -> None:
+        for artifact in step.inputs:
+            if artifact not in self.given_digests:
+                continue  # made by another stage
+            one = self.request.given[artifact]
+            if digest_given(one) != self.given_digests[artifact]:
+                raise InputError(
+                    f"given.{one.key} has changed while it was read",
+                    where=", ".join(map(str, one.paths)),
+                    hint="run the same command again when it is complete",
+                )
 
     def _finals(self, steps: list[tuple[int, Step]]) -> None:
         for number, step in steps:
@@ -198,6 +226,5 @@ class _Run:
         if artifact in self.results:
             return self.results[artifact].digest(artifact)
         if artifact not in self.given_digests:
-            source = self.request.given[artifact].source
-            self.given_digests[artifact] = digest_path(source) if isinstance(source, Path) else digest_value(source)
+            self.given_digests[artifact] = digest_given(self.request.given[artifact])
         return self.given_digests[artifact]
