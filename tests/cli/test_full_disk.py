@@ -77,7 +77,7 @@ def test_a_full_disk_is_told_with_what_to_do(vto, disk):
     fill(disk, 8)
     said = vto("run", "toy.yaml", "-o", disk / "run", "--json")
     assert (said.code, said.data["exit_code"]) == (3, 3)
-    assert said.data["error"]["hint"] == "make room; the same command again goes on where this one stopped"
+    assert said.data["error"]["hint"] == "make room; the same command again resumes where this one stopped"
 
 
 def test_a_read_only_disk_takes_no_run_and_shows_one(vto, disk):

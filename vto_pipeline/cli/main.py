@@ -41,7 +41,7 @@ INTERRUPTED = 130
 
 ADVICE = {
     **dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS, errno.ELOOP, errno.ENAMETOOLONG), ""),
-    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT), "make room; the same command again goes on where this one stopped"),
+    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT), "make room; the same command again resumes where this one stopped"),
     **dict.fromkeys(
         (errno.EIO, errno.ESTALE, errno.ETIMEDOUT, errno.EHOSTDOWN, errno.ENOTCONN),
         "is the disk or the network folder still there?",

@@ -96,7 +96,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def remove_partial(folder: Path) -> None:
-    """Remove what processes that were killed left of `replacing` in a folder that nobody else writes to."""
+    """Remove what killed processes left of `replacing` in a folder that is locked."""
     for rest in folder.glob(f".*{_PARTIAL}*"):
         rest.unlink(missing_ok=True)
 

@@ -12,6 +12,7 @@ from vto_pipeline.errors import ComputationError, ConfigError, InputError, VtoEr
 from vto_pipeline.io.documents import suggest
 from vto_pipeline.model.job import Job
 from vto_pipeline.pipeline.catalogue import Catalogue
+from vto_pipeline.pipeline.execution.budget import Budget
 from vto_pipeline.pipeline.execution.cost import Meter
 from vto_pipeline.pipeline.execution.digest import digest_given
 from vto_pipeline.pipeline.execution.final import make_final
@@ -35,6 +36,7 @@ def run(
     listener: Listener | None = None,
     cache: Path | None = None,
     afresh: str | None = None,
+    time_budget: float | None = None,
 ) -> dict[str, Any]:
     """Run a plan in a folder, resuming from the results of earlier runs.
 
@@ -47,6 +49,8 @@ def run(
         listener: Receives how it goes.
         cache: Where results are kept, which several runs may share; None: in the run's folder.
         afresh: Stage that is made anew, with all that depends on it, though results are stored.
+        time_budget: Wall time of the whole run [s]; what other stages leave of it is the budget of one that can stop in
+            time. None: each has what its settings say.
 
     Returns:
         What run.json holds.
@@ -59,7 +63,8 @@ def run(
     renewed = _dependents(afresh, plan) if afresh is not None else frozenset()
     with locked_run_folder(folder, [path for one in request.given.values() for path in one.paths]):
         store = Store(folder / "cache" if cache is None else cache)
-        runner = _Run(request, plan, catalogue, folder, store, force_all, listener or Listener(), renewed)
+        budget = None if time_budget is None else Budget(time_budget, plan, store)
+        runner = _Run(request, plan, catalogue, folder, store, force_all, listener or Listener(), renewed, budget)
         return runner.run_all()
 
 
@@ -89,12 +94,13 @@ class _Run:
         force_all: bool,
         listener: Listener,
         renewed: frozenset[str],
+        budget: Budget | None,
     ) -> None:
         self.request, self.plan, self.catalogue = request, plan, catalogue
         self.force_all, self.listener, self.renewed = force_all, listener, renewed
-        self.store = store
+        self.store, self.budget = store, budget
         self.out = OutputFolder(folder / "out", catalogue)
-        self.record = RunRecord(folder / RECORD, request, plan)
+        self.record = RunRecord(folder / RECORD, request, plan, None if budget is None else budget.seconds)
         self.results: dict[str, Result] = {}
         self.given_digests: dict[str, str] = {}
 
@@ -178,7 +184,8 @@ class _Run:
         reason = skip(inputs) if skip is not None else None
         if reason:
             return {made: inputs[source] for made, source in step.stage.passes.items()}, reason
-        outputs = dict(step.stage.run(inputs, step.settings, job))
+        settings = step.settings if self.budget is None else self.budget.share(step, job)
+        outputs = dict(step.stage.run(inputs, settings, job))
         if set(outputs) != set(step.stage.makes):
             raise TypeError(f"stage {step.stage.name} returned {sorted(outputs)}, promised {sorted(step.stage.makes)}")
         return outputs, ""
