@@ -101,8 +101,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         6 a batch ended with failures, 130 interrupted. Our own bugs (1) are left to Python, with their traceback.
     """
     session = Session()
+    stopped = False
+
+    def stop(*_: object) -> None:
+        nonlocal stopped
+        stopped = True
+        raise KeyboardInterrupt
+
     with suppress(ValueError):  # not the main thread
-        signal.signal(signal.SIGTERM, signal.default_int_handler)  # an end like Ctrl-C: temporary files are removed
+        for name in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(name, stop)
     try:
         code = vto.main(args=arguments, prog_name="vto", standalone_mode=False, obj=session)
         return code if isinstance(code, int) else 0
@@ -118,12 +126,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
         problem, hint = f"the system refuses: {error.strerror}", ADVICE[error.errno]
         return session.fail(InputError(problem, where=str(error.filename or ""), hint=hint))
     except (click.Abort, KeyboardInterrupt):
-        click.echo("interrupted; run the same command again to resume", err=True)
-        return INTERRUPTED
+        return _interrupted()
     except ImportError as error:
         if (error.name or "").startswith("vto_pipeline"):
             raise
         return session.fail(MissingDependencyError(f"cannot load a library: {error}", hint="run `vto doctor`"))
+    except Exception:
+        # Numba's compiler, for one, loses an interrupt and then stumbles over it.
+        if stopped:
+            return _interrupted()
+        raise
+
+
+def _interrupted() -> int:
+    click.echo("interrupted; run the same command again to resume", err=True)
+    return INTERRUPTED
 
 
 if __name__ == "__main__":
