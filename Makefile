@@ -7,10 +7,6 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.installed
 WORKERS ?= auto
 
-BENCHES := solvers integrators stability physics collision drape body scaling
-SAMPLE_RUNS := demo garment_from_depth garment_from_cloud body_from_measurements body_from_silhouettes body_from_cloud \
-	body_from_depth
-
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
@@ -62,13 +58,10 @@ docs: $(READY)  ## Write README.md and docs/ from docs/source and docs/results
 	$(BIN)/python -m vto_pipeline.bench.docs
 
 bench: $(READY)  ## Measure error against run time (hours; `vto bench NAME --quick` takes minutes)
-	$(BIN)/vto bench $(BENCHES)
+	$(BIN)/vto bench all
 
 figures: $(READY)  ## Measure what the pages quote again (under an hour on a quiet machine), and write the pages
-	$(BIN)/vto bench $(BENCHES) --quick --out docs/results
-	for name in $(SAMPLE_RUNS); do \
-		$(BIN)/vto run configs/$$name.yaml -o runs/$$name && \
-		$(BIN)/python -m vto_pipeline.bench runs/$$name --results docs/results || exit; done
+	$(BIN)/vto bench all --quick --out docs/results
 	$(BIN)/python -m vto_pipeline.bench.docs
 
 first-run:  ## In a fresh clone: clock `make demo` and `make test` from nothing

@@ -13,6 +13,7 @@ from vto_pipeline.bench.docs.__main__ import faults
 from vto_pipeline.bench.docs.pages import FIGURES, RESULTS, SOURCES, render_pages
 from vto_pipeline.bench.docs.prose import LONGEST, count_words, long_sentences, typed_figures
 from vto_pipeline.bench.docs.results import Results
+from vto_pipeline.bench.sample_runs import SAMPLES
 from vto_pipeline.errors import ConfigError, InputError
 from vto_pipeline.io.bodies.measurements import read_measurements
 from vto_pipeline.io.captures.photos import read_board
@@ -193,6 +194,6 @@ def test_examples_are_read_as_they_stand(page, block, tmp_path):
 
 
 def test_every_results_file_comes_from_a_bench_or_a_sample_run():
-    known = {*BENCHES, *(path.stem for path in (ROOT / "configs").glob("*.yaml"))}
+    known = {*BENCHES, *SAMPLES}
     found = {path.stem for path in (ROOT / RESULTS).glob("*.json")}
     assert {name for name in found if not name.startswith("first_run_")} <= known

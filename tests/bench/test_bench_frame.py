@@ -36,7 +36,7 @@ class Counted:
         if k == self.interrupted_before:
             raise KeyboardInterrupt
         self.measured.append(k)
-        return Timing(1.0 + k, 3, 0.5), {"rms_mm": 10.0**-k, "worst_mm": float("inf")}
+        return Timing(1.0 + k, 3, 0.5, 0.25), {"rms_mm": 10.0**-k, "worst_mm": float("inf")}
 
 
 @pytest.fixture
@@ -74,6 +74,7 @@ def test_document_and_picture(bench_of, tmp_path):
         "runs": 3,
         "compile_s": 0.5,
         "threads": document["machine"]["threads"],
+        "spread_s": 0.25,
     }
 
 
@@ -138,7 +139,7 @@ def test_median_of_three_after_a_warm_run(monkeypatch):
     called: list[str] = []
     result, timing = timed(lambda: called.append("run") or len(called), warm=lambda: called.append("warm"))
     assert called == ["warm", "run", "run", "run"]
-    assert (result, timing) == (4, Timing(2.0, 3, 7.0))
+    assert (result, timing) == (4, Timing(2.0, 3, 7.0, 4.0))
 
 
 def test_a_run_over_the_budget_is_not_repeated(monkeypatch):

@@ -8,8 +8,10 @@ from collections.abc import Iterator
 import pytest
 
 import vto_pipeline.bench as benches
+from vto_pipeline.bench import sample_runs
 from vto_pipeline.bench.bench import Bench, Row, Watch
 from vto_pipeline.bench.timing import Timing
+from vto_pipeline.errors import MissingDependencyError
 
 
 def toy_rows(quick: bool, watch: Watch) -> Iterator[Row]:
@@ -68,3 +70,54 @@ def test_against_other_programs(vto, tmp_path):
     assert "0.250" in said.out
     assert vto("bench", "scaling", "--out", tmp_path, "--against", tmp_path / "peers.jsonl").code == 2
     assert vto("bench", "solvers", "--out", tmp_path, "--against", tmp_path / "absent.jsonl").code == 3
+
+
+@pytest.mark.usefixtures("toy_bench")
+def test_all_stands_for_every_bench_and_sample_document(vto, tmp_path, monkeypatch):
+    ran = []
+    monkeypatch.setattr(
+        sample_runs, "run_sample", lambda name, folder, **_: ran.append(name) or {"bench": name, "rows": []}
+    )
+    monkeypatch.setattr(benches, "BENCHES", {name: benches.BENCHES[name] for name in ("solvers", "peers")})
+    said = vto("bench", "all", "--out", tmp_path, "--json")
+    assert said.code == 0, said.err
+    assert [document["bench"] for document in said.data["benches"]] == ["solvers", "peers", *sample_runs.SAMPLES]
+    assert ran == list(sample_runs.SAMPLES)
+    assert vto("bench", "all", "demo", "--out", tmp_path).code == 0
+
+
+def test_all_leaves_out_what_is_not_installed_and_a_name_does_not(vto, tmp_path, monkeypatch):
+    def absent(self, quick, watch):
+        raise MissingDependencyError("none of the peers is installed")
+
+    monkeypatch.setattr(Bench, "rows", absent)
+    monkeypatch.setattr(sample_runs, "SAMPLES", ())
+    said = vto("bench", "all", "--out", tmp_path)
+    assert (said.code, said.out) == (0, "")
+    assert "bench peers is left out: none of the peers is installed" in said.err
+    assert vto("bench", "peers", "--out", tmp_path).code == 5
+
+
+@pytest.mark.usefixtures("toy_bench")
+def test_what_got_worse_is_listed(vto, tmp_path):
+    vto("bench", "solvers", "--out", tmp_path / "old")
+    vto("bench", "solvers", "--out", tmp_path / "new")
+    same = vto("bench", "--compare", tmp_path / "old", "--out", tmp_path / "new")
+    assert (same.code, same.out.splitlines()[-1]) == (0, "nothing changed")
+    path = tmp_path / "new" / "solvers.json"
+    path.write_text(path.read_text().replace('"rms_stretch": 0.1', '"rms_stretch": 0.3'))
+    said = vto("bench", "solvers", "--compare", tmp_path / "old", "--out", tmp_path / "new")
+    assert said.out.splitlines()[-1].split() == [
+        "worse",
+        "solvers",
+        "hang",
+        "32,",
+        "toy,",
+        "substeps=1",
+        "rms_stretch",
+        "0.1",
+        "0.3",
+    ]
+    data = vto("bench", "--compare", tmp_path / "old", "--out", tmp_path / "new", "--json").data
+    assert [change["verdict"] for change in data[0]["changes"]] == ["worse"]
+    assert vto("bench", "--compare", tmp_path, "--out", tmp_path / "new").code == 3

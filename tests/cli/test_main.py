@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import statistics
 import subprocess
 import sys
 from importlib import import_module
+from pathlib import Path
 
 import click
 import pytest
@@ -73,3 +75,29 @@ def test_the_table_of_commands_is_the_folder(request):
     files = {path.stem for path in (request.config.rootpath / "vto_pipeline" / "cli" / "commands").glob("*.py")}
     assert set(COMMANDS) == files - {"__init__"}
     assert main_module.vto.list_commands(click.Context(main_module.vto)) == list(COMMANDS)
+
+
+LOSING = "try: time.sleep(60)\n    except KeyboardInterrupt: raise RuntimeError('no compiled object yet') from None"
+"""What Numba's compiler makes of an interrupt."""
+
+
+@pytest.mark.parametrize("waiting", ["time.sleep(60)", LOSING], ids=["plain", "lost by a library"])
+@pytest.mark.parametrize("stop", [signal.SIGTERM, signal.SIGINT])
+def test_sigterm_ends_a_command_like_ctrl_c(tmp_path, waiting, stop):
+    """A termination removes temporary files, as a kill cannot."""
+    program = (
+        "import time; from vto_pipeline.cli import main; from vto_pipeline.io.files import process_folder\n"
+        f"def wait(*_, **__):\n    print(process_folder(), flush=True)\n    {waiting}\n"
+        "main.vto.main = wait; raise SystemExit(main.main([]))"
+    )
+    environment = {**os.environ, "TMPDIR": str(tmp_path)}
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+    ) as process:
+        assert process.stdout is not None
+        folder = Path(process.stdout.readline().strip())
+        assert folder.is_dir()
+        process.send_signal(stop)
+        _, said = process.communicate()
+    assert (process.returncode, said) == (130, "interrupted; run the same command again to resume\n")
+    assert not folder.exists()

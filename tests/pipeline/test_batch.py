@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import threading
@@ -141,6 +142,18 @@ def test_limits_end_a_row_and_all_that_it_has_started(tmp_path: Path) -> None:
     large = run_row(task(tmp_path, "import time; x = bytearray(300_000_000); time.sleep(60)", memory_mb=150.0))
     assert (large.status, large.problem) == ("too large", "it needs more than 150 MB of memory")
     assert large.peak_mb > 150.0
+
+
+@pytest.mark.skipif(shutil.which("setpriv") is None, reason="no setpriv (util-linux)")
+def test_a_row_ends_with_the_worker_that_started_it(tmp_path: Path) -> None:
+    pid = tmp_path / "pid"
+    sleeper = f"import os, time; open({str(pid)!r}, 'w').write(f'{{os.getpid()}} '); time.sleep(100)"
+    worker = f"from vto_pipeline.pipeline.batch.row import RowTask, run_row; run_row({task(tmp_path, sleeper)!r})"
+    with subprocess.Popen([sys.executable, "-c", worker]) as process:
+        while not (pid.is_file() and pid.read_text().endswith(" ")):
+            time.sleep(0.05)
+        process.kill()
+    assert has_ended(int(pid.read_text()))
 
 
 def test_the_ledger_knows_what_is_done(tmp_path: Path) -> None:

@@ -3,6 +3,8 @@
 bench, record, timing, machine, provenance: what a bench is, how it is carried out, and on what
 measures: what several benches read off a cloth
 own_process, live_rows: commands that are run one by one, and their rows
+sample_runs: the sample documents, run and held against the truth
+changes: what got better or worse since earlier results
 cloth/, scaling/, physics/, stability/, collision/, drape/, body/, scan/, peers/: the benches
 samples/: the sample data and its truth
 demo: how far a run on the sample data is from the truth

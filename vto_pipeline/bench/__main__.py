@@ -8,9 +8,7 @@ import sys
 from pathlib import Path
 
 from vto_pipeline.bench.demo import measure_demo
-from vto_pipeline.bench.docs.sample_rows import sample_document
 from vto_pipeline.bench.picture import draw_demo
-from vto_pipeline.io.documents import write_json
 
 
 def main() -> None:
@@ -18,15 +16,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m vto_pipeline.bench", description=__doc__)
     parser.add_argument("run", type=Path, help="folder of a run of configs/demo.yaml or of another sample config")
     parser.add_argument("--samples", type=Path, default=Path("sample_data"), help="the sample data")
-    parser.add_argument("--results", type=Path, metavar="DIR", help="also write DIR/RUN.json")
     parser.add_argument("--picture", type=Path, help="also draw the README's picture into this PNG")
     arguments = parser.parse_args()
     found = measure_demo(arguments.run, arguments.samples)
     json.dump(found, sys.stdout, indent=1)
     sys.stdout.write("\n")
-    if arguments.results is not None:
-        document = sample_document(arguments.run, found)
-        write_json(arguments.results / f"{document['bench']}.json", document)
     if arguments.picture is not None:
         from PIL import Image
 

@@ -6,7 +6,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from importlib import import_module
 from typing import Any
 
@@ -32,6 +32,7 @@ class Row:
         runs: How many times it ran; one when a single run exceeds the budget of `timing.timed`.
         compile_s: What the first, untimed run took on top: compilation, or loading the compiled code [s].
         threads: Threads the kernels could use.
+        spread_s: From the shortest to the longest of its runs [s]; None where there was one.
     """
 
     scene: str
@@ -43,6 +44,7 @@ class Row:
     runs: int = 1
     compile_s: float = 0.0
     threads: int = field(default_factory=threads_now)
+    spread_s: float | None = None
 
     @property
     def key(self) -> str:
@@ -58,8 +60,8 @@ class Row:
 
     @classmethod
     def from_json(cls, plain: Mapping[str, Any]) -> Row:
-        """Return the row that `as_json` wrote."""
-        return cls(**{one.name: plain[one.name] for one in fields(cls)})
+        """Return the row that `as_json` wrote; an older one had no spread."""
+        return cls(**{one.name: plain[one.name] for one in fields(cls) if one.name in plain})
 
 
 class Watch:
@@ -95,7 +97,14 @@ class Watch:
             timing, errors = measure()
         except ComputationError as failure:
             timing, errors = Timing(time.perf_counter() - began), {"status": failure.problem}
-        return Row(scene, method, settings, vertices, timing.seconds, errors, timing.runs, timing.compile_s)
+        return replace(
+            wanted,
+            seconds=timing.seconds,
+            errors=errors,
+            runs=timing.runs,
+            compile_s=timing.compile_s,
+            spread_s=timing.spread_s,
+        )
 
 
 Rows = Callable[[bool, Watch], Iterable[Row]]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ import vto_pipeline
 from vto_pipeline.bench.timing import threads_now
 from vto_pipeline.pipeline.execution.digest import code_identity
 
+_HARDWARE = ("cpu", "cores", "threads", "memory_gb")
 _STATE = ("load_at_start", "niceness")  # how the machine happened to be, not what it is
 
 
@@ -40,6 +42,11 @@ def this_machine() -> dict[str, Any]:
 def same_machine(one: dict[str, Any], other: dict[str, Any]) -> bool:
     """Return whether rows measured on both may stand in one table: the same hardware, software and code."""
     return _identity(one) == _identity(other)
+
+
+def same_hardware(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """Return whether run times on both may be compared; software and code may differ."""
+    return all(one.get(name) == other.get(name) for name in _HARDWARE)
 
 
 def _identity(machine: dict[str, Any]) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -27,11 +27,19 @@ class Timing:
         seconds: Median wall time [s].
         runs: Of how many runs.
         compile_s: What the first call took [s]; zero when there was none.
+        spread_s: From the shortest to the longest run [s]; None where there was only one.
     """
 
     seconds: float
     runs: int = 1
     compile_s: float = 0.0
+    spread_s: float | None = None
+
+    @classmethod
+    def of(cls, walls: Sequence[float], compile_s: float = 0.0) -> Timing:
+        """Return the timing of repeated runs from their wall times [s]."""
+        spread = max(walls) - min(walls) if len(walls) > 1 else None
+        return cls(statistics.median(walls), len(walls), compile_s, spread)
 
 
 def timed(
@@ -51,7 +59,7 @@ def timed(
     while len(walls) < runs and sum(walls) + walls[-1] <= runs * budget and walls[-1] <= budget:
         result, seconds = clocked(run)
         walls.append(seconds)
-    return result, Timing(statistics.median(walls), len(walls), compile_s)
+    return result, Timing.of(walls, compile_s)
 
 
 def threads_now() -> int:

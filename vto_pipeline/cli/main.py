@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import signal
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from difflib import get_close_matches
-from errno import EACCES, EDQUOT, EIO, ELOOP, ENAMETOOLONG, ENOSPC, EPERM, EROFS
 from importlib import import_module
 
 import click
@@ -37,8 +39,16 @@ COMMANDS = {
 
 INTERRUPTED = 130
 
-REFUSED = frozenset({EACCES, EPERM, EROFS, ELOOP, ENAMETOOLONG, EIO, ENOSPC, EDQUOT})
-"""What an operating system answers when a file, a right or the disk is at fault, and not our own code."""
+ADVICE = {
+    **dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS, errno.ELOOP, errno.ENAMETOOLONG), ""),
+    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT), "make room; the same command again resumes where this one stopped"),
+    **dict.fromkeys(
+        (errno.EIO, errno.ESTALE, errno.ETIMEDOUT, errno.EHOSTDOWN, errno.ENOTCONN),
+        "is the disk or the network folder still there?",
+    ),
+    errno.EMFILE: "raise the limit of open files: ulimit -n",
+}
+"""What an operating system answers when a file, a right or the disk is at fault, and not our own code -> what to do."""
 
 
 class _LazyGroup(click.Group):
@@ -91,6 +101,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         6 a batch ended with failures, 130 interrupted. Our own bugs (1) are left to Python, with their traceback.
     """
     session = Session()
+    stopped = False
+
+    def stop(*_: object) -> None:
+        nonlocal stopped
+        stopped = True
+        raise KeyboardInterrupt
+
+    with suppress(ValueError):  # not the main thread
+        for name in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(name, stop)
     try:
         code = vto.main(args=arguments, prog_name="vto", standalone_mode=False, obj=session)
         return code if isinstance(code, int) else 0
@@ -101,16 +121,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
         session.answer_error(ConfigError(error.format_message()))
         return error.exit_code
     except OSError as error:
-        if error.errno not in REFUSED:
+        if error.errno not in ADVICE:
             raise
-        return session.fail(InputError(f"the system refuses: {error.strerror}", where=str(error.filename or "")))
+        problem, hint = f"the system refuses: {error.strerror}", ADVICE[error.errno]
+        return session.fail(InputError(problem, where=str(error.filename or ""), hint=hint))
     except (click.Abort, KeyboardInterrupt):
-        click.echo("interrupted; run the same command again to resume", err=True)
-        return INTERRUPTED
+        return _interrupted()
     except ImportError as error:
         if (error.name or "").startswith("vto_pipeline"):
             raise
         return session.fail(MissingDependencyError(f"cannot load a library: {error}", hint="run `vto doctor`"))
+    except Exception:
+        # Numba's compiler, for one, loses an interrupt and then stumbles over it.
+        if stopped:
+            return _interrupted()
+        raise
+
+
+def _interrupted() -> int:
+    click.echo("interrupted; run the same command again to resume", err=True)
+    return INTERRUPTED
 
 
 if __name__ == "__main__":

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
 import click
 
 from vto_pipeline.cli.session import Session
+from vto_pipeline.units import LENGTH_M, TIME_S
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -37,6 +39,25 @@ def _set_log(ctx: click.Context, _: click.Parameter, value: Path | None) -> None
 def _set_verbose(ctx: click.Context, _: click.Parameter, value: bool) -> None:
     ctx.ensure_object(Session).verbose |= value
     logging.basicConfig(level=logging.INFO if value else logging.WARNING, format="%(name)s: %(message)s")
+
+
+class Quantity(click.ParamType):
+    """A positive number with its unit, such as 60s or 0.5mm, in SI.
+
+    Args:
+        units: Name of a unit -> SI.
+    """
+
+    def __init__(self, units: Mapping[str, float]) -> None:
+        self.name = "quantity"
+        self._units = units
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the value in SI."""
+        found = re.fullmatch(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*([a-z]+)\s*", str(value))
+        if found is None or found[2] not in self._units or float(found[1]) == 0.0:
+            self.fail(f"{value!r} is not a positive number with one of the units {', '.join(self._units)}", param, ctx)
+        return float(found[1]) * self._units[found[2]]
 
 
 json_option = click.option(
@@ -68,6 +89,19 @@ afresh_option = click.option(
     "--from", "afresh", metavar="STAGE", help="Make this stage and all that depends on it anew, stored or not."
 )
 force_option = click.option("--force-all", is_flag=True, help="Leave no work out, for comparison.")
+
+
+time_budget_option = click.option(
+    "--time-budget", type=Quantity(TIME_S), metavar="60s", help="Wall time of the run; the drape takes what is left."
+)
+target_error_option = click.option(
+    "--target-error", type=Quantity(LENGTH_M), metavar="1mm", help="Predicted error at which the drape may end."
+)
+
+
+def drape_options(function: Function) -> Function:
+    """Add the options of every command whose run may drape."""
+    return pipeline_options(time_budget_option(target_error_option(function)))
 
 
 def message_options(function: Function) -> Function:

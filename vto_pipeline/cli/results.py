@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import chain
 from typing import Any
 
@@ -44,8 +44,18 @@ def outcome_lines(outcome: Outcome) -> Iterator[str]:
     width = max(len(artifact) for artifact in record["wanted"])
     for artifact in record["wanted"]:
         yield f"  {artifact:<{width}}  {outcome.path(artifact) if outcome.made(artifact) else 'as given'}"
+    if record.get("time_budget_s"):
+        yield f"  of the time budget of {record['time_budget_s']:g} s: {', '.join(_bought(record['stages']))}"
     for name, text in outcome.warnings:
         yield f"  warning from {name.replace('_', ' ')}: {text}"
+
+
+def _bought(stages: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield what each stage that ran took of a time budget, the longest first, and the error reached for it."""
+    for stage in sorted((one for one in stages if one["status"] == "ran"), key=lambda one: -one["seconds"]):
+        error = stage["metrics"].get("error_mm")
+        reached = "" if error is None else f" ({error:.2g} mm of motion left)"
+        yield f"{stage['name']} {stage['seconds']:.1f} s{reached}"
 
 
 def stage_counts(record: Mapping[str, Any]) -> str:

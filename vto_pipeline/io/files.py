@@ -72,6 +72,7 @@ def listed(folder: Path, suffixes: Collection[str]) -> tuple[Path, ...]:
     return tuple(folder / name for name in names)
 
 
+_PARTIAL = ".partial"
 _FOLDERS = ExitStack()
 atexit.register(_FOLDERS.close)
 
@@ -86,12 +87,18 @@ def replacing(path: Path) -> Iterator[Path]:
     """Yield a temporary path, renamed to `path` when the block succeeds: never half a file."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")
+    beside = path.with_name(f".{path.stem}.{os.getpid()}{_PARTIAL}{path.suffix}")
     try:
         yield beside
         os.replace(beside, path)
     finally:
         beside.unlink(missing_ok=True)
+
+
+def remove_partial(folder: Path) -> None:
+    """Remove what killed processes left of `replacing` in a folder that is locked."""
+    for rest in folder.glob(f".*{_PARTIAL}*"):
+        rest.unlink(missing_ok=True)
 
 
 @contextmanager

@@ -16,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Mapping
+from errno import ENOSPC
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from vto_pipeline.io.arrays import Arrays, read_arrays, write_arrays
 SECONDS = 60.0
 MEMORY_BYTES = 4 * 1024**3
 _FILE_BYTES = 4 * 1024**3
-_REFUSED, _OUT_OF_MEMORY = 3, 4  # exit codes of the child
+_REFUSED, _OUT_OF_MEMORY, _OUT_OF_SPACE = 3, 4, 5  # exit codes of the child
 
 
 def run_limited(
@@ -51,6 +52,7 @@ def run_limited(
 
     Raises:
         InputError: what the function raised; FormatError: it crashed, or ran into a limit.
+        OSError: no space is left for the answer.
     """
     with tempfile.TemporaryDirectory(prefix="vto-read-") as folder:
         task = {
@@ -84,6 +86,8 @@ def run_limited(
             refusal = json.loads((Path(folder) / "refusal.json").read_text(encoding="utf-8"))
             kind = FormatError if refusal["format"] else InputError
             raise kind(refusal["problem"], where=refusal["where"] or where, hint=refusal["hint"])
+        if code == _OUT_OF_SPACE:
+            raise OSError(ENOSPC, os.strerror(ENOSPC), tempfile.gettempdir())
         raise FormatError(
             _exit_reason(code, last_words, seconds, memory_bytes), where=where, hint="is the file damaged?"
         )
@@ -133,6 +137,10 @@ def _main(task: Mapping[str, Any]) -> int:
         return _REFUSED
     except MemoryError:
         return _OUT_OF_MEMORY
+    except OSError as e:
+        if e.errno != ENOSPC:
+            raise
+        return _OUT_OF_SPACE
     return 0
 
 

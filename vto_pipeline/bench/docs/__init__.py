@@ -1,6 +1,6 @@
 """The pages of the docs, made from templates and results files.
 
-results, sample_rows: figures from results files
+results: figures from results files
 pages: templates to Markdown
 prose: plain prose, checked
 """

@@ -6,7 +6,6 @@ frames alone: what it prepares before is not counted.
 
 from __future__ import annotations
 
-import statistics
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -77,7 +76,7 @@ def measure_peer(peer: Peer, scene: Scene, settings: Mapping[str, Value]) -> Mea
         except ComputationError as error:
             return Timing(0.0), {"status": error.problem}
     state = simulation.state()
-    timing = Timing(statistics.median(walls), len(walls))
+    timing = Timing.of(walls)
     if not np.isfinite(state.positions).all():
         return timing, {"status": "diverged"}
     return timing, {"status": "ended", **measures(scene, state)}

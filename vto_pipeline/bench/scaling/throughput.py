@@ -66,7 +66,8 @@ def seconds_of(call: Callable[[], object]) -> Timing:
             call()
 
     _, timing = timed(many, runs=5)
-    return Timing(timing.seconds / repeats, timing.runs, first.compile_s)
+    spread = None if timing.spread_s is None else timing.spread_s / repeats
+    return Timing(timing.seconds / repeats, timing.runs, first.compile_s, spread)
 
 
 def _measure(make: Callable[[int, bool], Kernel], count: int, threads: int) -> Measured:

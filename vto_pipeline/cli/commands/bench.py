@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @click.command("bench")
-@click.argument("names", metavar="NAME...", nargs=-1, required=True)
+@click.argument("names", metavar="NAME...", nargs=-1)
 @click.option(
     "--out",
     "folder",
@@ -26,44 +26,107 @@ if TYPE_CHECKING:
     metavar="DIR",
     help="Folder for NAME.json and NAME.png.",
 )
-@click.option("--quick", is_flag=True, help="Run fewer and smaller cases; takes minutes.")
+@click.option("--quick", is_flag=True, help="Run fewer and smaller cases; takes minutes a bench.")
 @click.option("--force", is_flag=True, help="Measure again, ignoring earlier results.")
 @click.option(
     "--against", type=PATH, metavar="FILE.jsonl", help="Results of other programs on the same scenes (solvers only)."
 )
+@click.option(
+    "--compare", "earlier", type=PATH, metavar="OLD", help="Measure nothing: say what in DIR changed since folder OLD."
+)
 @message_options
 @pass_session
 def bench_command(
-    session: Session, names: tuple[str, ...], folder: Path, quick: bool, force: bool, against: Path | None
+    session: Session,
+    names: tuple[str, ...],
+    folder: Path,
+    quick: bool,
+    force: bool,
+    against: Path | None,
+    earlier: Path | None,
 ) -> None:
     """Measure error against run time and plot it.
 
-    Rows already measured on this machine with this code are reused, even from an interrupted run.
+    Rows already measured on this machine with this code are reused, even from an interrupted run. `all` stands for
+    every bench, and for the sample documents in configs/, which are run as they stand and held against their truth.
 
     \b
     vto bench solvers --quick
-    vto bench solvers integrators stability physics scaling --out figures/
+    vto bench all --out docs/results
+    vto bench --compare old/results --out docs/results
     """
     from vto_pipeline.bench import BENCHES
     from vto_pipeline.bench.cloth.comparison import read_peers
     from vto_pipeline.bench.record import Files, run_bench
-    from vto_pipeline.errors import ConfigError
+    from vto_pipeline.bench.sample_runs import SAMPLES, run_sample
+    from vto_pipeline.errors import ConfigError, MissingDependencyError
 
-    unknown = [name for name in names if name not in BENCHES]
-    if unknown:
-        raise ConfigError(f"no such bench: {', '.join(unknown)}", hint=f"one of {', '.join(BENCHES)}")
-    if against is not None and "solvers" not in names:
+    every = (*BENCHES, *SAMPLES)
+    unknown = [name for name in names if name not in (*every, "all")]
+    if unknown or not (names or earlier):
+        problem = f"no such bench: {', '.join(unknown)}" if unknown else "which bench?"
+        raise ConfigError(problem, hint=f"all, or one of {', '.join(every)}")
+    wanted = every if "all" in names else tuple(dict.fromkeys(names))
+    if earlier is not None:
+        _tell_changes(session, earlier, folder, () if "all" in names else wanted)
+        return
+    if against is not None and "solvers" not in wanted:
         raise ConfigError("--against applies only to the bench solvers", hint="vto bench solvers --against FILE.jsonl")
     peers = {} if against is None else {"solvers": read_peers(against)}
-    documents = []
-    for name in dict.fromkeys(names):
-        session.say(f"bench {name}: {BENCHES[name].about}")
-        documents.append(
-            run_bench(name, BENCHES[name], folder, quick=quick, force=force, peers=peers.get(name, ()), say=session.say)
-        )
-    files = [Files.of(document["bench"], folder) for document in documents]
-    data = [{**document, "picture": str(one.picture)} for document, one in zip(documents, files, strict=True)]
+    documents, files = [], []
+    for name in wanted:
+        if name in SAMPLES:
+            session.say(f"sample document {name}")
+            documents.append(run_sample(name, folder, force=force, say=session.say))
+        else:
+            session.say(f"bench {name}: {BENCHES[name].about}")
+            options: dict[str, Any] = {"quick": quick, "force": force, "peers": peers.get(name, ()), "say": session.say}
+            try:
+                documents.append(run_bench(name, BENCHES[name], folder, **options))
+            except MissingDependencyError as error:
+                if name in names:
+                    raise
+                session.say(f"bench {name} is left out: {error.problem}")
+                continue
+        files.append(Files.of(name, folder))
+    data = [
+        {**document, "picture": str(one.picture) if one.picture.is_file() else None}
+        for document, one in zip(documents, files, strict=True)
+    ]
     session.answer({"benches": data}, _lines(documents, files))
+
+
+def _tell_changes(session: Session, earlier: Path, folder: Path, names: tuple[str, ...]) -> None:
+    """Print what got better or worse."""
+    from dataclasses import asdict
+
+    from vto_pipeline.bench.changes import compare_folders
+    from vto_pipeline.cli.tables import table_lines
+
+    found = compare_folders(earlier, folder, names)
+    rows = [
+        (change.verdict, change.bench, change.row, change.figure, _figure(change.old), _figure(change.new))
+        for verdict in ("worse", "better", "other")
+        for one in found
+        for change in one.changes
+        if change.verdict == verdict
+    ]
+    lines = []
+    for one in found:
+        rest = [one.untimed] if one.untimed else []
+        rest += [f"{len(one.gone)} rows are gone"] if one.gone else []
+        rest += [f"{one.added} rows are new"] if one.added else []
+        lines.append(
+            f"{one.bench}: {one.figures} errors and {one.times} times compared; {'; '.join(rest)}".rstrip("; ")
+        )
+    heads = ("", "bench", "row", "figure", "old", "new")
+    session.answer(
+        [asdict(one) for one in found], [*lines, *(table_lines(heads, rows) if rows else ["nothing changed"])]
+    )
+
+
+def _figure(value: float | str | bool | None) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def _lines(documents: Sequence[Mapping[str, Any]], files: Sequence[Files]) -> Iterator[str]:
@@ -71,7 +134,8 @@ def _lines(documents: Sequence[Mapping[str, Any]], files: Sequence[Files]) -> It
     from vto_pipeline.cli.tables import table_lines
 
     for document, one in zip(documents, files, strict=True):
-        yield f"{one.document}, {one.picture}: {len(document['rows'])} rows"
+        made = [one.document, one.picture] if one.picture.is_file() else [one.document]
+        yield f"{', '.join(map(str, made))}: {len(document['rows'])} rows"
         if "levels" in document:
             heads = ("scene", "rms stretch", "peer", "s", "ours", "budget", "s", "ratio")
             yield from table_lines(heads, [_level_cells(level) for level in document["levels"]])

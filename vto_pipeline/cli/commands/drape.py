@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from vto_pipeline.cli.options import PATH, pipeline_options
+from vto_pipeline.cli.options import PATH, drape_options
 from vto_pipeline.cli.session import Session, pass_session
 
 
@@ -39,7 +39,7 @@ from vto_pipeline.cli.session import Session, pass_session
     help="Preset or fabric file: one for all garments, or one per garment.",
 )
 @click.option("--regraded", is_flag=True, help="Show how it looks in the customer's size, not whether it fits.")
-@pipeline_options
+@drape_options
 @pass_session
 def drape_command(
     session: Session,

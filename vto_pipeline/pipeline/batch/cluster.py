@@ -9,7 +9,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from vto_pipeline.errors import ConfigError, MissingDependencyError
+from vto_pipeline.errors import BatchError, ConfigError, MissingDependencyError
 from vto_pipeline.pipeline.batch.row import RowResult, RowTask, run_row
 
 _SHARE_OF_MEMORY = 0.8  # of the machine's that rows may take together
@@ -36,7 +36,8 @@ def run_rows(tasks: Sequence[RowTask], workers: int, scheduler: str | None, scra
         scratch: Folder for the workers' own files.
 
     Raises:
-        MissingDependencyError: no dask.distributed; ConfigError: no scheduler answers.
+        MissingDependencyError: no dask.distributed; ConfigError: no scheduler answers; BatchError: the workers here do
+            not start.
     """
     try:
         from distributed import Client, LocalCluster, as_completed
@@ -45,9 +46,10 @@ def run_rows(tasks: Sequence[RowTask], workers: int, scheduler: str | None, scra
             "batches need dask.distributed", hint="pip install 'vto-pipeline[batch]'"
         ) from None
     logging.getLogger("distributed").setLevel(logging.WARNING)
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # a scheduler that is gone is told row by row
     with ExitStack() as stack:
-        if scheduler is None:
-            address: Any = stack.enter_context(
+        try:
+            address: Any = scheduler or stack.enter_context(
                 LocalCluster(
                     n_workers=min(workers, len(tasks)),
                     threads_per_worker=1,
@@ -57,8 +59,8 @@ def run_rows(tasks: Sequence[RowTask], workers: int, scheduler: str | None, scra
                     silence_logs=logging.WARNING,
                 )
             )
-        else:
-            address = scheduler
+        except RuntimeError as error:
+            raise BatchError(f"the workers did not start: {error}", hint="run the same command again") from None
         try:
             client = stack.enter_context(Client(address, timeout="20s"))
         except (OSError, TimeoutError, ValueError) as error:
@@ -72,4 +74,16 @@ def run_rows(tasks: Sequence[RowTask], workers: int, scheduler: str | None, scra
             if future.status == "finished":
                 yield future.result()
             else:
-                yield RowResult(task.name, task.key, "lost", -9, 0.0, 0.0, 1, f"its worker died: {future.exception()}")
+                yield RowResult(task.name, task.key, "lost", -9, 0.0, 0.0, 1, _loss(future))
+
+
+def _loss(future: Any) -> str:
+    """Return why there is no result of a row."""
+    from distributed import KilledWorker
+
+    if future.status == "cancelled":
+        return "the scheduler is gone"
+    error = future.exception()
+    if isinstance(error, KilledWorker):
+        return "each worker that it ran on has died"
+    return f"its worker could not run it: {error}"

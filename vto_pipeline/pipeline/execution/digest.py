@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import vto_pipeline
+from vto_pipeline.errors import InputError
+from vto_pipeline.pipeline.given import Given
 
 _SOURCE = {".py", ".yaml", ".html", ".js", ".css", ".csv", ".npz"}
 
@@ -24,18 +26,30 @@ def digest_file(path: Path) -> str:
 
 
 def digest_path(path: Path) -> str:
-    """Digest of a file (its type and bytes) or of a folder (names and bytes of its visible files)."""
-    if path.is_dir():
-        files = sorted(p for p in path.rglob("*") if p.is_file())
-        names = [(p, p.relative_to(path)) for p in files]
-        return digest_value({n.as_posix(): digest_file(p) for p, n in names if not _hidden(n)})
-    return digest_value([path.suffix.lower(), digest_file(path)])
+    """Digest of a file (its type and bytes) or of a folder (names and bytes of its visible files).
+
+    Raises:
+        InputError: a file is there no longer.
+    """
+    try:
+        if path.is_dir():
+            files = sorted(p for p in path.rglob("*") if p.is_file())
+            names = [(p, p.relative_to(path)) for p in files]
+            return digest_value({n.as_posix(): digest_file(p) for p, n in names if not _hidden(n)})
+        return digest_value([path.suffix.lower(), digest_file(path)])
+    except FileNotFoundError as error:
+        raise InputError("the file was there before and has vanished", where=str(error.filename)) from None
 
 
 def digest_value(value: Any) -> str:
     """Digest of plain data; a path inside it counts by its content, not its name."""
     text = json.dumps(_without_paths(value), sort_keys=True, ensure_ascii=False)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def digest_given(one: Given) -> str:
+    """Digest of what was given: the content of a file or folder, or the value in the document."""
+    return digest_path(one.source) if isinstance(one.source, Path) else digest_value(one.source)
 
 
 @cache

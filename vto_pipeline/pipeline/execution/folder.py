@@ -6,9 +6,11 @@ import fcntl
 import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from errno import EDQUOT, ENOSPC
 from pathlib import Path
 
 from vto_pipeline.errors import ConfigError, InputError
+from vto_pipeline.io.files import remove_partial
 
 _LOCK = ".lock"
 RECORD = "run.json"
@@ -23,7 +25,7 @@ def is_run(folder: Path) -> bool:
 def locked_run_folder(folder: Path, inputs: Iterable[Path] = ()) -> Iterator[None]:
     """Create a run's folder if needed, and lock it.
 
-    The lock is the operating system's, so that a killed run leaves none.
+    The lock is the operating system's, so that a killed run leaves none. What such a run was writing there is removed.
 
     Args:
         folder: RUN.
@@ -52,10 +54,15 @@ def locked_run_folder(folder: Path, inputs: Iterable[Path] = ()) -> Iterator[Non
                 where=str(folder),
                 hint="wait for it to end, or give another folder with -o",
             ) from None
-        lock.truncate(0)
-        lock.write(str(os.getpid()))
-        lock.flush()
-        yield
+        try:
+            os.ftruncate(lock.fileno(), 0)
+            os.write(lock.fileno(), str(os.getpid()).encode())
+            remove_partial(folder)
+            yield
+        except OSError as error:
+            if error.errno in (ENOSPC, EDQUOT) and error.filename is None:
+                error.filename = str(folder)  # what fails to be written has a name, what it is written to has none
+            raise
 
 
 def existing_run(folder: Path) -> Path:

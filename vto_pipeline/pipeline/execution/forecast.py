@@ -6,10 +6,9 @@ import json
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from vto_pipeline.pipeline.execution.digest import digest_path, digest_value
+from vto_pipeline.pipeline.execution.digest import digest_given
 from vto_pipeline.pipeline.execution.key import result_key
 from vto_pipeline.pipeline.execution.store import MANIFEST, Store
 from vto_pipeline.pipeline.plan import Plan
@@ -39,10 +38,7 @@ def forecast(request: Request, plan: Plan, store: Store, force_all: bool = False
         store: Where earlier results are.
         force_all: Of the run.
     """
-    digests = {
-        artifact: digest_path(one.source) if isinstance(one.source, Path) else digest_value(one.source)
-        for artifact, one in request.given.items()
-    }
+    digests = {artifact: digest_given(one) for artifact, one in request.given.items()}
     found = {}
     for step in plan.steps:
         stage = step.stage
@@ -53,15 +49,15 @@ def forecast(request: Request, plan: Plan, store: Store, force_all: bool = False
         if result is not None:
             mine = [a for a in stage.makes if plan.makers.get(a) == stage.name]
             digests |= {artifact: result.digest(artifact) for artifact in mine}
-        record = result.record if result is not None else _latest(store.folder / stage.name)
+        record = result.record if result is not None else latest_record(store, stage.name)
         found[stage.name] = Expected(result is not None, record.get("seconds"), record.get("peak_mb"))
     return found
 
 
-def _latest(folder: Path) -> Mapping[str, Any]:
-    """Return the record of the newest result in a stage's folder that was not skipped, or an empty one."""
+def latest_record(store: Store, stage: str) -> Mapping[str, Any]:
+    """Return the record of a stage's newest result that was not skipped, or an empty one."""
     newest: tuple[float, Mapping[str, Any]] = (0.0, {})
-    for manifest in sorted(folder.glob(f"*/{MANIFEST}")):
+    for manifest in sorted((store.folder / stage).glob(f"*/{MANIFEST}")):
         with suppress(OSError, ValueError, KeyError):  # gone meanwhile, or not ours
             record = json.loads(manifest.read_text(encoding="utf-8"))["record"]
             if not record["reason"]:

@@ -9,6 +9,7 @@ from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from vto_pipeline.io.files import remove_partial
 from vto_pipeline.model.artifact import ArtifactKind
 from vto_pipeline.pipeline.catalogue import Catalogue
 from vto_pipeline.pipeline.execution.digest import digest_file
@@ -65,6 +66,7 @@ class OutputFolder:
         """Create the folder, and remove the partial results of a failed run."""
         self.folder.mkdir(parents=True, exist_ok=True)
         shutil.rmtree(self.partial, ignore_errors=True)
+        remove_partial(self.folder)
         for rest in self.folder.glob(".*"):
             shutil.rmtree(rest, ignore_errors=True)
 

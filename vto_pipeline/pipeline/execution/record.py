@@ -61,7 +61,7 @@ class StageRecord:
 class RunRecord:
     """All of run.json, kept in step with the run."""
 
-    def __init__(self, path: Path, request: Request, plan: Plan) -> None:
+    def __init__(self, path: Path, request: Request, plan: Plan, time_budget: float | None = None) -> None:
         self._path, self._meter = path, Meter()
         uses = sorted({name for step in plan.steps for name in step.stage.uses})
         self.stages = {step.stage.name: StageRecord(step.stage.name) for step in plan.steps}
@@ -75,6 +75,7 @@ class RunRecord:
             "wanted": list(request.want),
             "given": {artifact: _given(one) for artifact, one in request.given.items()},
             "seed": request.seed,
+            "time_budget_s": time_budget,
         }
 
     def as_dict(self) -> dict[str, Any]:

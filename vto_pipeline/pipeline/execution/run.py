@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from vto_pipeline.errors import ComputationError, ConfigError, VtoError
+from vto_pipeline.errors import ComputationError, ConfigError, InputError, VtoError
 from vto_pipeline.io.documents import suggest
 from vto_pipeline.model.job import Job
 from vto_pipeline.pipeline.catalogue import Catalogue
+from vto_pipeline.pipeline.execution.budget import Budget
 from vto_pipeline.pipeline.execution.cost import Meter
-from vto_pipeline.pipeline.execution.digest import digest_path, digest_value
+from vto_pipeline.pipeline.execution.digest import digest_given
 from vto_pipeline.pipeline.execution.final import make_final
 from vto_pipeline.pipeline.execution.folder import RECORD, locked_run_folder
 from vto_pipeline.pipeline.execution.key import result_key
@@ -33,6 +36,7 @@ def run(
     listener: Listener | None = None,
     cache: Path | None = None,
     afresh: str | None = None,
+    time_budget: float | None = None,
 ) -> dict[str, Any]:
     """Run a plan in a folder, resuming from the results of earlier runs.
 
@@ -45,6 +49,8 @@ def run(
         listener: Receives how it goes.
         cache: Where results are kept, which several runs may share; None: in the run's folder.
         afresh: Stage that is made anew, with all that depends on it, though results are stored.
+        time_budget: Wall time of the whole run [s]; what other stages leave of it is the budget of one that can stop in
+            time. None: each has what its settings say.
 
     Returns:
         What run.json holds.
@@ -57,7 +63,8 @@ def run(
     renewed = _dependents(afresh, plan) if afresh is not None else frozenset()
     with locked_run_folder(folder, [path for one in request.given.values() for path in one.paths]):
         store = Store(folder / "cache" if cache is None else cache)
-        runner = _Run(request, plan, catalogue, folder, store, force_all, listener or Listener(), renewed)
+        budget = None if time_budget is None else Budget(time_budget, plan, store)
+        runner = _Run(request, plan, catalogue, folder, store, force_all, listener or Listener(), renewed, budget)
         return runner.run_all()
 
 
@@ -87,12 +94,13 @@ class _Run:
         force_all: bool,
         listener: Listener,
         renewed: frozenset[str],
+        budget: Budget | None,
     ) -> None:
         self.request, self.plan, self.catalogue = request, plan, catalogue
         self.force_all, self.listener, self.renewed = force_all, listener, renewed
-        self.store = store
+        self.store, self.budget = store, budget
         self.out = OutputFolder(folder / "out", catalogue)
-        self.record = RunRecord(folder / RECORD, request, plan)
+        self.record = RunRecord(folder / RECORD, request, plan, None if budget is None else budget.seconds)
         self.results: dict[str, Result] = {}
         self.given_digests: dict[str, str] = {}
 
@@ -126,6 +134,9 @@ class _Run:
             if isinstance(error, ComputationError) and error.partial:
                 self.out.put_partial(error.partial)
             raise
+        except OSError as error:  # a full disk, say; what can no longer be recorded is still told
+            record.status, record.reason = "failed", str(error.strerror)
+            raise
         finally:
             self.record.save()
             self.listener.ended(number, len(self.plan.steps), record)
@@ -156,7 +167,8 @@ class _Run:
         with self.store.making(name) as unfinished, self.store.making(name) as scratch:
             job = Job(self.listener.progress, scratch, self.request.seed, self.force_all)
             try:
-                outputs, reason = self._call(step, job)
+                with self._unchanged(step):
+                    outputs, reason = self._call(step, job)
             finally:
                 record.take(job, meter)
             for artifact in step.stage.makes:
@@ -172,10 +184,33 @@ class _Run:
         reason = skip(inputs) if skip is not None else None
         if reason:
             return {made: inputs[source] for made, source in step.stage.passes.items()}, reason
-        outputs = dict(step.stage.run(inputs, step.settings, job))
+        settings = step.settings if self.budget is None else self.budget.share(step, job)
+        outputs = dict(step.stage.run(inputs, settings, job))
         if set(outputs) != set(step.stage.makes):
             raise TypeError(f"stage {step.stage.name} returned {sorted(outputs)}, promised {sorted(step.stage.makes)}")
         return outputs, ""
+
+    @contextmanager
+    def _unchanged(self, step: Step) -> Iterator[None]:
+        """Refuse what a stage makes, or says, of given files that have changed since their digest was taken."""
+        try:
+            yield
+        except Exception:
+            self._check_given(step)
+            raise
+        self._check_given(step)
+
+    def _check_given(self, step: Step) -> None:
+        for artifact in step.inputs:
+            if artifact not in self.given_digests:
+                continue  # made by another stage
+            one = self.request.given[artifact]
+            if digest_given(one) != self.given_digests[artifact]:
+                raise InputError(
+                    f"given.{one.key} has changed while it was read",
+                    where=", ".join(map(str, one.paths)),
+                    hint="run the same command again when it is complete",
+                )
 
     def _finals(self, steps: list[tuple[int, Step]]) -> None:
         for number, step in steps:
@@ -198,6 +233,5 @@ class _Run:
         if artifact in self.results:
             return self.results[artifact].digest(artifact)
         if artifact not in self.given_digests:
-            source = self.request.given[artifact].source
-            self.given_digests[artifact] = digest_path(source) if isinstance(source, Path) else digest_value(source)
+            self.given_digests[artifact] = digest_given(self.request.given[artifact])
         return self.given_digests[artifact]

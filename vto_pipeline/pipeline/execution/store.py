@@ -77,9 +77,10 @@ class Store:
     def making(self, stage: str) -> Iterator[Path]:
         """A folder to make a result in; gone afterwards unless `finish` moved it."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        folder = Path(tempfile.mkdtemp(prefix=f"{_UNFINISHED}{stage}-", dir=self.folder))
-        held = os.open(folder, os.O_RDONLY)
-        fcntl.flock(held, fcntl.LOCK_EX)
+        with self._beginning(fcntl.LOCK_SH):
+            folder = Path(tempfile.mkdtemp(prefix=f"{_UNFINISHED}{stage}-", dir=self.folder))
+            held = os.open(folder, os.O_RDONLY)
+            fcntl.flock(held, fcntl.LOCK_EX)
         try:
             yield folder
         finally:
@@ -124,11 +125,22 @@ class Store:
 
     def sweep(self) -> None:
         """Remove what interrupted runs left, and nothing that a run at work is making."""
-        for folder in self.folder.glob(f"{_UNFINISHED}*"):
-            with suppress(OSError):  # held by its run, or just gone
-                held = os.open(folder, os.O_RDONLY)
-                try:
-                    fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                    shutil.rmtree(folder, ignore_errors=True)
-                finally:
-                    os.close(held)
+        unfinished = list(self.folder.glob(f"{_UNFINISHED}*"))
+        if not unfinished:
+            return
+        with suppress(BlockingIOError), self._beginning(fcntl.LOCK_EX | fcntl.LOCK_NB):
+            for folder in unfinished:
+                with suppress(OSError):  # held by its run, or just gone
+                    held = os.open(folder, os.O_RDONLY)
+                    try:
+                        fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                        shutil.rmtree(folder, ignore_errors=True)
+                    finally:
+                        os.close(held)
+
+    @contextmanager
+    def _beginning(self, operation: int) -> Iterator[None]:
+        """Hold the lock between the making of an unfinished folder and its being held, when it looks abandoned."""
+        with (self.folder / ".lock").open("w") as lock:
+            fcntl.flock(lock, operation)
+            yield

@@ -8,14 +8,17 @@ from pathlib import Path
 from shutil import copyfile
 from typing import Any
 
-from vto_pipeline.errors import ComputationError
+from vto_pipeline.errors import ComputationError, ConfigError
 from vto_pipeline.io.documents import Document, load_yaml
 from vto_pipeline.io.files import replacing
+from vto_pipeline.pipeline.execution.budget import SETTING
 from vto_pipeline.pipeline.execution.listener import Listener
 from vto_pipeline.pipeline.execution.run import run as run_plan
 from vto_pipeline.stages.entry import planning
 from vto_pipeline.stages.entry.documents import Order, drape_order, fit_order, scan_order
 from vto_pipeline.stages.entry.outcome import Outcome
+
+_DRAPE = "drape"
 
 Settings = Mapping[str, Any]
 """Key such as "drape.target_error_mm" -> value."""
@@ -144,6 +147,8 @@ def run_order(
     cache: Path | None = None,
     until: str | None = None,
     afresh: str | None = None,
+    time_budget: float | None = None,
+    target_error: float | None = None,
 ) -> Outcome:
     """Run a document in a folder, resuming from the results of earlier runs.
 
@@ -157,17 +162,30 @@ def run_order(
         cache: Where results are kept, which several runs may share; None: in RUN.
         until: Stage to stop after; None: all that is wanted is made.
         afresh: Stage that is made anew with all that depends on it, though results are stored.
+        time_budget: Wall time of the whole run [s]: the drape takes what the other stages leave of it.
+        target_error: Error of the drape [m] at which it may end.
 
     Raises:
         VtoError: of whatever kind; a failed computation is recorded in run.json and its partial result named.
     """
     folder = Path(output) if output is not None else order.folder
+    changes = [*overrides, *_budget_settings(time_budget, target_error)]
     request, plan, tables = planning.planned_document(
-        order.document, base or Path.cwd(), overrides, planning.catalogue(), until
+        order.document, base or Path.cwd(), changes, planning.catalogue(), until
     )
+    if len(changes) > len(overrides) and not any(step.stage.section == _DRAPE for step in plan.steps):
+        raise ConfigError("no drape in this run, and no other stage works to a time or an error that can be chosen")
     try:
         record = run_plan(
-            request, plan, tables, folder, force_all=force_all, listener=listener, cache=cache, afresh=afresh
+            request,
+            plan,
+            tables,
+            folder,
+            force_all=force_all,
+            listener=listener,
+            cache=cache,
+            afresh=afresh,
+            time_budget=time_budget,
         )
     except ComputationError as error:
         if error.partial:
@@ -178,6 +196,11 @@ def run_order(
             with replacing(folder / "out" / name) as beside:
                 copyfile(made, beside)
     return Outcome(folder, record, tables)
+
+
+def _budget_settings(time_budget: float | None, target_error: float | None) -> list[str]:
+    found = [] if time_budget is None else [f"{_DRAPE}.{SETTING}={time_budget}"]
+    return found if target_error is None else [*found, f"{_DRAPE}.target_error_mm={1e3 * target_error:g}"]
 
 
 def _path(given: Path | str | None) -> Path | None:

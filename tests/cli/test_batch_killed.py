@@ -1,0 +1,150 @@
+"""Batches whose client, workers and scheduler are killed: what is done stays done, and the same command goes on."""
+
+from __future__ import annotations
+
+import json
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from vto_pipeline.pipeline.batch.ledger import LEDGER, read_ledger
+
+pytest.importorskip("distributed")
+import psutil  # distributed brings it along
+
+TESTS = str(Path(__file__).parents[1])
+ROW = (
+    f"import sys; sys.path.insert(0, {TESTS!r}); from toy_tables import TOY; "
+    "from vto_pipeline.stages.entry import planning; planning.catalogue = lambda: TOY; "
+    "from vto_pipeline.cli.main import main; sys.exit(main())"
+)
+CLIENT = (
+    f"from vto_pipeline.cli.commands import batch; import sys; batch.PROGRAM = (sys.executable, '-c', {ROW!r}); {ROW}"
+)
+ORDER = """\
+schema: 1
+run:
+  schema: 1
+  given: {{left: {{number: left.txt}}, right: {{number: right.txt}}}}
+  want: [squared, page]
+every: {{stages.add.offset: {offsets}}}
+"""
+PATIENCE = 120.0  # s, for a machine that is busy with other things
+
+
+@pytest.fixture
+def client(tmp_path, monkeypatch) -> Callable[..., subprocess.Popen[str]]:
+    """Start `vto batch` on the toy tables, with a row for each offset from 1."""
+    monkeypatch.chdir(tmp_path)
+    Path("left.txt").write_text("3")
+    Path("right.txt").write_text("4")
+
+    def start(rows: int, *arguments: str) -> subprocess.Popen[str]:
+        Path("order.yaml").write_text(ORDER.format(offsets=list(range(1, rows + 1))))
+        command = [sys.executable, "-c", CLIENT, "batch", "order.yaml", "-o", "out", *arguments]
+        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+    return start
+
+
+@pytest.fixture
+def cluster(tmp_path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """A scheduler with two workers, each in a folder of its own, as on two machines: its address, and its process."""
+    module, file = [sys.executable, "-m"], tmp_path / "scheduler.json"
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    options = ["--port", "0", "--no-dashboard", "--scheduler-file", str(file)]
+    scheduler = subprocess.Popen([*module, "distributed.cli.dask_scheduler", *options], **quiet)
+    processes = [scheduler]
+    for name in ("one", "other"):
+        (tmp_path / name).mkdir()
+        options = ["--scheduler-file", str(file), "--nthreads", "1", "--no-dashboard"]
+        command = [*module, "distributed.cli.dask_worker", *options]
+        processes.append(subprocess.Popen(command, cwd=tmp_path / name, **quiet))
+    wait(lambda: file.is_file() and file.read_text().endswith("}"))
+    yield json.loads(file.read_text())["address"], scheduler
+    for process in reversed(processes):
+        process.terminate()
+        process.wait(PATIENCE)
+
+
+def wait(ready: Callable[[], object]) -> None:
+    """Wait until something is so."""
+    began = time.monotonic()
+    while not ready():
+        assert time.monotonic() - began < PATIENCE
+        time.sleep(0.05)
+
+
+def done() -> list[str]:
+    rows = read_ledger(Path("out"))["rows"] if Path("out", LEDGER).is_file() else []
+    return [row["name"] for row in rows if row["status"] == "done"]
+
+
+def results() -> dict[Path, int]:
+    """The finished results, by the number that a folder keeps for life."""
+    return {path.parent: path.parent.stat().st_ino for path in Path("out/cache").glob("*/*/manifest.json")}
+
+
+def squares(rows: int) -> list[str]:
+    return [Path(f"out/rows/row_{offset}/out/squared.txt").read_text() for offset in range(1, rows + 1)]
+
+
+def expected(rows: int) -> list[str]:
+    return [str((2 * 3 + 2 * 4 + offset) ** 2) for offset in range(1, rows + 1)]
+
+
+def workers(process: subprocess.Popen[str]) -> list[psutil.Process]:
+    with suppress(psutil.NoSuchProcess):
+        return [child for child in psutil.Process(process.pid).children() if "spawn_main" in " ".join(child.cmdline())]
+    return []
+
+
+@pytest.mark.parametrize(("rows", "kills"), [(4, 2), pytest.param(9, 40, marks=pytest.mark.slow)])
+def test_kills_of_workers_and_clients_lose_nothing(client, rows, kills):
+    chance, kept, listed, killed = random.Random(5), {}, [], []
+    while True:
+        batch = client(rows, "--workers", "2")
+        wait(lambda batch=batch: workers(batch) or batch.poll() is not None)
+        while batch.poll() is None and len(killed) < kills:
+            time.sleep(chance.uniform(0.0, 2.0))
+            victim = chance.choice([*workers(batch), *workers(batch), batch]) if killed else batch
+            with suppress(psutil.NoSuchProcess, ProcessLookupError):
+                below = psutil.Process(victim.pid).children(recursive=True)
+                victim.send_signal(signal.SIGKILL)
+                killed.append(victim)
+                assert not psutil.wait_procs(below, PATIENCE)[1]
+        said = batch.communicate()[0]
+        assert kept.items() <= results().items()  # not made again
+        assert set(listed) <= set(done())
+        kept, listed = results(), done()
+        if batch.returncode == 0:
+            break
+        assert batch.returncode in (-signal.SIGKILL, 6), said
+    assert killed
+    assert squares(rows) == expected(rows)
+
+
+def test_two_machines_do_a_batch_and_a_scheduler_that_dies_is_told(client, cluster):
+    address, scheduler = cluster
+    batch = client(4, "--scheduler", address)
+    wait(lambda: done() or batch.poll() is not None)
+    scheduler.kill()
+    said = batch.communicate()[0]
+    assert batch.returncode == 6, said
+    assert "the scheduler is gone" in said
+    assert "Traceback" not in said
+    kept, listed = results(), done()
+    assert listed
+    again = client(4)
+    said = again.communicate()[0]
+    assert again.returncode == 0, said
+    assert f"{len(listed)} of 4 rows are done and unchanged" in said
+    assert kept.items() <= results().items()
+    assert squares(4) == expected(4)
