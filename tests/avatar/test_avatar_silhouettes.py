@@ -34,7 +34,7 @@ from vto_pipeline.model.body import Avatar, Measurements
 from vto_pipeline.model.frames import Silhouettes
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
-from vto_pipeline.render.rasterise import rasterise
+from vto_pipeline.numerics.rasterise import rasterise
 
 BODIES = Path(__file__).parents[3] / "shared" / "data" / "bodies"
 SAMPLES = Path(__file__).parents[2] / "sample_data"

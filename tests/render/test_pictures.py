@@ -7,9 +7,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.numerics.rasterise import rasterise
 from vto_pipeline.render.marks import mark_places
 from vto_pipeline.render.pictures import BACK, FRONT, LEFT, render_picture
-from vto_pipeline.render.rasterise import rasterise
 from vto_pipeline.render.tint import tint
 
 RED, GREEN = (220, 40, 40), (40, 200, 60)

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from pathlib import Path
+
 import numpy as np
 from pydantic import Field
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.coarse_align import PlacementSearch, tilted_rotations, upright_rotations
-from vto_pipeline.garment.robust_icp import MannequinAlignment, robust_icp
+from vto_pipeline.garment.outline.edges import load_edges
+from vto_pipeline.garment.outline.search import OutlineConfig, place_by_outline
+from vto_pipeline.garment.robust_icp import MannequinAlignment, robust_icp, scale_of
 from vto_pipeline.garment.scale_search import scaled_starts
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import face_area_vectors, face_normals
 from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.camera import CameraSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
@@ -25,6 +31,8 @@ BAND_SIGMAS = 1.5
 """The band ends at so many standard deviations of the scan's noise: tight cloth lies hardly further out. The noise
 looks larger while the placement is off, so that the band is tightened several times."""
 LEAST_BAND = 5e-4
+FEW = 2000
+"""Scan points that rank the starts."""
 SAME_SCALE = 0.02
 """Placements whose scales differ by no more than this share are one."""
 SPACING = 0.01
@@ -39,36 +47,147 @@ class AlignConfig(Config):
     candidates: int = Field(6, ge=1, le=50, description="Placements refined; twice as many where the scale is unknown")
     widest_band_mm: float = Field(3.0, ge=0.2, le=20, description="Farther out, a point is never bare mannequin [mm]")
     enough_bare: float = Field(0.03, ge=0, le=1, description="Least share of the scan that must lie on bare mannequin")
-    upright_bare: float = Field(0.08, ge=0, le=1, description="Below this share, other up axes are tried too")
+    upright_bare: float = Field(
+        0.08, ge=0, le=1, description="Below this share, the outline in the photos or other up axes are tried"
+    )
     most_inside: float = Field(0.02, ge=0, le=1, description="Largest share of the scan inside the mannequin")
     worst_sigma_mm: float = Field(1.0, ge=0.01, le=50, description="Largest placement uncertainty accepted [mm]")
     rival_merit: float = Field(
         0.9, gt=0, le=1, description="A placement of another scale that is nearly as good is an error [share]"
     )
+    outline: OutlineConfig = Field(default_factory=OutlineConfig, description="The mannequin's outline in photos")
 
 
-def align_to_mannequin(surface: TriangleMesh, mannequin: TriangleMesh, config: AlignConfig, job: Job) -> FloatArray:
+@dataclass(frozen=True)
+class PosedPhotos:
+    """The photos a scan was made from.
+
+    Args:
+        paths: Their files.
+        cameras: In the scan's frame and unit.
+    """
+
+    paths: tuple[Path, ...]
+    cameras: CameraSet
+
+
+def align_to_mannequin(
+    surface: TriangleMesh, mannequin: TriangleMesh, config: AlignConfig, job: Job, photos: PosedPhotos | None = None
+) -> FloatArray:
     """Return mannequin_from_surface, shape (4, 4): rigid, or a similarity where the scan has no scale of its own.
 
-    Only what shows of the bare mannequin (neck, forearms, stand) tells the placement; the garment stands off outwards
-    and is trimmed, and nothing may lie inside. All translations of many rotations are scored at once, the best
-    placements refined by robust point-to-plane steps, the best of these kept.
+    What was scanned of the bare mannequin (neck, forearms, stand) tells the placement. Where that is too little, as of
+    a form without texture, its outline in the photos does.
 
     Raises:
-        GarmentError: too little bare mannequin shows, what shows leaves some motion undetermined, too much of the
-            scan lies inside, or another scale explains it as well.
+        GarmentError: neither settles the placement, and why.
     """
-    distance = SurfaceDistance(mannequin)
-    normals_there = face_normals(mannequin)
-    points, normals, _ = sample_surface(surface, config.samples, job.seed)
-    few = slice(None, None, max(config.samples // 2000, 1))
-    free = not surface.metric
+    scan = _Scan(surface, mannequin, config, job)
+    if photos is None:
+        return scan.on_bare_parts(config.enough_bare, tilted=True)
+    try:
+        return scan.on_bare_parts(config.upright_bare, tilted=False)
+    except GarmentError as error:
+        too_little = error
+    try:
+        found = scan.by_outline(photos)
+    except GarmentError as error:
+        no_outline = error
+    else:
+        job.note(f"the mannequin is placed by its outline in the photos: {too_little.problem}")
+        return found
+    try:
+        found = scan.on_bare_parts(config.enough_bare, tilted=True)
+    except GarmentError as error:
+        raise GarmentError(f"{error.problem}; and {no_outline.problem}", hint=no_outline.hint) from None
+    job.warn(f"little bare mannequin tells the placement, and photos do not confirm it: {no_outline.problem}")
+    return found
 
-    def refined(start: FloatArray, bands: FloatArray, which: slice = slice(None)) -> MannequinAlignment:
-        return robust_icp(points[which], normals[which], distance, normals_there, start, bands, free)
 
-    def best_of(starts: list[FloatArray]) -> MannequinAlignment:
-        rough = [refined(start, COARSE_BANDS, few) for start in starts]
+class _Scan:
+    """One scan to be placed."""
+
+    def __init__(self, surface: TriangleMesh, mannequin: TriangleMesh, config: AlignConfig, job: Job) -> None:
+        self.surface, self.mannequin, self.config, self.job = surface, mannequin, config, job
+        self.distance = SurfaceDistance(mannequin)
+        self.normals_there = face_normals(mannequin)
+        self.points, self.normals, _ = sample_surface(surface, config.samples, job.seed)
+        self.few = slice(None, None, max(config.samples // FEW, 1))
+        self.free = not surface.metric
+
+    def on_bare_parts(self, least: float, tilted: bool) -> FloatArray:
+        """Place the scan by what it shows of the bare mannequin.
+
+        The garment stands off outwards and is trimmed, and nothing may lie inside. All translations of many rotations
+        are scored at once, the best placements refined by robust point-to-plane steps, the best of these kept.
+
+        Args:
+            least: Share of the scan that must lie on bare mannequin; cloth that lies close may pass for some percent.
+            tilted: Whether other up axes are tried.
+
+        Raises:
+            GarmentError: too little bare mannequin shows, what shows leaves some motion undetermined, too much of the
+                scan lies inside, or another scale explains it as well.
+        """
+        config, job = self.config, self.job
+        if self.free:
+            job.progress(0.1, "trying sizes")
+            sized = self._sized(2 * config.candidates)
+            return _accept(self._best_of(sized or [np.eye(4)]), self.surface, least, config, job)
+        job.progress(0.1, "trying upright placements")
+        placed = self._best_of(self._starts(upright_rotations(config.yaw_starts))[: config.candidates])
+        share = float(placed.bare.mean())
+        fits = share >= config.upright_bare and placed.inside <= config.most_inside
+        if fits and not job.force_all:
+            job.leave_out(
+                "other up axes",
+                f"{share:.0%} of the upright scan lies on bare mannequin, {placed.inside:.1%} inside it",
+            )
+        elif tilted:
+            job.progress(0.4, "trying other up axes")
+            tilts = self._starts(tilted_rotations(12, np.deg2rad(15.0)))[: config.candidates]
+            placed = max((placed, self._best_of(tilts)), key=_worth)
+        return _accept(placed, self.surface, least, config, job)
+
+    def by_outline(self, photos: PosedPhotos) -> FloatArray:
+        """Place the scan by the mannequin's outline in its photos.
+
+        Raises:
+            GarmentError: the outline does not settle the placement, or too much of the scan lies inside.
+        """
+        config, job = self.config, self.job
+        job.progress(0.3, "the mannequin's outline in the photos")
+        if self.free:
+            starts = self._sized(config.yaw_starts)
+        else:
+            starts = self._starts(upright_rotations(config.yaw_starts))
+        if not starts:
+            raise GarmentError("the scan fits the mannequin in no size", hint="is it the right mannequin?")
+        edges = load_edges(photos.paths, photos.cameras, self.surface)
+        found = place_by_outline(self.mannequin, self.points[self.few], edges, starts, self.free, config.outline, job)
+        _check_inside(found.fit.inside, config)
+        job.measure(placed_by="outline")
+        if self.free:
+            _tell_scale(scale_of(found.mannequin_from_scan), found.scale_error, job)
+        return found.mannequin_from_scan
+
+    def _starts(self, rotations: list[FloatArray]) -> list[FloatArray]:
+        """The best translation of each rotation, best first."""
+        search = PlacementSearch(self.points, self.mannequin, self.distance, COARSE_CELL)
+        scored = sorted((search.best(rotation) for rotation in rotations), key=lambda found: -found[0])
+        return [placement for _, placement in scored]
+
+    def _sized(self, count: int) -> list[FloatArray]:
+        """Placements in several sizes, best first."""
+        return scaled_starts(self.points[self.few], self.mannequin, self.distance, count, self.config.enough_bare)
+
+    def _refined(self, start: FloatArray, bands: FloatArray, which: slice = slice(None)) -> MannequinAlignment:
+        points, normals = self.points[which], self.normals[which]
+        return robust_icp(points, normals, self.distance, self.normals_there, start, bands, self.free)
+
+    def _best_of(self, starts: list[FloatArray]) -> MannequinAlignment:
+        config = self.config
+        rough = [self._refined(start, COARSE_BANDS, self.few) for start in starts]
         rough = [one for one in rough if one.bare.mean() >= config.enough_bare] or rough[:1]
         best = max(rough, key=_worth)
         rivals = [one for one in rough if _worth(one) > config.rival_merit * _worth(best)]
@@ -81,34 +200,12 @@ def align_to_mannequin(surface: TriangleMesh, mannequin: TriangleMesh, config: A
                 "more of the bare mannequin",
             )
         bands = np.geomspace(COARSE_BANDS[-1], config.widest_band_mm * 1e-3, FINE_BANDS)
-        placed = refined(best.mannequin_from_surface, bands)
+        placed = self._refined(best.mannequin_from_surface, bands)
         for _ in range(TIGHTENINGS):
             band = float(np.clip(BAND_SIGMAS * placed.noise, LEAST_BAND, bands[-1]))
             bands = np.geomspace(bands[-1], band, FINE_BANDS)
-            placed = refined(placed.mannequin_from_surface, bands)
+            placed = self._refined(placed.mannequin_from_surface, bands)
         return placed
-
-    if free:
-        job.progress(0.1, "trying sizes")
-        sized = scaled_starts(points[few], mannequin, distance, 2 * config.candidates, config.enough_bare)
-        placed = best_of(sized or [np.eye(4)])
-        return _accept(placed, surface, config, job)
-    search = PlacementSearch(points, mannequin, distance, COARSE_CELL)
-
-    def starts(rotations: list[FloatArray]) -> list[FloatArray]:
-        scored = sorted((search.best(rotation) for rotation in rotations), key=lambda found: -found[0])
-        return [placement for _, placement in scored[: config.candidates]]
-
-    job.progress(0.1, "trying upright placements")
-    placed = best_of(starts(upright_rotations(config.yaw_starts)))
-    fits = placed.bare.mean() >= config.upright_bare and placed.inside <= config.most_inside
-    if fits and not job.force_all:
-        reason = f"{placed.bare.mean():.0%} of the upright scan lies on bare mannequin, {placed.inside:.1%} inside it"
-        job.leave_out("other up axes", reason)
-    else:
-        job.progress(0.4, "trying other up axes")
-        placed = max((placed, best_of(starts(tilted_rotations(12, np.deg2rad(15.0))))), key=_worth)
-    return _accept(placed, surface, config, job)
 
 
 def _worth(placed: MannequinAlignment) -> float:
@@ -116,26 +213,23 @@ def _worth(placed: MannequinAlignment) -> float:
     return placed.merit * placed.scale**2
 
 
-def _accept(placed: MannequinAlignment, surface: TriangleMesh, config: AlignConfig, job: Job) -> FloatArray:
+def _accept(
+    placed: MannequinAlignment, surface: TriangleMesh, least: float, config: AlignConfig, job: Job
+) -> FloatArray:
     """Measure the placement, and refuse one that the bare parts do not determine."""
     share = float(placed.bare.mean())
-    if share < config.enough_bare:
+    if share < least:
         raise GarmentError(
-            f"only {share:.1%} of the scan lies on bare mannequin; at least {config.enough_bare:.0%} is needed",
+            f"only {share:.1%} of the scan lies on bare mannequin; at least {least:.0%} is needed",
             hint="is it the right mannequin, in metres? the scan should show the neck, arms or stand",
         )
-    if placed.inside > config.most_inside:
-        raise GarmentError(
-            f"{placed.inside:.1%} of the scan lies inside the mannequin; at most {config.most_inside:.0%} is allowed",
-            hint="is it the right mannequin, in metres, in the same pose?",
-        )
+    _check_inside(placed.inside, config)
     sigma, of_scale = _uncertainty(placed, surface, config.samples)
     job.measure(
         inlier_rms_mm=placed.rms * 1e3, inlier_share=share, inside_share=placed.inside, uncertainty_mm=sigma * 1e3
     )
     if not surface.metric:
-        job.measure(scale_source="mannequin", metres_per_unit=placed.scale, scale_error_percent=100 * of_scale)
-        job.note(f"the scan is scaled by the mannequin: standard error {100 * of_scale:.2f} %")
+        _tell_scale(placed.scale, of_scale, job)
     if sigma > config.worst_sigma_mm * 1e-3:
         raise GarmentError(
             f"the visible part of the mannequin leaves its placement uncertain by {sigma * 1e3:.1f} mm; "
@@ -143,6 +237,21 @@ def _accept(placed: MannequinAlignment, surface: TriangleMesh, config: AlignConf
             hint="leave more of the mannequin uncovered, on several sides",
         )
     return placed.mannequin_from_surface
+
+
+def _check_inside(share: float, config: AlignConfig) -> None:
+    """Refuse a placement in which cloth would be inside the mannequin."""
+    if share > config.most_inside:
+        raise GarmentError(
+            f"{share:.1%} of the scan lies inside the mannequin; at most {config.most_inside:.0%} is allowed",
+            hint="is it the right mannequin, in metres, in the same pose?",
+        )
+
+
+def _tell_scale(scale: float, error: float, job: Job) -> None:
+    """Record a scale that comes from the mannequin and its standard error [share]."""
+    job.measure(scale_source="mannequin", metres_per_unit=scale, scale_error_percent=100 * error)
+    job.note(f"the scan is scaled by the mannequin: standard error {100 * error:.2f} %")
 
 
 def _uncertainty(placed: MannequinAlignment, surface: TriangleMesh, samples: int) -> tuple[float, float]:

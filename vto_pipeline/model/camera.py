@@ -52,6 +52,16 @@ class Intrinsics:
             cy=(self.cy - shift) / factor,
         )
 
+    def resized(self, width: int, height: int) -> Intrinsics:
+        """The same camera with another number of pixels."""
+        x, y = width / self.width, height / self.height
+        cx, cy = (self.cx + 0.5) * x - 0.5, (self.cy + 0.5) * y - 0.5
+        return replace(self, width=width, height=height, fx=self.fx * x, fy=self.fy * y, cx=cx, cy=cy)
+
+    def without_distortion(self) -> Intrinsics:
+        """The same camera with a lens that bends nothing."""
+        return replace(self, k1=0.0)
+
 
 @dataclass(frozen=True)
 class CameraSet:

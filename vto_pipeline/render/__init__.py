@@ -1,5 +1,5 @@
 """The detailed garment after the drape, and pictures.
 
 dress, transfer: the render mesh rides on the simulation mesh
-pictures, rasterise, shading, tint, marks: pictures without a display
+pictures, shading, tint, marks: pictures without a display
 """

@@ -9,7 +9,7 @@ import numpy as np
 from vto_pipeline.geometry.topology import concatenate, vertex_normals
 from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
-from vto_pipeline.render.rasterise import rasterise
+from vto_pipeline.numerics.rasterise import rasterise
 from vto_pipeline.render.shading import crevices, matt_brightness
 
 FRONT, LEFT, BACK = 0.0, 90.0, 180.0

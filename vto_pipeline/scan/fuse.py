@@ -10,8 +10,9 @@ from vto_pipeline.errors import ScanError
 from vto_pipeline.geometry.topology import component_areas
 from vto_pipeline.io.captures.depth import frame_color, frame_depth
 from vto_pipeline.io.captures.images import read_image
+from vto_pipeline.io.captures.undistort import undistorted
 from vto_pipeline.model.arrays import ByteArray, FloatArray
-from vto_pipeline.model.camera import CameraSet, Intrinsics
+from vto_pipeline.model.camera import CameraSet
 from vto_pipeline.model.frames import DepthFrameSet, DepthMaps, PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud, TriangleMesh
@@ -154,15 +155,6 @@ def fuse_depth_frames(frames: DepthFrameSet, world_from_cam: FloatArray, config:
         color_of,
     )
     return _fuse(views, config, job)
-
-
-def undistorted(picture: ByteArray, camera: Intrinsics) -> ByteArray:
-    """Return a picture, shape (H, W, 3), as the same camera without distortion would have taken it; black beyond it."""
-    import cv2
-
-    if camera.k1 == 0.0:
-        return picture
-    return np.asarray(cv2.undistort(picture, camera.matrix, np.array([camera.k1, 0.0, 0.0, 0.0])), dtype=np.uint8)
 
 
 def _fuse(views: DepthViews, config: FuseConfig, job: Job) -> TriangleMesh:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vto_pipeline.cloth.rest_shape.from_hanging import RestShapeConfig, rest_shape
-from vto_pipeline.garment.align import AlignConfig, align_to_mannequin
+from vto_pipeline.garment.align import AlignConfig, PosedPhotos, align_to_mannequin
 from vto_pipeline.garment.bare_parts import BareParts
 from vto_pipeline.garment.openings import OpeningsConfig, close_scan_holes, list_openings
 from vto_pipeline.garment.simulation_mesh import SimulationMeshConfig, remesh_for_simulation
@@ -28,7 +28,10 @@ Outputs = Mapping[str, Any]
 
 def _align(inputs: Inputs, settings: AlignConfig, job: Job) -> Outputs:
     mannequin = need_metres(inputs["mannequin_surface"], "the mannequin")
-    placement = align_to_mannequin(inputs["garment_surface"], mannequin, settings, job)
+    photos = None
+    if "garment_photos" in inputs and "garment_cameras" in inputs:
+        photos = PosedPhotos(inputs["garment_photos"].paths, inputs["garment_cameras"])
+    placement = align_to_mannequin(inputs["garment_surface"], mannequin, settings, job, photos)
     return {"garment_placement": placement}
 
 
@@ -81,12 +84,13 @@ def _idle(settings: RestShapeConfig) -> tuple[str, ...]:
 STAGES: tuple[Stage, ...] = (
     Stage(
         name="align",
-        about="the scan aligned to the mannequin (robust ICP on its bare parts)",
+        about="the scan aligned to the mannequin (robust ICP on its bare parts, or its outline in the photos)",
         needs=("garment_surface", "mannequin_surface"),
+        optional=("garment_photos", "garment_cameras"),
         makes=("garment_placement",),
         run=_align,
         settings=AlignConfig,
-        uses=("libigl",),
+        uses=("libigl", "opencv-python-headless", "pyfqmr"),
     ),
     Stage(
         name="subtract",

@@ -1,6 +1,6 @@
 """Camera data.
 
-images, heic, exif: pictures, and what EXIF says of the lens
+images, heic, exif, undistort: pictures, what EXIF says of the lens, pictures without its distortion
 photos, depth: folders of photos and of depth frames
 video: a video, from which photos are taken
 photo_archive: photos that a stage has made

@@ -15,7 +15,7 @@ from pydantic import Field
 
 from vto_pipeline.errors import InputError, ScanError
 from vto_pipeline.io.captures.images import read_image
-from vto_pipeline.model.camera import CameraSet, Intrinsics
+from vto_pipeline.model.camera import CameraSet
 from vto_pipeline.model.frames import DepthMaps, PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
@@ -71,7 +71,7 @@ def estimate_depth_maps(
         hint = "photos about 15 degrees apart work best; is there texture?"
         raise ScanError(f"no two of {len(views)} photos share {config.min_shared_points} sparse points", hint=hint)
     _check_memory(views, pairs, job)
-    pinholes = tuple(_undistorted(view.camera) for view in views)
+    pinholes = tuple(view.camera.without_distortion() for view in views)
     depth = _merge(cameras.names, views, pairs, cloud, seen, config, job)
     merged = DepthMaps(cameras.names, pinholes, cameras.world_from_cam, depth)
     checked = _check(merged, pairs, config, job)
@@ -99,20 +99,9 @@ def _load(photos: PhotoSet, cameras: CameraSet, max_side: int) -> list[StereoVie
         if scale < 1:
             size = (round(gray.shape[1] * scale), round(gray.shape[0] * scale))
             gray = cv2.resize(gray, size, interpolation=cv2.INTER_AREA)
-            camera = resized_camera(camera, *size)
+            camera = camera.resized(*size)
         views.append(StereoView(gray, camera, pose))
     return views
-
-
-def resized_camera(camera: Intrinsics, width: int, height: int) -> Intrinsics:
-    """The same camera with another number of pixels."""
-    x, y = width / camera.width, height / camera.height
-    cx, cy = (camera.cx + 0.5) * x - 0.5, (camera.cy + 0.5) * y - 0.5
-    return Intrinsics(width, height, camera.fx * x, camera.fy * y, cx, cy, camera.k1)
-
-
-def _undistorted(camera: Intrinsics) -> Intrinsics:
-    return Intrinsics(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy)
 
 
 def _check_memory(views: list[StereoView], pairs: list[tuple[int, int]], job: Job) -> None:

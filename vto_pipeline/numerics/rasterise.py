@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-
-from vto_pipeline.model.arrays import FloatArray, IntArray
+from numpy.typing import NDArray
 
 
 @njit(cache=True)
-def rasterise(corners: FloatArray, width: int, height: int) -> tuple[IntArray, FloatArray, FloatArray]:
+def rasterise(
+    corners: NDArray[np.float64], width: int, height: int
+) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
     """Draw triangles into a depth buffer. Where two are equally near, the first stays.
 
     A pixel belongs to a triangle when its centre is inside (edge functions, Pineda 1988).

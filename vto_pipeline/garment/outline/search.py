@@ -1,0 +1,199 @@
+"""The mannequin's placement from its outline: many starts, one winner, or a refusal in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import Field
+
+from vto_pipeline.errors import GarmentError
+from vto_pipeline.garment.outline.contour import ContourMesh
+from vto_pipeline.garment.outline.edges import EdgePhoto
+from vto_pipeline.garment.outline.fit import OutlineFit, OutlineProblem
+from vto_pipeline.geometry.remeshing.decimate import decimate
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.settings import Config
+
+FEW_PHOTOS = 12
+"""So many, from all sides, tell good starts from bad ones."""
+WIDEST, COARSE = 0.06, 0.012
+"""Reach of the first step and of the steps that rank the starts [share of the form's size]."""
+COARSE_STEPS, FINE_STEPS = 8, 12
+FINEST_PX = 3.0
+"""Reach of the last steps, in pixels on the form."""
+UPRIGHT = (1, 3, 4, 5)
+"""Of the seven ways to move, those that leave an upright form upright."""
+LARGEST_FORM = 40_000
+"""Faces; an outline at the pixels of a photo is not changed by more."""
+SAME_PLACE = 0.02
+"""Placements whose points differ by no more than this on average are one [share of the form's size]."""
+SHARED_PX = 0.5
+"""What cameras may all have wrong alike, so that photos do not disagree over it [px]."""
+
+
+class OutlineConfig(Config):
+    """How the mannequin's outline in the photos is used."""
+
+    refined: int = Field(default=4, ge=1, le=50, description="Starts followed to the end")
+    least_support: float = Field(
+        default=0.35, ge=0, le=1, description="Least share of the visible outline that is an edge"
+    )
+    least_photos: int = Field(default=4, ge=2, le=1000, description="Photos that must show some of the outline")
+    rival_support: float = Field(
+        default=0.8, gt=0, le=1, description="Another placement as good as this share is an error"
+    )
+    worst_sigma_mm: float = Field(
+        default=4.0, ge=0.01, le=50, description="Largest placement uncertainty accepted [mm]"
+    )
+
+
+@dataclass(frozen=True)
+class OutlinePlacement:
+    """Where the outline puts the mannequin.
+
+    Args:
+        mannequin_from_scan: Rigid, or a similarity where the scale was free, shape (4, 4).
+        fit: The last step.
+        sigma: Standard error of the least certain point [m].
+        scale_error: Standard error of the scale [share]; 0 where it was known.
+    """
+
+    mannequin_from_scan: FloatArray
+    fit: OutlineFit
+    sigma: float
+    scale_error: float
+
+
+def place_by_outline(
+    form: TriangleMesh,
+    scan: FloatArray,
+    photos: Sequence[EdgePhoto],
+    starts: Sequence[FloatArray],
+    free_scale: bool,
+    config: OutlineConfig,
+    job: Job,
+) -> OutlinePlacement:
+    """Find the placement in which the outline of the form lies on edges of the photos.
+
+    Cloth hides part of the outline and is never inside the form. Each start takes some steps in a few photos with the
+    form upright; the best are followed in all photos, with all ways to move free, to a reach of some pixels.
+
+    Args:
+        form: The mannequin [m].
+        scan: Points of the garment's scan, spread evenly, shape (N, 3), in its own unit.
+        photos: As edges.
+        starts: mannequin_from_scan, each (4, 4), with a scale.
+        free_scale: Whether the scale is unknown.
+        config: Settings.
+        job: Receives progress and the figures.
+
+    Raises:
+        GarmentError: the outline is not found, found in two places, or leaves the placement uncertain.
+    """
+    mesh = ContourMesh(decimate(form, LARGEST_FORM))
+    distance = SurfaceDistance(mesh.mesh)
+    some = np.unique(np.linspace(0, len(photos) - 1, min(len(photos), FEW_PHOTOS)).round().astype(int))
+    few = OutlineProblem(mesh, distance, scan, [photos[k] for k in some])
+    free: tuple[int, ...] = (*UPRIGHT, 6) if free_scale else UPRIGHT
+    rough = []
+    for number, start in enumerate(starts):
+        placement = _inverse(start)
+        for reach in np.geomspace(WIDEST, COARSE, COARSE_STEPS) * mesh.size:
+            placement = few.step(placement, reach, free).scan_from_form
+        rough.append(few.step(placement, COARSE * mesh.size, free, move=False))
+        job.progress(0.4 + 0.3 * (number + 1) / len(starts), f"outline: start {number + 1} of {len(starts)}")
+    chosen = _distinct(sorted(rough, key=_worth, reverse=True), mesh)[: config.refined]
+    every = OutlineProblem(mesh, distance, scan, photos)
+    free = tuple(range(7 if free_scale else 6))
+    fits = []
+    for number, one in enumerate(chosen):
+        placement, last = one.scan_from_form, FINEST_PX * _pixel(one.scan_from_form, photos, mesh)
+        for reach in np.geomspace(2 * COARSE * mesh.size, last, FINE_STEPS):
+            placement = every.step(placement, max(reach, last), free).scan_from_form
+        fits.append(every.step(placement, last, free, move=False))
+        job.progress(0.7 + 0.3 * (number + 1) / len(chosen), f"outline: placement {number + 1} of {len(chosen)}")
+    fits = _distinct(sorted(fits, key=_worth, reverse=True), mesh)
+    return _accept(fits, mesh, photos, free_scale, config, job)
+
+
+def _inverse(transform: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.inv(transform), dtype=np.float64)
+
+
+def _worth(fit: OutlineFit) -> float:
+    return fit.support - fit.inside
+
+
+def _distinct(fits: list[OutlineFit], mesh: ContourMesh) -> list[OutlineFit]:
+    """Of placements that are one, the first."""
+    kept: list[OutlineFit] = []
+    for fit in fits:
+        if all(_apart(fit, other, mesh) > SAME_PLACE for other in kept):
+            kept.append(fit)
+    return kept
+
+
+def _apart(one: OutlineFit, other: OutlineFit, mesh: ContourMesh) -> float:
+    """Mean distance between two placements of the form [share of its size]."""
+    between = np.linalg.solve(one.scan_from_form, other.scan_from_form)
+    moved = mesh.mesh.vertices @ between[:3, :3].T + between[:3, 3]
+    return float(np.linalg.norm(moved - mesh.mesh.vertices, axis=1).mean() / mesh.size)
+
+
+def _pixel(placement: FloatArray, photos: Sequence[EdgePhoto], mesh: ContourMesh) -> float:
+    """Side of a pixel on the form, the median over the photos [m]."""
+    scale = float(np.cbrt(np.linalg.det(placement[:3, :3])))
+    middle = placement[:3, :3] @ mesh.mesh.vertices.mean(axis=0) + placement[:3, 3]
+    away = [photo.cam_from_scan[2, :3] @ middle + photo.cam_from_scan[2, 3] for photo in photos]
+    return float(np.median([abs(z) / p.levels[0].camera.fx for z, p in zip(away, photos, strict=True)])) / scale
+
+
+def _accept(
+    fits: list[OutlineFit],
+    mesh: ContourMesh,
+    photos: Sequence[EdgePhoto],
+    free_scale: bool,
+    config: OutlineConfig,
+    job: Job,
+) -> OutlinePlacement:
+    """Measure the best placement, and refuse it where the photos do not settle it."""
+    best = fits[0]
+    rival = max((_worth(fit) / max(_worth(best), 1e-9) for fit in fits[1:]), default=0.0)
+    shared = SHARED_PX * _pixel(best.scan_from_form, photos, mesh)
+    arm = 0.5 * mesh.size
+    parts = np.array([arm] * 3 + [1.0] * 3 + [arm])[: len(best.covariance)]
+    spread = best.covariance * np.outer(parts, parts)
+    sigma = float(np.sqrt(np.linalg.eigvalsh(spread)[-1] + shared**2))
+    of_scale = float(np.hypot(np.sqrt(best.covariance[6, 6]), shared / arm)) if free_scale else 0.0
+    job.measure(
+        outline_support=round(best.support, 3),
+        outline_rival=round(rival, 3),
+        outline_photos=best.photos,
+        outline_rms_mm=best.rms * 1e3,
+        inside_share=best.inside,
+        uncertainty_mm=sigma * 1e3,
+    )
+    hint = "show more of the bare mannequin (neck, arms, stand) on several sides, before a backdrop of another colour"
+    if best.photos < config.least_photos or best.support < config.least_support:
+        raise GarmentError(
+            f"the mannequin's outline is not in the photos: {best.support:.0%} of it lies on edges in {best.photos} "
+            f"photos; at least {config.least_support:.0%} in {config.least_photos} photos is needed",
+            hint="is it the right mannequin, in metres, in the same pose? " + hint,
+        )
+    if rival > config.rival_support:
+        raise GarmentError(
+            f"the mannequin's outline fits the photos in two places, the second {rival:.0%} as well as the first",
+            hint=hint,
+        )
+    if sigma > config.worst_sigma_mm * 1e-3:
+        raise GarmentError(
+            f"the mannequin's outline leaves its placement uncertain by {sigma * 1e3:.1f} mm; at most "
+            f"{config.worst_sigma_mm:g} mm is allowed",
+            hint=hint,
+        )
+    return OutlinePlacement(_inverse(best.scan_from_form), best, sigma, of_scale)
