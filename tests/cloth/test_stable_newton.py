@@ -74,7 +74,7 @@ MOVED = 1e-4  # m: far from standing still
 
 def test_steps_grow_while_the_force_falls():
     stepper = Steps()
-    polish = StableNewtonSteps(stepper, enough=0.01, still=1e-6)
+    polish = StableNewtonSteps(stepper, enough=0.01)
     polish.choose(True, 5e-3, MOVED)
     assert stepper.exact
     stepper.was_positive_definite = True
@@ -89,7 +89,7 @@ def test_steps_grow_while_the_force_falls():
 
 def test_what_leaves_more_force_is_tried_in_shorter_steps_until_they_are_as_usual():
     stepper = Steps()
-    polish = StableNewtonSteps(stepper, enough=0.01, still=1e-6)
+    polish = StableNewtonSteps(stepper, enough=0.01)
     polish.choose(True, 5e-3, MOVED)
     stepper.was_positive_definite = True
     assert not polish.diverged(0.04, MOVED)  # what is soft comes first
@@ -111,7 +111,7 @@ def test_what_leaves_more_force_is_tried_in_shorter_steps_until_they_are_as_usua
 
 def test_where_cloth_all_but_stands_still_steps_grow_whatever_force_a_micrometre_of_stretch_makes():
     stepper = Steps()
-    polish = StableNewtonSteps(stepper, enough=0.01, still=1e-5)
+    polish = StableNewtonSteps(stepper, enough=0.01)
     polish.choose(True, 0.1, 1e-6)
     stepper.was_positive_definite = True
     lengths = []
@@ -120,12 +120,19 @@ def test_where_cloth_all_but_stands_still_steps_grow_whatever_force_a_micrometre
         polish.choose(True, residual, 1e-6)
         lengths.append(stepper.step)
     assert_allclose(lengths, [4 / 30, 16 / 30, LONGEST])
-    assert polish.diverged(3.2, 1e-4)  # it went somewhere
+    assert polish.diverged(3.2, MOVED)  # it went somewhere
+    while not polish.took_full_step:
+        polish.choose(True, 0.1, 1e-6)
+    polish.choose(True, 0.1, 1e-6)  # all the way, and still out of balance
+    assert stepper.step < LONGEST
+    for _ in range(5):
+        polish.choose(True, 0.1, 1e-6)
+    assert stepper.step == pytest.approx(1 / 30)  # so it is the force that counts
 
 
 def test_short_steps_that_tear_cloth_are_taken_back_and_the_usual_ones_go_on():
     stepper = Steps()
-    polish = StableNewtonSteps(stepper, enough=0.01, still=1e-6)
+    polish = StableNewtonSteps(stepper, enough=0.01)
     assert not polish.diverged(0.17, MOVED)
     polish.choose(True, 0.17, MOVED)
     polish.choose(True, 0.17, MOVED)
@@ -205,7 +212,7 @@ class Indefinite(Steps):
 
     def choices(self, count):
         """Steps per frame and whether they are exact, in so many looks, the cloth all but still."""
-        chooser, chosen = StableNewtonSteps(self, 0.01, 1e-6), []
+        chooser, chosen = StableNewtonSteps(self, 0.01), []
         for _ in range(count):
             chooser.choose(near=True, residual=1.0, moved=MOVED)
             chosen.append((self.substeps, self.exact))

@@ -18,7 +18,6 @@ from vto_pipeline.model.cloth import TraceRow
 _QUIET = 3  # looks in a row under the bound: an oscillating cloth stands still for an instant at each turn
 _COARSE = 2.0  # times the bound: waiting longer for a coarse answer, itself in error by more, is waste
 _STILL, _LONG = 1e-4, 10  # m, looks in a row: what stays within that is waited for no longer, in balance or not
-_SLIGHT = 0.02  # of the bound: a move from look to look that is none
 _VAGUE = 3e-3  # m: what is not known to be stable may still buckle by as much, as dresses of `vto bench drape` do
 _NEAR = 1e-3  # m a look: slow enough to ask whether it is
 _JAMMED = 100.0  # weights left over: cloth on its way to rest has forces of the order of its weight
@@ -130,7 +129,7 @@ def relax_to_rest(
     coarse: FloatArray | None = None
     quiet = still = 0
     stepper.prepare(state.positions)
-    exact, newton_steps = stepper.has_exact_rest, StableNewtonSteps(stepper, limits.residual, _SLIGHT * limits.error)
+    exact, newton_steps = stepper.has_exact_rest, StableNewtonSteps(stepper, limits.residual)
     looks, share = 0, 0.0
     while share < 1.0 and time.perf_counter() < limits.deadline:
         before, known = result.state.positions, stepper.contact_memory

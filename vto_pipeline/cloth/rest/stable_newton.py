@@ -14,6 +14,7 @@ _ASIDE = 10.0  # times the left-over force at its begin, at first: what is soft 
 _FALLS = 0.5  # times that after each look
 _SLIGHT = 0.1  # of the left-over force that is enough: less is no sign of going astray
 _SHORTER = 64.0  # times shorter than usual, at most, where cloth is about to buckle
+_STANDS = 1e-5  # m: a move from look to look that is none, rms over vertices
 _PAUSE = 4  # looks with the usual stiffness where the shortest steps were of no use; twice as many after each time
 _TORN = 100.0  # weights left over: what comes to that in a few short steps has snapped into a place to be torn out of
 _FEW = 3  # of these steps to a look: it is the way that matters there, not the time it takes
@@ -33,20 +34,21 @@ class StableNewtonSteps:
     Where it is not in the shortest ones either, as in cloth that buckles within an edge, time would stand still: so the
     usual stiffness goes on for a while. So it does where short steps snap cloth into a place that it is torn out of.
 
+    Thread hardly stretches: what has moved by a micrometre may pull with many times its weight, and is no farther from
+    rest for that. So where cloth all but stands still, steps grow whatever the force, unless it fails to fall then too.
+
     Args:
         stepper: The cloth among its colliders, prepared; its steps are changed.
         enough: Left-over force, as a share of weight, at which cloth counts as in balance.
-        still: A move from look to look that is none, rms over vertices [m]. Thread hardly stretches: what has moved by
-            a micrometre may pull with many times its weight, and is no farther from rest for that.
     """
 
-    def __init__(self, stepper: Stepper, enough: float, still: float) -> None:
+    def __init__(self, stepper: Stepper, enough: float) -> None:
         self._stepper = stepper
         self._usual = stepper.substeps
         self._enough = enough
-        self._still = still
         self._most = self._before = np.inf
         self._tried = False
+        self._stands = _STANDS
         self._wait, self._pause = 0, _PAUSE
 
     @property
@@ -72,7 +74,7 @@ class StableNewtonSteps:
             moved: How far it went, rms over vertices [m].
         """
         stable, steps = self._stepper.was_positive_definite, self._stepper.substeps
-        strays = stable and steps < self._usual and residual > self._most and moved > self._still
+        strays = stable and steps < self._usual and residual > self._most and moved > self._stands
         tears = not stable and steps > self._usual and residual > max(_TORN, _ASIDE * self._before)
         if strays:
             self._shorten()
@@ -90,7 +92,10 @@ class StableNewtonSteps:
             residual: Left-over force now.
             moved: How far the last look's steps went, rms over vertices [m].
         """
-        stepper, stands = self._stepper, moved <= self._still
+        stepper, stands = self._stepper, moved <= self._stands
+        if self.took_full_step and residual >= self._enough and stands:
+            self._stands, stepper.substeps = 0.0, self._usual
+            return
         if stepper.was_positive_definite and residual > self._most and not stands:
             self._most = _ASIDE * residual
         elif stepper.was_positive_definite:
