@@ -81,13 +81,21 @@ LOSING = "try: time.sleep(60)\n    except KeyboardInterrupt: raise RuntimeError(
 """What Numba's compiler makes of an interrupt."""
 
 
-@pytest.mark.parametrize("waiting", ["time.sleep(60)", LOSING], ids=["plain", "lost by a library"])
+LOADED = "from vto_pipeline.scan.photos.sfm import load_colmap; load_colmap(0)"
+"""A library with a handler of its own."""
+
+
+@pytest.mark.parametrize(
+    ("before", "waiting"),
+    [("pass", "time.sleep(60)"), ("pass", LOSING), (LOADED, "time.sleep(60)")],
+    ids=["plain", "lost by a library", "taken by a library"],
+)
 @pytest.mark.parametrize("stop", [signal.SIGTERM, signal.SIGINT])
-def test_sigterm_ends_a_command_like_ctrl_c(tmp_path, waiting, stop):
+def test_sigterm_ends_a_command_like_ctrl_c(tmp_path, before, waiting, stop):
     """A termination removes temporary files, as a kill cannot."""
     program = (
         "import time; from vto_pipeline.cli import main; from vto_pipeline.io.files import process_folder\n"
-        f"def wait(*_, **__):\n    print(process_folder(), flush=True)\n    {waiting}\n"
+        f"def wait(*_, **__):\n    {before}\n    print(process_folder(), flush=True)\n    {waiting}\n"
         "main.vto.main = wait; raise SystemExit(main.main([]))"
     )
     environment = {**os.environ, "TMPDIR": str(tmp_path)}

@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from vto_pipeline.garment.outline.edges import EdgeLevel
-from vto_pipeline.geometry.topology import edge_face_counts, face_normals
+from vto_pipeline.geometry.topology import edge_face_counts, face_normals, half_edges
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.numerics.rasterise import rasterise
@@ -93,7 +93,7 @@ class ContourMesh:
 def _inner_edges(mesh: TriangleMesh) -> tuple[IntArray, IntArray]:
     """Edges with two faces, shape (E, 2), and those faces, shape (E, 2); others have no inside and outside."""
     edges, count = edge_face_counts(mesh)
-    halves = np.sort(np.stack([mesh.faces, np.roll(mesh.faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    halves = np.sort(half_edges(mesh), axis=1)
     order = np.lexsort((halves[:, 1], halves[:, 0]))
     first = np.cumsum(count) - count
     inner = count == 2

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import signal
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -51,10 +53,7 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
     Raises:
         ScanError: fewer than 3 photos could be placed.
     """
-    import pycolmap
-
-    pycolmap.logging.minloglevel = pycolmap.logging.FATAL.value
-    pycolmap.set_random_seed(job.seed)
+    load_colmap(job.seed)
     with tempfile.TemporaryDirectory(dir=job.scratch) as scratch:
         job.progress(0.0, "features")
         counts = detect(photos, Path(scratch) / "sure.db", SURE, config.features)
@@ -89,6 +88,18 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
         reprojection_px=round(float(model.compute_mean_reprojection_error()), 3),
     )
     return cameras, cloud
+
+
+def load_colmap(seed: int) -> None:
+    """Load COLMAP, quiet and seeded. Its handler of crashes takes SIGTERM too: that stays with who had it."""
+    before = signal.getsignal(signal.SIGTERM)
+    import pycolmap
+
+    if before is not None:
+        with suppress(ValueError):  # not the main thread
+            signal.signal(signal.SIGTERM, before)
+    pycolmap.logging.minloglevel = pycolmap.logging.FATAL.value
+    pycolmap.set_random_seed(seed)
 
 
 def _values(model: Any, names: list[str], config: SfmConfig) -> tuple[CameraSet, PointCloud]:
