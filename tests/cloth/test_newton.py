@@ -105,6 +105,26 @@ def test_damped_steps_solve_their_equation():
     assert left(found) < 1e-6 * left(state.positions)  # 19 iterations that leave a third each, at least
 
 
+@pytest.mark.parametrize("h", [5e-4, 2e-3, FRAME])
+@pytest.mark.parametrize("rayleigh", [0.01, 0.1])
+def test_dampers_do_not_stall_a_step(rayleigh, h, monkeypatch):
+    """Newton converges quadratically: a few iterations leave next to nothing of the forces that set it in motion."""
+    model, state = stirred(8, (0, 7), rayleigh=rayleigh)
+    method, iterations, once = Newton(model), [], Newton._iterate
+    monkeypatch.setattr(method, "_iterate", lambda *a, **k: iterations.append(1) or once(method, *a, **k))
+    method.exact = True
+    y = method.advance(state, empty_contacts(64), h, 1).positions
+
+    def unbalanced(y):
+        forces = model.mass[:, None] * (state.positions + h * state.velocities + h * h * model.gravity - y) / (h * h)
+        add_forces(y, model.constraints, forces)
+        add_damping_forces(y, (y - state.positions) / h, model.constraints, forces)
+        return np.linalg.norm(forces[model.inverse_mass > 0.0])
+
+    assert unbalanced(y) < 0.03 * unbalanced(state.positions + h * state.velocities)
+    assert len(iterations) <= 5
+
+
 def test_free_fall_is_exact():
     model, rest = cloth(6)
     v = np.broadcast_to([0.3, 1.0, -0.2], rest.shape)

@@ -230,8 +230,10 @@ class Newton:
         system.uncouple()
         forces = (model.mass / (h * h))[:, None] * (target - y)
         energy = add_forces(y, model.constraints, forces)
+        drag = np.zeros_like(y)
         if y is not x:
-            add_damping_forces(y, (y - x) / h, model.constraints, forces)
+            add_damping_forces(y, (y - x) / h, model.constraints, drag)
+        forces += drag
         forces[self._held] = 0.0
         if y is x:
             if not measured:  # in the cloth's own frame: speed is no force
@@ -273,7 +275,22 @@ class Newton:
             extensions -= 1
             rounds = max(rounds, 1)
         foreseen = -_quadratic(system.levels, right, move)
-        return self._shortened(y, target, move, h, energy, pushes, foreseen)
+        lost = self._dissipated(y, move, h, drag)
+        parabola = tuple(push + loss for push, loss in zip(pushes, lost, strict=True))
+        return self._shortened(y, target, move, h, energy, parabola, foreseen)
+
+    def _dissipated(self, y: FloatArray, move: FloatArray, h: float, drag: FloatArray) -> tuple[float, float, float]:
+        """Return what dampers add to the objective after a share of 0, ½ and 1 of a move: a parabola [J].
+
+        Args:
+            y, move: [m], shape (V, 3).
+            h: Step [s].
+            drag: Their forces at y [N], shape (V, 3).
+        """
+        more = np.zeros_like(y)
+        add_damping_forces(y, move / h, self._model.constraints, more)
+        slope, bend = -float(np.vdot(drag, move)), -float(np.vdot(more, move))
+        return 0.0, 0.5 * slope + 0.125 * bend, slope + 0.5 * bend
 
     def _assembled(self, y: FloatArray, h: float) -> BlockMatrix:
         """Return the matrix of a step of h [s] at positions y [m], without contacts."""
@@ -305,7 +322,7 @@ class Newton:
         move: FloatArray,
         h: float,
         energy: float,
-        pushes: tuple[float, ...],
+        parabola: tuple[float, ...],
         foreseen: float,
     ) -> _Iteration:
         """Return y + share move with the first share of 1, ½, ¼ ... that does not raise the objective.
@@ -314,17 +331,17 @@ class Newton:
             y, target, move: [m], shape (V, 3).
             h: Step [s].
             energy: Elastic, at y [J].
-            pushes: Energy of the planes after a share of 0, ½ and 1 of the move: a parabola [J].
+            parabola: What planes and dampers hold after a share of 0, ½ and 1 of the move [J].
             foreseen: By how much the objective would fall were it a parabola [J].
         """
-        now = energy + self._inertia(y, target, h) + pushes[0]
-        bend = 2.0 * (pushes[0] - 2.0 * pushes[1] + pushes[2])
-        slope = pushes[2] - pushes[0] - bend
+        now = energy + self._inertia(y, target, h) + parabola[0]
+        bend = 2.0 * (parabola[0] - 2.0 * parabola[1] + parabola[2])
+        slope = parabola[2] - parabola[0] - bend
         for share in backtracking_shares(_SHORTEST):
             there = y + share * move
             energy = add_forces(there, self._model.constraints, np.zeros_like(there))
-            pushed = pushes[0] + share * (slope + share * bend)
-            fall = now - energy - self._inertia(there, target, h) - pushed
+            held = parabola[0] + share * (slope + share * bend)
+            fall = now - energy - self._inertia(there, target, h) - held
             if fall >= -self._allowed - _ROUNDING * now:
                 return _Iteration(there, share, fall, foreseen, now - fall)
         return _Iteration(y, 0.0, 0.0, foreseen, now)
