@@ -143,6 +143,8 @@ def test_short_steps_that_tear_cloth_are_taken_back_and_the_usual_ones_go_on():
     assert not stepper.exact
     polish.choose(True, 0.17, MOVED)
     assert not stepper.exact  # and no other try at once
+    polish.choose(True, 0.009, MOVED)
+    assert stepper.exact  # but in balance there is nothing to be torn out of
 
 
 class Buckling(Steps):

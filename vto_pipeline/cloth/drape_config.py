@@ -40,7 +40,7 @@ class DrapeConfig(StepConfig, PlaceConfig, Materials):
     target_residual: float = Field(
         0.01, ge=0, le=10, description="Rms residual force below which it is at rest, as a share of a vertex's weight"
     )
-    settle_seconds: float = Field(6.0, gt=0, le=600, description="Longest simulated time to reach rest [s]")
+    settle_seconds: float = Field(12.0, gt=0, le=600, description="Longest simulated time to reach rest [s]")
     finest: int = Field(160, ge=1, le=10000, description="Most steps per 1/60 s that refinement may reach")
     time_budget_s: float | None = Field(
         None, gt=0, description="Wall time after which to stop settling [s]; none by default"

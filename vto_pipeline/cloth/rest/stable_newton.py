@@ -108,7 +108,7 @@ class StableNewtonSteps:
             self._most = _ASIDE * max(residual, _SLIGHT * self._enough)
             if self._tried and stepper.substeps >= _SHORTER * self._usual:  # not even so: there is no end to that way
                 self._give_up()
-            near = near and self._wait == 0
+            near = near and (self._wait == 0 or residual < self._enough)
             self._wait = max(self._wait - 1, 0)
             if not near:
                 stepper.substeps = self._usual

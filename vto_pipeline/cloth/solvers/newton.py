@@ -53,6 +53,7 @@ _ROUNDING = 1e-9  # relative change of the objective that is no change
 _CONTACT_ROUNDS = 20  # solutions with a revised set of contacts, an iteration, at most
 _CHANGED = 0.05  # of the contact forces: amiss by less, their set is good enough
 _FEW = 4.0  # contacts' mean force, amiss: with more, what lies on a fine mesh breaks loose in the next step
+_HARDLY = 0.04  # the same with the exact stiffness: a tight garment's contacts bear a hundred times its weight
 _EXTENSIONS = 2  # times an iteration is solved again with what it would have passed through
 _CROSSED = 0.01  # of an edge: how far a plane may be crossed without solving again
 
@@ -267,7 +268,7 @@ class Newton:
             if touches:
                 pushes = tuple(contact_energy(self.active, x, y + share * move) for share in (0.0, 0.5, 1.0))
                 changed = update_active_set(self.active, x, y + move, _CROSSED * model.edge_length)
-                good = min(_CHANGED, _FEW / max(self.pushing_contacts, 1))
+                good = min(_CHANGED, (_HARDLY if self.definite else _FEW) / max(self.pushing_contacts, 1))
             if changed >= good and rounds > 0:
                 continue
             if changed >= good or extensions == 0 or not self._add_contacts_on_path(x, y + move):
