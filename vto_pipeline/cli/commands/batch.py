@@ -76,20 +76,24 @@ def batch_command(
         for one in missing:
             ledger.wait(one.row.name)
         ledger.save()
-        missing = list(_finish_stored(session, missing, folder, store, force_all, ledger))
-        count = workers or default_workers(1e3 * memory)
-        limits = {"seconds": time_limit, "memory_mb": 1e3 * memory, "retries": retries}
-        tasks = [_task(one, folder, force_all, count, limits) for one in missing]
-        began = time.monotonic()
-        for done, result in enumerate(run_rows(tasks, count, scheduler, folder / "workers") if tasks else (), start=1):
-            words = _found(folder / "rows" / result.name) if result.status == "done" else ""
-            ledger.enter(result, words)
-            left = (time.monotonic() - began) / done * (len(tasks) - done)
-            session.say(
-                f"[{done}/{len(tasks)}] {result.name}: {result.status} after {result.seconds:.1f} s"
-                f"{': ' if result.problem or words else ''}{result.problem or words}; about {left:.0f} s left"
-            )
-        ledger.save()
+        try:
+            missing = list(_finish_stored(session, missing, folder, store, force_all, ledger))
+            count = workers or default_workers(1e3 * memory)
+            limits = {"seconds": time_limit, "memory_mb": 1e3 * memory, "retries": retries}
+            tasks = [_task(one, folder, force_all, count, limits) for one in missing]
+            results = run_rows(tasks, count, scheduler, folder / "workers") if tasks else ()
+            began = time.monotonic()
+            for done, result in enumerate(results, start=1):
+                words = _found(folder / "rows" / result.name) if result.status == "done" else ""
+                ledger.enter(result, words)
+                left = (time.monotonic() - began) / done * (len(tasks) - done)
+                session.say(
+                    f"[{done}/{len(tasks)}] {result.name}: {result.status} after {result.seconds:.1f} s"
+                    f"{': ' if result.problem or words else ''}{result.problem or words}; about {left:.0f} s left"
+                )
+        finally:  # also where it is cancelled
+            ledger.save()
+            _write_page(folder)
         _answer(session, folder, ledger)
 
 
@@ -155,21 +159,26 @@ def _found(run: Path) -> str:
     return "; ".join(open_run(run).verdicts)
 
 
-def _answer(session: Session, folder: Path, ledger: Ledger) -> None:
-    """Write the page, and print the outcome.
-
-    Raises:
-        BatchError: not every row is done.
-    """
+def _write_page(folder: Path) -> None:
     from vto_pipeline.io.files import replacing
     from vto_pipeline.pipeline.batch.ledger import read_ledger
     from vto_pipeline.report.batch_page import build_batch_page
 
     batch = read_ledger(folder)
-    pages = {name: f"rows/{name}/out/page.html" for name in ledger.rows}
+    pages = {row["name"]: f"rows/{row['name']}/out/page.html" for row in batch["rows"]}
     pages = {name: page for name, page in pages.items() if (folder / page).is_file()}
     with replacing(folder / "page.html") as beside:
         beside.write_text(build_batch_page(batch, pages), encoding="utf-8")
+
+
+def _answer(session: Session, folder: Path, ledger: Ledger) -> None:
+    """Print the outcome.
+
+    Raises:
+        BatchError: not every row is done.
+    """
+    from vto_pipeline.pipeline.batch.ledger import read_ledger
+
     done = ledger.counts().get("done", 0)
     if done < len(ledger.rows):
         others = ", ".join(f"{count} {status}" for status, count in sorted(ledger.counts().items()) if status != "done")
@@ -178,4 +187,4 @@ def _answer(session: Session, folder: Path, ledger: Ledger) -> None:
             where=str(folder),
             hint=f"`vto status {folder}` lists them; run the same command again to repeat them only",
         )
-    session.answer(batch, [f"{done} rows are done", f"  page  {folder / 'page.html'}"])
+    session.answer(read_ledger(folder), [f"{done} rows are done", f"  page  {folder / 'page.html'}"])
