@@ -8,6 +8,7 @@ from scipy.stats import linregress
 
 from vto_pipeline.bench.bench import Watch
 from vto_pipeline.bench.scaling import direct_solvers
+from vto_pipeline.bench.scaling.batches import batch_rows
 from vto_pipeline.bench.scaling.direct_solvers import direct_rows
 from vto_pipeline.bench.scaling.overhead import _spinning
 from vto_pipeline.bench.scaling.roofline import bandwidth
@@ -88,3 +89,12 @@ def test_a_solver_that_is_not_installed_is_left_out_with_a_reason(monkeypatch):
     said = []
     assert "MKL PARDISO" not in [row.method for row in direct_rows(4, Watch(said.append))]
     assert any("MKL PARDISO is left out: no package pypardiso" in text for text in said)
+
+
+def test_a_row_of_a_batch_costs_less_than_it_may():
+    """By processor time, which leaves out what else runs on this machine."""
+    plan, journal, stored = (row.errors for row in batch_rows(500, 3, Watch()))
+    assert plan["rows"] == 500
+    assert 0.0 < plan["peak_mb"] < 1000.0
+    assert 0.0 < journal["row_cpu_ms"] < 5.0
+    assert 0.0 < stored["row_cpu_ms"] < 50.0

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from toy_tables import CALLS
 
 from vto_pipeline.cli.commands import batch
 
@@ -72,6 +73,23 @@ def test_a_batch_does_what_can_be_done_and_only_the_rest_again(ordered, tmp_path
     status = ordered("status", "november")
     assert status.code == 0
     assert status.out.startswith("3 rows: 3 done")
+
+
+@pytest.mark.filterwarnings("default")  # of dask and its worker processes
+def test_rows_whose_results_are_stored_start_no_process(ordered, monkeypatch: pytest.MonkeyPatch) -> None:
+    Path("table.csv").write_text(TABLE.replace("true", ""))
+    assert ordered("batch", "order.yaml", "-o", "november").code == 0
+    Path("november/batch.json").unlink()
+    Path("november/rows/a/out/squared.txt").unlink()
+    Path("table.csv").write_text(TABLE.replace("true", "") + "d,left.txt,1,\n")  # as row a
+    monkeypatch.setattr(batch, "PROGRAM", ("false",))
+    again = ordered("batch", "order.yaml", "-o", "november", "--json")
+    assert again.code == 0, again.err
+    assert "4 rows had all their results stored" in again.err
+    assert [row["tries"] for row in again.data["rows"]] == [0, 0, 0, 0]
+    assert squared("a") == squared("d") == str((2 * 3 + 2 * 4 + 1) ** 2)
+    assert CALLS == ["page"] * 4
+    assert json.loads(Path("november/documents/d.json").read_text())["stages"] == {"add": {"offset": 1}}
 
 
 def test_a_row_that_cannot_be_planned_stops_all_before_they_begin(ordered, tmp_path: Path) -> None:

@@ -14,7 +14,10 @@ from pathlib import Path
 
 import pytest
 
+from vto_pipeline.cli.main import main
 from vto_pipeline.pipeline.batch.ledger import LEDGER, read_ledger
+from vto_pipeline.pipeline.execution import folder as folder_module
+from vto_pipeline.pipeline.execution.folder import locked_run_folder
 
 pytest.importorskip("distributed")
 import psutil  # distributed brings it along
@@ -148,3 +151,34 @@ def test_two_machines_do_a_batch_and_a_scheduler_that_dies_is_told(client, clust
     assert f"{len(listed)} of 4 rows are done and unchanged" in said
     assert kept.items() <= results().items()
     assert squares(4) == expected(4)
+
+
+def test_a_batch_that_is_cancelled_ends_and_is_resumed(client, capfd):
+    batch = client(3, "--workers", "1")
+    wait(lambda: done() or batch.poll() is not None)
+    below = psutil.Process(batch.pid).children(recursive=True)
+    assert main(["cancel", "out", "--wait", str(PATIENCE), "--json"]) == 0
+    said = batch.communicate()[0]
+    assert json.loads(capfd.readouterr().out) == {"cancelled": True, "process": batch.pid}
+    assert batch.returncode == 130, said
+    assert said.splitlines()[-1] == "interrupted; run the same command again to resume"
+    assert not psutil.wait_procs(below, PATIENCE)[1]
+    listed = done()
+    assert 0 < len(listed) < 3
+    assert "waiting" in Path("out/page.html").read_text()
+    assert main(["cancel", "out"]) == 0
+    assert capfd.readouterr().out == "nothing is at work there\n"
+    again = client(3)
+    said = again.communicate()[0]
+    assert again.returncode == 0, said
+    assert f"{len(listed)} of 3 rows are done and unchanged" in said
+    assert squares(3) == expected(3)
+
+
+def test_what_is_elsewhere_or_no_run_is_not_cancelled(tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    assert main(["cancel", "."]) == 3
+    with locked_run_folder(tmp_path / "run"):
+        monkeypatch.setattr(folder_module, "gethostname", lambda: "another")
+        assert main(["cancel", "run"]) == 2
+    assert "the run is on another machine" in capfd.readouterr().err

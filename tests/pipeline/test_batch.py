@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import subprocess
 import sys
@@ -14,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from vto_pipeline.errors import ConfigError, InputError
+from vto_pipeline.pipeline.batch import ledger as ledger_module
 from vto_pipeline.pipeline.batch.ledger import LEDGER, Ledger, read_ledger
 from vto_pipeline.pipeline.batch.order import read_order
 from vto_pipeline.pipeline.batch.row import RowResult, RowTask, run_row
@@ -82,16 +82,6 @@ def test_a_wrong_batch_is_refused_with_its_place(tmp_path: Path, text: str, tabl
     with pytest.raises(ConfigError, match="^") as caught:
         order(tmp_path, text, table=table)
     assert problem in caught.value.problem
-
-
-def test_the_key_of_a_row_is_what_decides_its_result(tmp_path: Path) -> None:
-    (row,) = order(tmp_path, f"{RUN}rows: [{{name: a}}]\n")
-    key = row.key(False)
-    os.utime(tmp_path / "left.txt", (1, 1))
-    assert row.key(False) == key
-    assert row.key(True) != key
-    (tmp_path / "left.txt").write_text("5")
-    assert row.key(False) != key
 
 
 def task(folder: Path, program: str, **limits: float) -> RowTask:
@@ -169,6 +159,48 @@ def test_the_ledger_knows_what_is_done(tmp_path: Path) -> None:
     (tmp_path / LEDGER).write_text('{"rows": [{}]}')
     with pytest.raises(InputError, match="not the record of a batch"):
         Ledger(tmp_path, ["a"])
+
+
+def test_what_ended_before_a_kill_is_in_the_ledger(tmp_path: Path) -> None:
+    """A process enters rows and is killed by the system while it writes the next."""
+    program = (
+        "import os; from pathlib import Path\n"
+        "from vto_pipeline.pipeline.batch.ledger import JOURNAL, Ledger\n"
+        "from vto_pipeline.pipeline.batch.row import RowResult\n"
+        "ledger = Ledger(Path('.'), [f'r{i}' for i in range(40)]); ledger.save()\n"
+        "for i in range(30): ledger.enter(RowResult(f'r{i}', 'k', 'done', 0, 1.0, 1.0, 1), 'fits')\n"
+        'with open(JOURNAL, \'a\') as journal: journal.write(\'{"name": "r30", "sta\')\n'
+        "os.kill(os.getpid(), 9)"
+    )
+    killed = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, check=False)
+    assert killed.returncode == -9
+    assert read_ledger(tmp_path)["counts"] == {"done": 30, "waiting": 10}
+    names = [f"r{i}" for i in range(40)]
+    again = Ledger(tmp_path, names)
+    again.save()
+    again.enter(RowResult("r30", "k", "failed", 4, 1.0, 1.0, 1, "sum diverged"), "")
+    assert [name for name in names if Ledger(tmp_path, names).is_done(name, "k")] == names[:30]
+    assert read_ledger(tmp_path)["rows"][30]["problem"] == "sum diverged"
+
+
+@pytest.mark.parametrize("rows", [100, 2000])
+def test_a_row_costs_the_same_in_any_batch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rows: int) -> None:
+    """A clock on which a row ends each second, and the files take a millisecond for each row they list."""
+    now, listed = 0.0, 0
+
+    def write(path: Path, value: dict[str, list]) -> None:
+        nonlocal now, listed
+        now += 1e-3 * len(value["rows"])
+        listed += len(value["rows"])
+
+    monkeypatch.setattr(ledger_module, "write_json", write)
+    monkeypatch.setattr(ledger_module.time, "monotonic", lambda: now)
+    ledger = Ledger(tmp_path, [f"r{i}" for i in range(rows)])
+    ledger.save()
+    for i in range(rows):
+        now += 1.0
+        ledger.enter(RowResult(f"r{i}", "k", "done", 0, 1.0, 1.0, 1), "fits")
+    assert 15 < listed / rows < 25  # 1 s : 1 ms : 50; if written after each row, as many as there are rows
 
 
 def test_what_one_run_makes_others_wait_for(tmp_path: Path) -> None:

@@ -44,7 +44,7 @@ def test_each_part_counts(step, inputs, seed, force_all):
 
 def test_a_new_version_or_source_counts(monkeypatch):
     before = result_key(STEP, INPUTS, 0, False)
-    monkeypatch.setattr(key_module.metadata, "version", lambda name: "99")
+    monkeypatch.setattr(key_module, "_version", lambda name: "99")
     assert result_key(STEP, INPUTS, 0, False) != before
     monkeypatch.undo()
     monkeypatch.setattr(key_module, "code_identity", lambda: "another source")

@@ -7,6 +7,7 @@ Which kind of file it is shows in its content: `instrument` heads a sheet of KES
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -64,10 +65,16 @@ def read_fabric(fabric: str | Path | Mapping[str, Any]) -> Fabric:
         if str(fabric) not in names:
             problem = f"{str(fabric)!r} is neither a preset nor a file of type {', '.join(_LOADERS)}"
             raise ConfigError(problem, where="fabric", hint=suggest(str(fabric), names))
-        path, suffix = _PRESETS / f"{fabric}.yaml", ".yaml"
+        return _read_preset(str(fabric))
     return complete_fabric(_read(_LOADERS[suffix](path)))
 
 
+@lru_cache(maxsize=64)  # the rows of a batch name the same few
+def _read_preset(name: str) -> Fabric:
+    return complete_fabric(_read(load_yaml(_PRESETS / f"{name}.yaml")))
+
+
+@cache
 def preset_names() -> tuple[str, ...]:
     """Names of the presets, sorted."""
     return tuple(sorted(path.stem for path in _PRESETS.glob("*.yaml")))

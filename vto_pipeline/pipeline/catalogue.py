@@ -11,9 +11,11 @@ from vto_pipeline.model.settings import Config
 from vto_pipeline.pipeline.stage import Stage
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Catalogue:
     """Stages, artifacts and inputs. Every cross-reference is checked when it is built.
+
+    Equal only to itself, so that what follows from a catalogue can be kept by it.
 
     Args:
         stages: In the order in which people think of them; the order of a plan where its needs leave a choice.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import lru_cache
 from itertools import product
 
 from vto_pipeline.pipeline.catalogue import Catalogue
@@ -10,8 +11,13 @@ from vto_pipeline.pipeline.catalogue import Catalogue
 Ways = set[frozenset[str]]
 
 
-def reachable(given: Iterable[str], catalogue: Catalogue, *, without: str = "") -> set[str]:
+def reachable(given: Iterable[str], catalogue: Catalogue, *, without: str = "") -> frozenset[str]:
     """Artifacts that are given or that some chain of stages makes; `without` is an artifact no stage may make."""
+    return _reachable(frozenset(given), catalogue, without)
+
+
+@lru_cache(maxsize=1024)  # the rows of a batch ask the same over and over
+def _reachable(given: frozenset[str], catalogue: Catalogue, without: str) -> frozenset[str]:
     have = set(given)
     grew = True
     while grew:
@@ -20,7 +26,7 @@ def reachable(given: Iterable[str], catalogue: Catalogue, *, without: str = "") 
             if have.issuperset(stage.needs):
                 have.update(artifact for artifact in stage.makes if artifact != without)
         grew = len(have) > before
-    return have
+    return frozenset(have)
 
 
 def lacking(artifact: str, given: Iterable[str], catalogue: Catalogue, *, only: str | None = None) -> list[list[str]]:
@@ -36,6 +42,11 @@ def lacking(artifact: str, given: Iterable[str], catalogue: Catalogue, *, only: 
         Groups of alternatives; one key of each group would do. Only the smallest additions are considered, and where
         several things are missing at once, the keys of one section are the alternatives.
     """
+    return [list(group) for group in _lacking(artifact, frozenset(given), catalogue, only)]
+
+
+@lru_cache(maxsize=1024)
+def _lacking(artifact: str, given: frozenset[str], catalogue: Catalogue, only: str | None) -> list[list[str]]:
     ways = _ways(artifact, reachable(given, catalogue), catalogue, frozenset(), only)
     fewest = min((len(way) for way in ways), default=0)
     named = {key for way in ways if len(way) == fewest for key in way}
@@ -48,7 +59,9 @@ def lacking(artifact: str, given: Iterable[str], catalogue: Catalogue, *, only: 
     return list(groups.values())
 
 
-def _ways(artifact: str, have: set[str], catalogue: Catalogue, above: frozenset[str], only: str | None = None) -> Ways:
+def _ways(
+    artifact: str, have: frozenset[str], catalogue: Catalogue, above: frozenset[str], only: str | None = None
+) -> Ways:
     """Smallest sets of keys that would make an artifact available; `above` guards against circles."""
     if artifact in have and only is None:
         return {frozenset()}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
@@ -14,6 +15,7 @@ VERSION = 1
 _STRICT = ConfigDict(extra="forbid", frozen=True)
 
 
+@lru_cache(maxsize=32)
 def document_model(catalogue: Catalogue) -> type[BaseModel]:
     """A pydantic model of all sections of a document but `schema`."""
     sections = {name: (kind, kind()) for name, kind in catalogue.sections.items()}

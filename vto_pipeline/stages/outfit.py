@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 from vto_pipeline.assess.allowance import known_kinds
@@ -114,8 +115,11 @@ def outfit_tables(tables: Catalogue, names: Sequence[str]) -> Catalogue:
     Raises:
         ConfigError: a name makes two artifacts share theirs.
     """
-    if not names:
-        return tables
+    return _outfit_tables(tables, tuple(names)) if names else tables
+
+
+@lru_cache(maxsize=32)
+def _outfit_tables(tables: Catalogue, names: tuple[str, ...]) -> Catalogue:
     kinds = {kind.name: kind for kind in tables.kinds}
     own = [_kind(kinds[artifact], name) for name in names for artifact in _OWN]
     rest = [kind for kind in tables.kinds if kind.name not in _OWN]

@@ -11,6 +11,7 @@ import numpy as np
 from vto_pipeline.bench.bench import Measured, Row, Value, Watch
 from vto_pipeline.bench.cloth.scenes import hang, measures
 from vto_pipeline.bench.cloth.solvers import timed_run
+from vto_pipeline.bench.scaling.batches import batch_rows
 from vto_pipeline.bench.scaling.direct_solvers import direct_rows
 from vto_pipeline.bench.scaling.overhead import overhead_rows
 from vto_pipeline.bench.scaling.throughput import kernel_rows
@@ -44,6 +45,7 @@ def rows(quick: bool, watch: Watch) -> Iterable[Row]:
         yield from overhead_rows(count, watch)
     for count in (40,) if quick else (80, 160, 320):
         yield from direct_rows(count, watch)
+    yield from batch_rows(10_000, 20 if quick else 200, watch)
 
 
 def fit_power_law(vertices: Sequence[float], seconds: Sequence[float]) -> PowerLaw:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,12 +12,14 @@ import click
 
 from vto_pipeline.cli.options import PATH, force_option, message_options
 from vto_pipeline.cli.session import Session, pass_session
-from vto_pipeline.errors import BatchError, VtoError
+from vto_pipeline.errors import BatchError
 
 if TYPE_CHECKING:
     from vto_pipeline.pipeline.batch.ledger import Ledger
     from vto_pipeline.pipeline.batch.order import Row
     from vto_pipeline.pipeline.batch.row import RowTask
+    from vto_pipeline.pipeline.execution.store import Store
+    from vto_pipeline.stages.entry.batches import PlannedRow
 
 PROGRAM = (sys.executable, "-c", "import sys; from vto_pipeline.cli.main import main; sys.exit(main())")
 """What runs one row: this program once more, whatever is on the path."""
@@ -58,64 +60,82 @@ def batch_command(
     from vto_pipeline.pipeline.batch.ledger import Ledger
     from vto_pipeline.pipeline.batch.order import read_order
     from vto_pipeline.pipeline.execution.folder import locked_run_folder
+    from vto_pipeline.pipeline.execution.store import Store
+    from vto_pipeline.stages.entry.batches import plan_rows
 
     rows = read_order(document)
     folder = (output or Path("runs") / document.stem).absolute()
-    _check_all(rows)
+    names, store = [row.name for row in rows], Store(folder / "cache")
+    planned = plan_rows(rows, store, Ledger(folder, names).is_done, force_all)
     with locked_run_folder(folder):
-        ledger = Ledger(folder, [row.name for row in rows])
-        keys = {row.name: row.key(force_all) for row in rows}
-        missing = [row for row in rows if not ledger.is_done(row.name, keys[row.name])]
-        missing.sort(key=lambda row: -ledger.expected_seconds(row.name))  # the longest first; stable
+        ledger = Ledger(folder, names)
+        missing = [one for one in planned if not ledger.is_done(one.row.name, one.key)]
+        missing.sort(key=lambda one: -ledger.expected_seconds(one.row.name))  # the longest first; stable
         if len(missing) < len(rows):
             session.say(f"{len(rows) - len(missing)} of {len(rows)} rows are done and unchanged")
-        count = workers or default_workers(1e3 * memory)
-        limits = {"seconds": time_limit, "memory_mb": 1e3 * memory, "retries": retries}
-        tasks = [_task(row, keys[row.name], folder, force_all, count, limits) for row in missing]
-        for row in missing:
-            ledger.wait(row.name)
+        for one in missing:
+            ledger.wait(one.row.name)
         ledger.save()
-        began = time.monotonic()
-        for done, result in enumerate(run_rows(tasks, count, scheduler, folder / "workers") if tasks else (), start=1):
-            words = _found(folder / "rows" / result.name) if result.status == "done" else ""
-            ledger.enter(result, words)
-            left = (time.monotonic() - began) / done * (len(tasks) - done)
-            session.say(
-                f"[{done}/{len(tasks)}] {result.name}: {result.status} after {result.seconds:.1f} s"
-                f"{': ' if result.problem or words else ''}{result.problem or words}; about {left:.0f} s left"
-            )
+        try:
+            missing = list(_finish_stored(session, missing, folder, store, force_all, ledger))
+            count = workers or default_workers(1e3 * memory)
+            limits = {"seconds": time_limit, "memory_mb": 1e3 * memory, "retries": retries}
+            tasks = [_task(one, folder, force_all, count, limits) for one in missing]
+            results = run_rows(tasks, count, scheduler, folder / "workers") if tasks else ()
+            began = time.monotonic()
+            for done, result in enumerate(results, start=1):
+                words = _found(folder / "rows" / result.name) if result.status == "done" else ""
+                ledger.enter(result, words)
+                left = (time.monotonic() - began) / done * (len(tasks) - done)
+                session.say(
+                    f"[{done}/{len(tasks)}] {result.name}: {result.status} after {result.seconds:.1f} s"
+                    f"{': ' if result.problem or words else ''}{result.problem or words}; about {left:.0f} s left"
+                )
+        finally:  # also where it is cancelled
+            ledger.save()
+            _write_page(folder)
         _answer(session, folder, ledger)
 
 
-def _check_all(rows: Sequence[Row]) -> None:
-    """Plan every row, so that no mistake waits until hours have passed.
+def _finish_stored(
+    session: Session, rows: Iterable[PlannedRow], folder: Path, store: Store, force_all: bool, ledger: Ledger
+) -> Iterator[PlannedRow]:
+    """Finish the rows whose results are all stored, here; yield the others."""
+    from vto_pipeline.pipeline.batch.row import RowResult
+    from vto_pipeline.stages.entry.batches import finish_stored
 
-    Raises:
-        VtoError: of the first row that is wrong.
-    """
-    from vto_pipeline.io.documents import Document
-    from vto_pipeline.stages.entry import planning
+    count = 0
+    for one in rows:
+        name, began = one.row.name, time.monotonic()
+        outcome = finish_stored(one.row, folder / "rows" / name, store, force_all) if one.stored else None
+        if outcome is None:
+            yield one
+            continue
+        _write_document(one.row, folder)
+        seconds = round(time.monotonic() - began, 3)
+        ledger.enter(RowResult(name, one.key, "done", 0, seconds, 0.0, 0), "; ".join(outcome.verdicts))
+        count += 1
+    if count:
+        session.say(f"{count} rows had all their results stored")
 
-    tables = planning.catalogue()
-    for row in rows:
-        try:
-            planning.planned_document(Document(row.data, Path(row.where)), Path("/"), (), tables)
-        except VtoError as error:
-            error.where = f"row {row.name}, {error.where or row.where}"
-            raise
 
-
-def _task(row: Row, key: str, folder: Path, force_all: bool, workers: int, limits: Mapping[str, Any]) -> RowTask:
-    """Write the row's document, and return what a worker is to do with it."""
+def _write_document(row: Row, folder: Path) -> Path:
     from vto_pipeline.io.documents import write_json
+
+    path = folder / "documents" / f"{row.name}.json"
+    write_json(path, row.data)
+    return path
+
+
+def _task(planned: PlannedRow, folder: Path, force_all: bool, workers: int, limits: Mapping[str, Any]) -> RowTask:
+    """Write the row's document, and return what a worker is to do with it."""
     from vto_pipeline.pipeline.batch.row import RowTask
     from vto_pipeline.pipeline.execution.cost import thread_count
 
-    document = folder / "documents" / f"{row.name}.json"
-    write_json(document, row.data)
+    row = planned.row
     arguments = [
         "run",
-        str(document),
+        str(_write_document(row, folder)),
         "-o",
         str(folder / "rows" / row.name),
         "--cache",
@@ -124,7 +144,7 @@ def _task(row: Row, key: str, folder: Path, force_all: bool, workers: int, limit
     ]
     return RowTask(
         name=row.name,
-        key=key,
+        key=planned.key,
         command=(*PROGRAM, *arguments, *(["--force-all"] if force_all else [])),
         log=str(folder / "logs" / f"{row.name}.log"),
         threads=max(1, thread_count() // workers),
@@ -139,21 +159,26 @@ def _found(run: Path) -> str:
     return "; ".join(open_run(run).verdicts)
 
 
-def _answer(session: Session, folder: Path, ledger: Ledger) -> None:
-    """Write the page, and print the outcome.
-
-    Raises:
-        BatchError: not every row is done.
-    """
+def _write_page(folder: Path) -> None:
     from vto_pipeline.io.files import replacing
     from vto_pipeline.pipeline.batch.ledger import read_ledger
     from vto_pipeline.report.batch_page import build_batch_page
 
     batch = read_ledger(folder)
-    pages = {name: f"rows/{name}/out/page.html" for name in ledger.rows}
+    pages = {row["name"]: f"rows/{row['name']}/out/page.html" for row in batch["rows"]}
     pages = {name: page for name, page in pages.items() if (folder / page).is_file()}
     with replacing(folder / "page.html") as beside:
         beside.write_text(build_batch_page(batch, pages), encoding="utf-8")
+
+
+def _answer(session: Session, folder: Path, ledger: Ledger) -> None:
+    """Print the outcome.
+
+    Raises:
+        BatchError: not every row is done.
+    """
+    from vto_pipeline.pipeline.batch.ledger import read_ledger
+
     done = ledger.counts().get("done", 0)
     if done < len(ledger.rows):
         others = ", ".join(f"{count} {status}" for status, count in sorted(ledger.counts().items()) if status != "done")
@@ -162,4 +187,4 @@ def _answer(session: Session, folder: Path, ledger: Ledger) -> None:
             where=str(folder),
             hint=f"`vto status {folder}` lists them; run the same command again to repeat them only",
         )
-    session.answer(batch, [f"{done} rows are done", f"  page  {folder / 'page.html'}"])
+    session.answer(read_ledger(folder), [f"{done} rows are done", f"  page  {folder / 'page.html'}"])

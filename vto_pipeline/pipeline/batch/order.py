@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import csv
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from copy import deepcopy
 from dataclasses import dataclass
 from itertools import product
 from math import prod
@@ -18,7 +18,6 @@ from vto_pipeline.errors import ConfigError, MissingDependencyError
 from vto_pipeline.io.documents import Document, check_schema, load_yaml
 from vto_pipeline.io.files import check_file
 from vto_pipeline.model.settings import Config
-from vto_pipeline.pipeline.execution.digest import code_identity, digest_value
 from vto_pipeline.pipeline.request import number_or_word
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
@@ -53,10 +52,6 @@ class Row:
     data: Mapping[str, Any]
     where: str
 
-    def key(self, force_all: bool) -> str:
-        """Digest of all that decides its result: the document, what its files hold, and the code."""
-        return digest_value({"document": _with_paths(self.data), "code": code_identity(), "force_all": force_all})
-
 
 def read_order(path: Path) -> list[Row]:
     """Read a batch document and its table.
@@ -85,10 +80,10 @@ def read_order(path: Path) -> list[Row]:
         rows.append(Row(name, _absolute(_changed(whole, change, where), base), where))
     if not rows:
         raise ConfigError("the batch has no rows", where=str(path), hint="give rows: or every:")
-    names = [row.name for row in rows]
+    times = Counter(row.name for row in rows)
     for row in rows:
-        if names.count(row.name) > 1:
-            raise ConfigError(f"the name {row.name!r} is there {names.count(row.name)} times", where=row.where)
+        if times[row.name] > 1:
+            raise ConfigError(f"the name {row.name!r} is there {times[row.name]} times", where=row.where)
     return rows
 
 
@@ -168,33 +163,27 @@ def _parquet_rows(path: Path) -> list[dict[str, Any]]:
 
 
 def _changed(document: Mapping[str, Any], change: Mapping[str, Any], where: str) -> dict[str, Any]:
-    """Return a copy of a document with values put at keys such as `stages.drape.friction`."""
-    copy = deepcopy(dict(document))
+    """Return a document with values put at keys such as `stages.drape.friction`; it shares what is as before."""
+    changed = dict(document)
     for key, value in change.items():
         parts = key.split(".")
         if parts[0] not in _SECTIONS or not all(parts):
             hint = f"a column is `name` or a key that begins with {', '.join(_SECTIONS)}, as in given.fabric"
             raise ConfigError(f"{key!r} is not a key of a pipeline document", where=where, hint=hint)
-        branch = copy
+        branch = changed
         for part in parts[:-1]:
-            branch = branch.setdefault(part, {})
-            if not isinstance(branch, dict):
+            inner = branch.get(part, {})
+            if not isinstance(inner, dict):
                 raise ConfigError(f"{key}: {part} is not a mapping there", where=where)
+            branch[part] = dict(inner)
+            branch = branch[part]
         branch[parts[-1]] = value
-    return copy
+    return changed
 
 
 def _absolute(data: Mapping[str, Any], base: Path) -> dict[str, Any]:
     """Return a document whose given files and folders have absolute paths."""
     return {**data, "given": _mapped(data.get("given", {}), lambda text: _path(text, base) or text)}
-
-
-def _with_paths(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a document with a Path for each given file or folder, so that its content counts."""
-    return {
-        **data,
-        "given": _mapped(data.get("given", {}), lambda text: Path(text) if _path(text, Path("/")) else text),
-    }
 
 
 def _mapped(value: Any, change: Any) -> Any:

@@ -52,8 +52,8 @@ class RowResult:
 
     Args:
         name, key: Of its task.
-        status: "done", "refused" (bad input or document), "failed", "crashed", "too long", "too large", or "lost" with
-            its worker.
+        status: "done", "refused" (bad input or document), "failed", "cancelled", "crashed", "too long", "too large", or
+            "lost" with its worker.
         exit_code: Of its process; negative for a signal.
         seconds, peak_mb: Wall time of the last try [s], and largest resident memory seen [MB].
         tries: How many there were.
@@ -70,7 +70,7 @@ class RowResult:
     problem: str = ""
 
 
-_STATUS = {0: "done", 2: "refused", 3: "refused", 4: "failed", 5: "refused"}
+_STATUS = {0: "done", 2: "refused", 3: "refused", 4: "failed", 5: "refused", 130: "cancelled"}
 
 
 def run_row(task: RowTask) -> RowResult:
@@ -156,6 +156,8 @@ def _resident_mb(group: int) -> float:
 def _problem(task: RowTask, status: str, code: int, answer: IO[bytes]) -> str:
     if status == "done":
         return ""
+    if status == "cancelled":
+        return "it was cancelled"
     if status == "too large":
         return f"it needs more than {task.memory_mb:.0f} MB of memory"
     if status == "too long":

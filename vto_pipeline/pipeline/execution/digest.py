@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -41,15 +41,19 @@ def digest_path(path: Path) -> str:
         raise InputError("the file was there before and has vanished", where=str(error.filename)) from None
 
 
-def digest_value(value: Any) -> str:
+OfPath = Callable[[Path], str]
+"""Digest of a file's or folder's content; `cache(digest_path)` for many rows that share files."""
+
+
+def digest_value(value: Any, of_path: OfPath = digest_path) -> str:
     """Digest of plain data; a path inside it counts by its content, not its name."""
-    text = json.dumps(_without_paths(value), sort_keys=True, ensure_ascii=False)
+    text = json.dumps(_without_paths(value, of_path), sort_keys=True, ensure_ascii=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def digest_given(one: Given) -> str:
+def digest_given(one: Given, of_path: OfPath = digest_path) -> str:
     """Digest of what was given: the content of a file or folder, or the value in the document."""
-    return digest_path(one.source) if isinstance(one.source, Path) else digest_value(one.source)
+    return of_path(one.source) if isinstance(one.source, Path) else digest_value(one.source, of_path)
 
 
 @cache
@@ -66,11 +70,11 @@ def _hidden(name: Path) -> bool:
     return any(part.startswith(".") for part in name.parts)
 
 
-def _without_paths(value: Any) -> Any:
+def _without_paths(value: Any, of_path: OfPath) -> Any:
     if isinstance(value, Path):
-        return {"content": digest_path(value)}
+        return {"content": of_path(value)}
     if isinstance(value, Mapping):
-        return {str(key): _without_paths(item) for key, item in value.items()}
+        return {str(key): _without_paths(item, of_path) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_without_paths(item) for item in value]
+        return [_without_paths(item, of_path) for item in value]
     return value

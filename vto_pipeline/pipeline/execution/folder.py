@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from errno import EDQUOT, ENOSPC
 from pathlib import Path
+from socket import gethostname
 
 from vto_pipeline.errors import ConfigError, InputError
 from vto_pipeline.io.files import remove_partial
@@ -50,19 +51,41 @@ def locked_run_folder(folder: Path, inputs: Iterable[Path] = ()) -> Iterator[Non
         except BlockingIOError:
             lock.seek(0)
             raise ConfigError(
-                f"another run is using this folder (process {lock.read().strip() or 'unknown'})",
+                f"another run is using this folder (process {lock.read().strip().replace(' ', ' on ') or 'unknown'})",
                 where=str(folder),
                 hint="wait for it to end, or give another folder with -o",
             ) from None
         try:
             os.ftruncate(lock.fileno(), 0)
-            os.write(lock.fileno(), str(os.getpid()).encode())
+            os.write(lock.fileno(), f"{os.getpid()} {gethostname()}".encode())
             remove_partial(folder)
             yield
         except OSError as error:
             if error.errno in (ENOSPC, EDQUOT) and error.filename is None:
                 error.filename = str(folder)  # what fails to be written has a name, what it is written to has none
             raise
+
+
+def process_in(folder: Path) -> int | None:
+    """Return the process of this machine that works in a run's or a batch's folder, or None.
+
+    Raises:
+        InputError: the folder was made by neither.
+        ConfigError: the process is on another machine.
+    """
+    try:
+        lock = (folder / _LOCK).open(encoding="utf-8")
+    except (FileNotFoundError, NotADirectoryError):
+        raise InputError("not the folder of a run or of a batch", where=str(folder)) from None
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            return None
+        except BlockingIOError:
+            process, _, host = lock.read().partition(" ")
+    if host != gethostname():
+        raise ConfigError(f"the run is on another machine, {host or 'unknown'}", where=str(folder), hint="go there")
+    return int(process)
 
 
 def existing_run(folder: Path) -> Path:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from vto_pipeline.pipeline.execution.digest import digest_given
+from vto_pipeline.pipeline.execution.digest import OfPath, digest_given, digest_path
 from vto_pipeline.pipeline.execution.key import result_key
-from vto_pipeline.pipeline.execution.store import MANIFEST, Store
-from vto_pipeline.pipeline.plan import Plan
+from vto_pipeline.pipeline.execution.store import MANIFEST, Result, Store
+from vto_pipeline.pipeline.plan import Plan, Step
 from vto_pipeline.pipeline.request import Request
 
 
@@ -38,8 +38,23 @@ def forecast(request: Request, plan: Plan, store: Store, force_all: bool = False
         store: Where earlier results are.
         force_all: Of the run.
     """
-    digests = {artifact: digest_given(one) for artifact, one in request.given.items()}
     found = {}
+    for step, result in stored_results(request, plan, store, force_all):
+        record = result.record if result is not None else latest_record(store, step.stage.name)
+        found[step.stage.name] = Expected(result is not None, record.get("seconds"), record.get("peak_mb"))
+    return found
+
+
+def stored_results(
+    request: Request, plan: Plan, store: Store, force_all: bool = False, of_path: OfPath = digest_path
+) -> Iterator[tuple[Step, Result | None]]:
+    """Yield each stage of a plan with its result if that is stored; what depends on one that is not is not known.
+
+    Args:
+        request, plan, store, force_all: As for `forecast`.
+        of_path: Digest of a file or folder.
+    """
+    digests = {artifact: digest_given(one, of_path) for artifact, one in request.given.items()}
     for step in plan.steps:
         stage = step.stage
         result = None
@@ -49,9 +64,7 @@ def forecast(request: Request, plan: Plan, store: Store, force_all: bool = False
         if result is not None:
             mine = [a for a in stage.makes if plan.makers.get(a) == stage.name]
             digests |= {artifact: result.digest(artifact) for artifact in mine}
-        record = result.record if result is not None else latest_record(store, stage.name)
-        found[stage.name] = Expected(result is not None, record.get("seconds"), record.get("peak_mb"))
-    return found
+        yield step, result
 
 
 def latest_record(store: Store, stage: str) -> Mapping[str, Any]:

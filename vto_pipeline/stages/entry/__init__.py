@@ -3,5 +3,6 @@
 commands: scan, fit, drape and run
 documents: the pipeline document that each of them stands for
 planning: the tables, and the request and the plan of a document
+batches: the rows of a batch, planned, and finished at once where all is stored
 outcome: what a run made, and what it says
 """

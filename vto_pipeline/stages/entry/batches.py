@@ -1,0 +1,89 @@
+"""A batch before its rows run: each one planned, and those finished at once that need no computing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from vto_pipeline.errors import VtoError
+from vto_pipeline.io.documents import Document
+from vto_pipeline.pipeline.batch.order import Row
+from vto_pipeline.pipeline.catalogue import Catalogue
+from vto_pipeline.pipeline.execution.digest import digest_path
+from vto_pipeline.pipeline.execution.forecast import stored_results
+from vto_pipeline.pipeline.execution.key import run_key
+from vto_pipeline.pipeline.execution.run import run
+from vto_pipeline.pipeline.execution.store import Store
+from vto_pipeline.pipeline.plan import Plan
+from vto_pipeline.pipeline.request import Request
+from vto_pipeline.stages.entry import planning
+from vto_pipeline.stages.entry.outcome import Outcome
+
+
+@dataclass(frozen=True)
+class PlannedRow:
+    """A row that can be run.
+
+    Args:
+        row: What it runs.
+        key: Of its result.
+        done: Whether it was done before.
+        stored: Whether, though it was not, the result of every stage is stored.
+    """
+
+    row: Row
+    key: str
+    done: bool
+    stored: bool
+
+
+def plan_rows(
+    rows: Sequence[Row], store: Store, is_done: Callable[[str, str], bool], force_all: bool
+) -> list[PlannedRow]:
+    """Plan every row, so that no mistake waits until hours have passed. A file that rows share is read once.
+
+    Args:
+        rows: All of the batch.
+        store: Where the rows keep their results.
+        is_done: Name and key of a row -> whether it was done before.
+        force_all: Of the runs.
+
+    Raises:
+        VtoError: of the first row that is wrong.
+    """
+    tables, of_path = planning.catalogue(), cache(digest_path)
+    found = []
+    for row in rows:
+        try:
+            request, plan, _ = _plan(row, tables)
+            key = run_key(request, plan, force_all, of_path)
+        except VtoError as error:
+            error.where = f"row {row.name}, {error.where or row.where}"
+            raise
+        done = is_done(row.name, key)
+        results = () if done else stored_results(request, plan, store, force_all, of_path)
+        stored = not done and all(result is not None for step, result in results if not step.stage.final)
+        found.append(PlannedRow(row, key, done, stored))
+    return found
+
+
+def finish_stored(row: Row, folder: Path, store: Store, force_all: bool) -> Outcome | None:
+    """Finish a row whose results are all stored, in this process; None where that fails, for whatever reason.
+
+    Args:
+        row: The row.
+        folder: Of its run.
+        store: Where its results are.
+        force_all: Of the run.
+    """
+    with suppress(Exception):  # a process of its own tells what is wrong, and costs no other row
+        request, plan, tables = _plan(row, planning.catalogue())
+        return Outcome(folder, run(request, plan, tables, folder, force_all=force_all, cache=store.folder), tables)
+    return None
+
+
+def _plan(row: Row, tables: Catalogue) -> tuple[Request, Plan, Catalogue]:
+    return planning.planned_document(Document(row.data, Path(row.where)), Path("/"), (), tables)
