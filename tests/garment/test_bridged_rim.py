@@ -21,11 +21,10 @@ def test_a_body_that_bulges_into_a_hole_does_not_pass_through_it() -> None:
     post = trimesh.creation.cylinder(radius=0.1, height=0.8, sections=96)
     body = SurfaceDistance(TriangleMesh(post.vertices[:, [1, 2, 0]], post.faces))
     turn = np.linspace(0.0, 2.0 * np.pi, 240, endpoint=False)
-    angle = np.radians(45.0) * np.cos(turn)  # a hole in a tube 5 mm off, as high as it is wide
+    angle = np.radians(65.0) * np.cos(turn)  # a hole in a tube 5 mm off; the post comes 26 mm through its disc
     hole = np.column_stack([0.105 * np.sin(angle), 0.08 * np.sin(turn), 0.105 * np.cos(angle)])
     around = np.column_stack([0.105 * np.sin(turn), 0.0 * turn, 0.105 * np.cos(turn)])
     for loop in (hole, hole[::-1]):
         assert not passes_through(loop, body)
-        assert not encloses(loop, body, 0.06)
     assert passes_through(around, body)
     assert passes_through(around[::-1], body)
