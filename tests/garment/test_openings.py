@@ -249,3 +249,8 @@ def dressed_triangles(step=0.01, rows=8):
     at = np.arange(rows * rows).reshape(rows, rows)
     a, b, c, d = at[:-1, :-1].ravel(), at[1:, :-1].ravel(), at[1:, 1:].ravel(), at[:-1, 1:].ravel()
     return TriangleMesh(vertices, np.vstack([np.column_stack([a, b, d]), np.column_stack([b, c, d])]))
+
+
+def test_an_opening_is_not_filled_right_through_the_arm_in_it():
+    with pytest.raises(GarmentError, match="runs through the mannequin"):
+        close_scan_holes(sleeve(), arm(), OpeningsConfig(least_perimeter_mm=5000), Job())

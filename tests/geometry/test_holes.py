@@ -8,11 +8,24 @@ import shapes
 from numpy.testing import assert_allclose, assert_array_equal
 
 from vto_pipeline.errors import GarmentError
+from vto_pipeline.geometry.remeshing import holes
 from vto_pipeline.geometry.remeshing.holes import fill_holes, fill_notch
+from vto_pipeline.geometry.remeshing.refine import refine
 from vto_pipeline.geometry.remeshing.remesh import edge_lengths
-from vto_pipeline.geometry.remeshing.repair import is_manifold
+from vto_pipeline.geometry.remeshing.repair import RepairConfig, is_manifold, repair
 from vto_pipeline.geometry.remeshing.triangulate import triangulate_loop
-from vto_pipeline.geometry.topology import boundary_loops, boundary_walks, face_normals, submesh
+from vto_pipeline.geometry.topology import (
+    boundary_loops,
+    boundary_walks,
+    component_areas,
+    edge_faces,
+    edges,
+    face_area_vectors,
+    face_normals,
+    half_edges,
+    submesh,
+)
+from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
 
@@ -35,6 +48,7 @@ def test_a_filled_sphere_is_round_and_rounder_the_smaller_the_hole():
         assert outward.min() > 0.9
         worst.append(np.abs(np.linalg.norm(filled.vertices[len(cut.vertices) :], axis=1) - 0.15).max())
     assert 1e-7 < worst[1] < 1e-4  # a 30 mm hole within 0.1 mm
+    assert worst[0] < 3.5e-4  # 0.46 mm with the lengths of the flat filling
     assert worst[0] > 4.0 * worst[1]  # error grows with the fourth power of the hole in theory
 
 
@@ -112,3 +126,109 @@ def test_a_loop_that_allows_no_chord_is_refused():
     square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     with pytest.raises(GarmentError, match="cannot be filled"):
         triangulate_loop(square, np.zeros((4, 3)), np.ones((4, 4), dtype=bool))
+
+
+@pytest.mark.parametrize("teeth", [3.0, 60.0])
+def test_a_ragged_flat_loop_of_thousands_of_points_is_covered_just_once(teeth):
+    count, rng = 4000, np.random.default_rng(3)
+    turn = np.linspace(0, 2 * np.pi, count, endpoint=False)
+    reach = 1.0 + 0.3 * np.sign(np.sin(teeth * turn)) + rng.uniform(-0.002, 0.002, count)
+    points = reach[:, None] * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
+    flat, forbidden = np.tile([0.0, 0.0, 1.0], (count, 1)), np.zeros((count, count), dtype=bool)
+    faces = triangulate_loop(points, flat, forbidden)
+    twice = np.cross(*np.diff(points[faces], axis=1).transpose(1, 0, 2))[:, 2]
+    wanted = np.cross(points, np.roll(points, -1, axis=0))[:, 2].sum()
+    assert len(faces) == count - 2
+    assert_allclose(np.abs(twice).sum(), wanted, rtol=1e-12)
+    ears = np.sort(faces[np.ptp(faces, axis=1) == 2][:10], axis=1)[:, [0, 2]]  # chords that it likes are taken now
+    forbidden[ears[:, 0], ears[:, 1]] = forbidden[ears[:, 1], ears[:, 0]] = True
+    faces = triangulate_loop(points, flat, forbidden)
+    assert len(faces) == count - 2
+    assert not forbidden[faces, np.roll(faces, -1, axis=1)].any()
+
+
+def test_a_loop_too_long_to_be_held_is_refused():
+    nothing = np.zeros((0, 0), dtype=bool)
+    with pytest.raises(GarmentError, match="10001 edges"):
+        triangulate_loop(np.zeros((10_001, 3)), np.zeros((10_001, 3)), nothing)
+
+
+def ragged_cap(subdivisions):
+    """A ball of 150 mm and a hole in it of about 55 mm whose rim is ragged."""
+    ball = shapes.sphere(subdivisions, radius=0.15)
+    middle, rng = shapes.centers(ball), np.random.default_rng(0)
+    turn = np.arctan2(middle[:, 0], middle[:, 2])
+    rim = sum(0.05 * np.sin(k * turn + rng.uniform(0, 6)) for k in (3, 7, 13, 29, 61)) + rng.normal(0, 0.01, len(turn))
+    kept = submesh(ball, np.arccos(middle[:, 1] / 0.15) > 0.35 + rim)[0]
+    piece, size = component_areas(kept)
+    return repair(submesh(kept, piece == np.argmax(size))[0], RepairConfig(weld_mm=0.0), Job())
+
+
+def test_a_ragged_hole_takes_triangles_by_its_area_and_they_are_even():
+    cut = ragged_cap(7)
+    (walk,) = [walk for walk in boundary_walks(cut) if len(walk) > 400]
+    filled = fill_holes(cut, [walk])
+    assert is_manifold(filled)
+    patch, source = submesh(filled, np.arange(len(filled.faces)) >= len(cut.faces))
+    edge = np.linalg.norm(np.diff(cut.vertices[half_edges(cut)[walk, 0]], axis=0), axis=1).mean()
+    even = np.linalg.norm(face_area_vectors(patch), axis=1).sum() / (np.sqrt(3) / 4 * edge**2)
+    assert 0.8 * even < len(patch.faces) < 1.5 * even
+    side = np.roll(patch.vertices[patch.faces], -1, axis=1) - patch.vertices[patch.faces]
+    side = side[np.linalg.norm(side, axis=2).min(axis=1) > 0.0]  # where the rim touches itself, points coincide
+    side /= np.linalg.norm(side, axis=2, keepdims=True)
+    least = np.degrees(np.arccos(-np.einsum("fkd,fkd->fk", side, np.roll(side, 1, axis=1)).max(axis=1)))
+    assert np.percentile(least, 5) > 25.0  # the smallest angle of a triangle; 60 at best
+    new = filled.vertices[source[source >= len(cut.vertices)]]
+    assert np.abs(np.linalg.norm(new, axis=1) - 0.15).max() < 5e-4
+
+
+def test_a_slit_with_thousands_of_edges_is_filled_as_the_surface_around_it_runs():
+    radius, size = 0.15, 0.0005
+    sheet = shapes.grid(1600, 12, size)
+    middle = shapes.centers(sheet)
+    slit = (np.abs(middle[:, 0] - 800 * size) < 780 * size) & (np.abs(middle[:, 1] - 6 * size) < 2 * size)
+    flat, _ = submesh(sheet, ~slit)
+    x, y, _ = flat.vertices.T
+    bent = TriangleMesh(np.column_stack([radius * np.sin(y / radius), x, radius * np.cos(y / radius)]), flat.faces)
+    walk = next(w for w in boundary_walks(bent) if 3000 < len(w) < 3200)
+    filled = fill_holes(bent, [walk])
+    assert is_manifold(filled)
+    assert len(filled.faces) - len(bent.faces) < 1.5 * 4 * 1560 * 4 / np.sqrt(3)
+    new = filled.vertices[len(bent.vertices) :]
+    assert_allclose(np.hypot(new[:, 0], new[:, 2]), radius, rtol=0, atol=2e-6)  # 3 um of sagitta across the slit
+
+
+def test_a_very_large_hole_is_filled_with_longer_edges_inside(monkeypatch):
+    monkeypatch.setattr(holes, "MOST_FACES", 3000)
+    turn = np.linspace(0, 2 * np.pi, 800, endpoint=False)
+    ring = np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
+    i, j = np.arange(800), np.roll(np.arange(800), -1)
+    faces = np.vstack([np.column_stack([i, 800 + i, 800 + j]), np.column_stack([i, 800 + j, j])]).astype(np.int32)
+    band = TriangleMesh(np.vstack([0.1 * ring, 0.1008 * ring]), faces)
+    inner = next(w for w in boundary_walks(band) if half_edges(band)[w, 0].max() < 800)
+    filled = fill_holes(band, [inner])
+    assert 3000 < len(filled.faces) - len(band.faces) < 3000 + 10 * 800  # 118,000 as fine as the rim
+    assert_allclose(np.linalg.norm(face_area_vectors(filled), axis=1).sum(), np.pi * 0.1008**2, rtol=1e-4)
+
+
+def test_refinement_leaves_area_rim_and_taken_chords():
+    turn = np.linspace(0, 2 * np.pi, 30, endpoint=False)
+    points = (1.0 + 0.3 * np.sin(3 * turn))[:, None] * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
+    flat = np.tile([0.0, 0.0, 1.0], (30, 1))
+    patch = TriangleMesh(points, triangulate_loop(points, flat, np.zeros((30, 30), dtype=bool)))
+    chords = np.abs(np.subtract.outer(np.arange(30), np.arange(30)))
+    free = refine(patch, 5.0, np.zeros((30, 30), dtype=bool))  # longer than all: only flipped
+    assert len(free.vertices) == 30
+    fan = {tuple(pair) for pair in edges(free).tolist()} - {tuple(pair) for pair in edges(patch).tolist()}
+    assert fan  # some edges are better flipped
+    kept = refine(patch, 5.0, (chords > 1) & (chords < 29))
+    assert_array_equal(edges(kept), edges(patch))
+    fine = refine(patch, 0.1, np.zeros((30, 30), dtype=bool))
+    pair = edges(fine)
+    inner = edge_faces(fine)[:, 1] >= 0
+    length = np.linalg.norm(fine.vertices[pair[:, 0]] - fine.vertices[pair[:, 1]], axis=1)
+    assert np.percentile(length[inner], 95) < 1.5 * 0.1
+    assert_array_equal(fine.vertices[:30], points)
+    assert_array_equal(np.sort(boundary_loops(fine)[0]), np.arange(30))
+    assert_allclose(face_area_vectors(fine)[:, 2].sum(), face_area_vectors(patch)[:, 2].sum(), rtol=1e-12)
+    assert face_area_vectors(fine)[:, 2].min() > 0.0

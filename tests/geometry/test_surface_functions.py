@@ -11,10 +11,9 @@ from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.geodesic import distance_from
 from vto_pipeline.geometry.laplace import extend_smoothly, laplacian
 from vto_pipeline.geometry.remeshing.clip import clip_to_positive
-from vto_pipeline.geometry.remeshing.subdivide import split_long_edges
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import boundary_loops, edge_faces, edges, face_area_vectors, submesh
+from vto_pipeline.geometry.topology import boundary_loops, face_area_vectors, submesh
 from vto_pipeline.model.mesh import TriangleMesh
 
 
@@ -102,17 +101,3 @@ def test_paths_along_edges_are_as_long_as_the_grid_says():
     along = np.arange(6) * 11  # vertices along the first column
     assert_allclose(found[along], 0.1 * np.arange(6), atol=1e-12)
     assert np.isinf(found[-1])
-
-
-def test_splitting_leaves_area_rim_and_short_edges():
-    fan = TriangleMesh(
-        np.vstack([[[0, 0, 0]], [[np.cos(t), np.sin(t), 0] for t in np.linspace(0, 2 * np.pi, 30, endpoint=False)]]),
-        [[0, 1 + k, 1 + (k + 1) % 30] for k in range(30)],
-    )
-    split = split_long_edges(fan, 0.25)
-    pair = edges(split)
-    inner = edge_faces(split)[:, 1] >= 0
-    length = np.linalg.norm(split.vertices[pair[:, 0]] - split.vertices[pair[:, 1]], axis=1)
-    assert length[inner].max() <= 0.25
-    assert_allclose(area(split), area(fan), rtol=1e-12)
-    assert len(boundary_loops(split)[0]) == 30

@@ -11,6 +11,7 @@ from scan_scene import distances, make_scene, photos, render
 
 from vto_pipeline.errors import InputError, ScanError
 from vto_pipeline.model.camera import CameraSet, Intrinsics
+from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
 from vto_pipeline.scan.photos import stereo
@@ -50,6 +51,17 @@ def test_depth_agrees_with_the_ray_cast_truth(maps, shot, scene):
     assert np.percentile(error, 95) < 4e-3
     assert min(covered) > 0.5
     assert 0.5 < job.metrics["consistent_share"] <= 1
+
+
+def test_photos_that_were_exposed_differently_cover_as_much(maps, shot, true_cameras, sparse, tmp_path):
+    for index, path in enumerate(shot[0].paths):
+        picture = cv2.imread(str(path))
+        cv2.imwrite(str(tmp_path / path.name), np.rint(picture * (0.75, 1.0, 0.85)[index % 3]).astype(np.uint8))
+    uneven = PhotoSet(tuple(tmp_path / path.name for path in shot[0].paths), shot[0].intrinsics)
+    job = Job()
+    found = estimate_depth_maps(uneven, true_cameras, sparse, StereoConfig(), job)
+    assert (found.depth > 0).sum() > 0.97 * (maps[0].depth > 0).sum()
+    assert_allclose(job.metrics["exposure_spread"], 1 / 0.75, rtol=0.02)
 
 
 def test_same_bits_on_one_core_and_on_all_in_the_stated_memory(maps, shot, true_cameras, sparse, monkeypatch):

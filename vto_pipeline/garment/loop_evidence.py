@@ -11,9 +11,11 @@ from vto_pipeline.geometry.topology import boundary_walks, face_normals, half_ed
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 
-DEEP = 0.2
-"""A body part goes through a loop when it is this share of the loop's radius deep, and at least a tenth of the disc."""
-RIM_OUTSIDE = 0.8
+DEEP, LEAST_FILLED = 0.2, 0.1
+"""A body part goes through a loop when it is this share of the loop's radius deep, and fills this share of the disc."""
+OUTSIDE, INSIDE = 0.15, 0.5
+"""It is as deep so many radii before the loop and behind it: what bulges into a hole, or slants across, ends there."""
+RIM_OUTSIDE = 0.9
 """Share of the rim that must stay outside the mannequin while the disc is moved inwards."""
 RINGS = np.arange(0.5, 10.0) / 10.0
 
@@ -64,26 +66,53 @@ def _disc(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 def encloses(points: FloatArray, distance: SurfaceDistance, reach: float) -> bool:
     """Return whether the mannequin passes through a loop, or ends not far inside it.
 
-    The loop is spanned by a disc; the disc is moved into the garment by up to `reach`. A body part goes through when it
-    fills the middle of the disc while the rim stays outside of it. Before a hole in a sheet over the body,
-    middle and rim go inside together.
+    A body part that ends inside is found when the disc that spans the loop is moved into the garment by up to `reach`,
+    and the rim stays outside of it. Before a hole in a sheet over the body, middle and rim go inside together.
 
     Args:
         points: The loop in order, running as a boundary does [m], shape (L, 3).
         distance: Signed distances to the mannequin.
         reach: How far inside the body part may end [m].
     """
-    length, center, normal = _disc(points)
-    radius = float(length.sum()) / (2.0 * np.pi)
-    disc = (center + RINGS[:, None, None] * (points - center)).reshape(-1, 3)
-    area = np.repeat(RINGS, len(points))
-    for shift in np.linspace(0.0, reach, 7):
+    if passes_through(points, distance):
+        return True
+    _, _, normal = _disc(points)
+    for shift in np.linspace(0.0, reach, 7)[1:]:
         inward = -shift * normal
-        outside = float(np.mean(distance.signed(points + inward).distance > -0.05 * radius))
-        if shift > 0.0 and outside < RIM_OUTSIDE:  # unmoved, the rim is cloth: what of it lies inside was bridged there
+        if outside_share(points + inward, distance) < RIM_OUTSIDE:
             return False
-        depth = -distance.signed(disc + inward).distance
-        filled = float(np.average(depth > 0.0, weights=area))
-        if depth.max() > DEEP * radius and filled > 0.1:
+        if _fills(points, inward, distance):
             return True
     return False
+
+
+def outside_share(points: FloatArray, distance: SurfaceDistance) -> float:
+    """Return which share of a loop (L, 3) lies outside the mannequin, or hardly inside."""
+    return float(np.mean(distance.signed(points).distance > -0.05 * _radius(points)))
+
+
+def passes_through(points: FloatArray, distance: SurfaceDistance) -> bool:
+    """Return whether a part of the mannequin fills the middle of a loop and goes on on both sides of it.
+
+    What lies inside of the loop itself does not count: the rim is cloth, and was bridged there.
+
+    Args:
+        points: The loop in order [m], shape (L, 3).
+        distance: Signed distances to the mannequin.
+    """
+    _, _, normal = _disc(points)
+    outward = _radius(points) * normal
+    return all(_fills(points, share * outward, distance) for share in (0.0, OUTSIDE, -INSIDE))
+
+
+def _fills(points: FloatArray, shift: FloatArray, distance: SurfaceDistance) -> bool:
+    """Return whether the mannequin fills the middle of a loop's disc, when that is moved."""
+    _, center, _ = _disc(points)
+    disc = (center + RINGS[:, None, None] * (points - center)).reshape(-1, 3)
+    depth = -distance.signed(disc + shift).distance
+    filled = float(np.average(depth > 0.0, weights=np.repeat(RINGS, len(points))))
+    return bool(depth.max() > DEEP * _radius(points) and filled > LEAST_FILLED)
+
+
+def _radius(points: FloatArray) -> float:
+    return float(_disc(points)[0].sum()) / (2.0 * np.pi)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vto_pipeline.garment.bare_parts import BareParts
-from vto_pipeline.garment.loop_evidence import encloses
+from vto_pipeline.garment.loop_evidence import RIM_OUTSIDE, encloses, outside_share, passes_through
 from vto_pipeline.garment.rims import smooth_curve
 from vto_pipeline.geometry.remeshing.holes import fill_notch
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
@@ -26,6 +26,8 @@ TANGENT = 0.02
 """The direction of a rim beside a notch is taken over this length [m]."""
 LOOKED_AT = 120
 """Points of each rim between which notches are looked for."""
+TRIED = 2000
+"""Candidates that are looked at."""
 ROUNDS = 3
 """How often notches are looked for: one rim may have several."""
 BARE = 0.2
@@ -41,6 +43,7 @@ def close_notches(
 
     The line across a notch runs outside the mannequin or grazes it, and the rim that is left goes round the mannequin.
     What would cover mannequin that was seen bare is no notch but the shape of the rim, as the V of an open collar.
+    Where the mannequin passes through what the line cuts off, that is the opening, and the hole is on its other side.
 
     Args:
         mesh: The garment.
@@ -85,18 +88,28 @@ def _largest_notch(
         points = smooth_curve(points, WAVELENGTH)
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1))])
     at = np.unique(np.searchsorted(along[:-1], np.arange(LOOKED_AT) / LOOKED_AT * along[-1]).clip(max=len(walk) - 1))
-    for start, end in _candidate_notches(points, along, at, distance, least_perimeter):
+    for start, end in _candidate_notches(points, along, at, distance, least_perimeter)[:TRIED]:
         if bare is not None and np.mean(bare.under(_between(points, along, start, end))) > BARE:
             continue
         left = at[np.argsort(np.mod(at - end, len(walk)))]  # from the notch's end round to its start
         left = left[: np.count_nonzero(np.mod(at - end, len(walk)) <= np.mod(start - end, len(walk)))]
         closing_line = points[start] + np.linspace(0.0, 1.0, 12)[1:-1, None] * (points[end] - points[start])
-        if encloses(np.vstack([points[left], closing_line]), distance, reach):
+        path = _path(points, start, end)
+        cut_off = np.vstack([path[:: 1 + len(path) // LOOKED_AT], closing_line[::-1]])
+        if passes_through(cut_off, distance):
+            continue
+        rim = np.vstack([points[left], closing_line])
+        if encloses(rim, distance, reach) and outside_share(rim, distance) >= RIM_OUTSIDE:
             before = points[start] - points[_index_along(along, start, -TANGENT)]
             after = points[_index_along(along, end, TANGENT)] - points[end]
             notch = np.roll(walk, -start)[: (end - start) % len(walk)]
             return notch, np.stack([before, after]) / np.linalg.norm([before, after], axis=1, keepdims=True)
     return None
+
+
+def _path(points: FloatArray, start: int, end: int) -> FloatArray:
+    """Return the points of a rim from one place on to another, shape (N, 3)."""
+    return np.roll(points, -start, axis=0)[: (end - start) % len(points) + 1]
 
 
 def _between(points: FloatArray, along: FloatArray, start: int, end: int) -> FloatArray:
@@ -111,10 +124,7 @@ def _between(points: FloatArray, along: FloatArray, start: int, end: int) -> Flo
 def _candidate_notches(
     points: FloatArray, along: FloatArray, at: IntArray, distance: SurfaceDistance, least_perimeter: float
 ) -> list[tuple[int, int]]:
-    """Return where notches may start and end, the best for each start, the best of all first.
-
-    The best leaves the roundest rim: greatest 4π area / perimeter².
-    """
+    """Return where notches may start and end, first what leaves the roundest rim: greatest 4π area / perimeter²."""
     steps = np.arange(1, len(at) - 1)
     i, j = at[:, None], at[(np.arange(len(at))[:, None] + steps) % len(at)]
     arc = np.mod(along[j] - along[i], along[-1])
@@ -128,12 +138,8 @@ def _candidate_notches(
     row, column = np.nonzero(notch & (left > least_perimeter) & (round_left > ROUNDER * whole))
     free = _outside(points[at[row]], points[j[row, column]], distance)
     row, column = row[free], column[free]
-    worth = np.full(arc.shape, -np.inf)
-    worth[row, column] = round_left[row, column]
-    best = np.argmax(worth, axis=1)
-    found = worth[np.arange(len(at)), best]
-    order = [int(r) for r in np.argsort(-found, kind="stable") if np.isfinite(found[r])]
-    return [(int(at[r]), int(j[r, best[r]])) for r in order]
+    order = np.argsort(-round_left[row, column], kind="stable")
+    return [(int(at[r]), int(j[r, c])) for r, c in zip(row[order], column[order], strict=True)]
 
 
 def _roundness_left(points: FloatArray, start: IntArray, end: IntArray, length: FloatArray) -> FloatArray:

@@ -23,6 +23,9 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
 
+MOST_INSIDE = 0.025
+"""A filling may lie so deep inside the mannequin [m], whence it is moved out; deeper, a body part goes through it."""
+
 
 class OpeningsConfig(Config):
     """What counts as an opening, and how far its rim is cleaned."""
@@ -96,6 +99,8 @@ def close_scan_holes(
     filled = fill_holes(bridged, [shape.walk for shape, real in zip(shapes, is_opening, strict=True) if not real])
     observed = np.arange(len(filled.vertices)) < len(clean.vertices)
     if distance is not None:
+        if config.keep is None:
+            _check_not_through(filled, ~observed, distance)
         filled = _project_off_mannequin(filled, ~observed, distance, config.clearance_mm * 1e-3)
     final = fair_rims(filled, config.fair_mm * 1e-3)
     if face_components(final)[0] != 1:
@@ -127,6 +132,25 @@ def _thinned(shell: TriangleMesh, edge: float, job: Job) -> TriangleMesh:
         return shell
     job.note(f"thinned {len(shell.faces)} faces to {faces}")
     return largest_piece(repair(decimate(shell, faces, aggressiveness=3.0), RepairConfig(weld_mm=0.0), job))
+
+
+def _check_not_through(mesh: TriangleMesh, which: NDArray[np.bool_], distance: SurfaceDistance) -> None:
+    """Refuse fillings that run deep through the mannequin: what was filled is an opening, or has one for its part.
+
+    Raises:
+        GarmentError: they do.
+    """
+    if not which.any():
+        return
+    inside = distance.signed(mesh.vertices[which])
+    deepest = int(np.argmin(inside.distance))
+    if inside.distance[deepest] < -MOST_INSIDE:
+        x, y, z = mesh.vertices[which][deepest]
+        problem = f"a filled hole runs through the mannequin at ({x:.2f}, {y:.2f}, {z:.2f}) m, "
+        raise GarmentError(
+            f"{problem}{-1e3 * inside.distance[deepest]:.0f} mm inside: too little was seen beside an opening",
+            hint="take more photos of that place, from above or below; are scan and mannequin aligned?",
+        )
 
 
 def _project_off_mannequin(

@@ -2,6 +2,7 @@
 
 photos/, depth/: cameras and depth, from each kind of capture
 keyframes: photos from a video
+exposure: how brightly each photo was exposed
 fuse, level_set: one surface from many depth maps
 depth_views, in_order: maps that are read when they are needed
 object_sphere: what the cameras look at, without the room

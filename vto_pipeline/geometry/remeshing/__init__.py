@@ -1,9 +1,10 @@
 """Remeshing, repair and hole filling.
 
 remesh, isotropic: triangles of one size
-decimate, subdivide: fewer, more
+decimate: fewer
 clip: along the line where a value changes sign
-holes, triangulate: holes filled so that the filling continues the surface
+holes: filled so that the filling continues the surface; ears and triangulate span them, refine makes triangles even
+fold: how much two triangles fold
 flat_faces: the panels of a mesh carried over onto another
 repair: from a triangle soup to an oriented manifold
 """

@@ -1,7 +1,8 @@
 """Span a closed loop of points by triangles between its own points.
 
 Liepa 2003, "Filling holes in meshes", section 3, after Barequet and Sharir 1995: by dynamic programming a triangulation
-whose worst fold is small, and of equals the smallest. It is the best one when a flat one exists, else near it.
+whose worst fold is small, and of equals the smallest. It is the best one when a flat one exists, else near it. A long
+loop is first shortened by its ears.
 """
 
 from __future__ import annotations
@@ -11,10 +12,15 @@ from numba import njit
 from numpy.typing import NDArray
 
 from vto_pipeline.errors import GarmentError
+from vto_pipeline.geometry.remeshing.ears import clip_ears
+from vto_pipeline.geometry.remeshing.fold import fold_to, triangle_normal
 from vto_pipeline.model.arrays import FloatArray, IntArray
 
-LONGEST = 2000
-"""Points of the longest loop: the work grows with the third power of it."""
+LONGEST = 1000
+"""Points of the longest loop that is triangulated at its best, in about 2 s: the work grows with the third power."""
+
+MOST = 10_000
+"""Points of the longest loop that is shortened to that by ears: chords that are taken need the square in bytes."""
 
 TIE = 1e-9
 """Folds that differ by less are equal."""
@@ -33,30 +39,18 @@ def triangulate_loop(points: FloatArray, rim_normals: FloatArray, forbidden: NDA
         GarmentError: the loop is too long, or every triangulation needs a forbidden chord.
     """
     count = len(points)
-    if count > LONGEST:
-        raise GarmentError(f"a hole has {count} edges; the most is {LONGEST}", hint="remesh to longer edges")
-    fold, split = _best_splits(points, rim_normals, forbidden)
-    if not np.isfinite(fold[0, count - 1]):
+    if count > MOST:
+        raise GarmentError(f"a hole has {count} edges; the most is {MOST}", hint="remesh to longer edges")
+    ears, kept, normals = clip_ears(points, rim_normals, forbidden, LONGEST)
+    if len(kept) > LONGEST:
+        raise GarmentError(
+            f"a hole of {count} edges, smooth but for {len(ears)} corners, is too long: the most is {LONGEST}",
+            hint="remesh to longer edges",
+        )
+    fold, split = _best_splits(points[kept], normals, forbidden[np.ix_(kept, kept)])
+    if not np.isfinite(fold[0, -1]):
         raise GarmentError(f"a hole of {count} edges cannot be filled without doubling an edge of the mesh")
-    return _collect(split)
-
-
-@njit(cache=True)
-def _normal(points, i, k, j):  # type: ignore[no-untyped-def]
-    """Return the unit normal of a triangle, zero if it has no area, and its area. Scalars, for speed."""
-    ux, uy, uz = points[k, 0] - points[i, 0], points[k, 1] - points[i, 1], points[k, 2] - points[i, 2]
-    vx, vy, vz = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1], points[j, 2] - points[i, 2]
-    x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-    length = np.sqrt(x * x + y * y + z * z)
-    if length == 0.0:
-        return 0.0, 0.0, 0.0, 0.0
-    return x / length, y / length, z / length, 0.5 * length
-
-
-@njit(cache=True)
-def _fold(x, y, z, normal):  # type: ignore[no-untyped-def]
-    """Return one less the cosine between two unit normals."""
-    return 1.0 - (x * normal[0] + y * normal[1] + z * normal[2])
+    return np.vstack([ears, kept[_collect(split)]])
 
 
 @njit(cache=True)
@@ -79,16 +73,16 @@ def _best_splits(points, rim_normals, forbidden):  # type: ignore[no-untyped-def
                     worst = max(fold[i, k], fold[k, j])
                     if worst > best_fold or worst == np.inf:
                         continue
-                    x, y, z, own_area = _normal(points, i, k, j)
-                    worst = max(worst, max(_fold(x, y, z, normal[i, k]), _fold(x, y, z, normal[k, j])))
+                    x, y, z, own_area = triangle_normal(points, i, k, j)
+                    worst = max(worst, max(fold_to(x, y, z, normal[i, k]), fold_to(x, y, z, normal[k, j])))
                     if last:
-                        worst = max(worst, _fold(x, y, z, rim_normals[j]))
+                        worst = max(worst, fold_to(x, y, z, rim_normals[j]))
                     total = area[i, k] + area[k, j] + own_area
                     if worst < best_fold - TIE or (worst < best_fold + TIE and total < best_area):
                         best_fold, best_area, best = worst, total, k
             fold[i, j], area[i, j], split[i, j] = best_fold, best_area, best
             if best >= 0:
-                x, y, z, _ = _normal(points, i, best, j)
+                x, y, z, _ = triangle_normal(points, i, best, j)
                 normal[i, j, 0], normal[i, j, 1], normal[i, j, 2] = x, y, z
     return fold, split
 

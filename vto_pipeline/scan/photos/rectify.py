@@ -39,11 +39,13 @@ class StereoView:
         gray: Shape (H, W), uint8.
         camera: Of this picture, distortion included.
         world_from_cam: Rigid transform [m], shape (4, 4).
+        exposure: How much brighter it shows the same things than the other photos.
     """
 
     gray: NDArray[np.uint8]
     camera: Intrinsics
     world_from_cam: FloatArray
+    exposure: float = 1.0
 
 
 @dataclass(frozen=True)

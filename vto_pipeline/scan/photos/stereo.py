@@ -20,10 +20,11 @@ from vto_pipeline.model.frames import DepthMaps, PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
 from vto_pipeline.model.settings import Config
+from vto_pipeline.scan.exposure import exposures
 from vto_pipeline.scan.library_message import library_message
 from vto_pipeline.scan.photos.consistency import agreeing_views, consensus, rays
 from vto_pipeline.scan.photos.disparity import MatchConfig, match_pair
-from vto_pipeline.scan.photos.neighbours import choose_pairs, visibility
+from vto_pipeline.scan.photos.neighbours import camera_points, choose_pairs, visibility
 from vto_pipeline.scan.photos.rectify import StereoView, rectify
 from vto_pipeline.scan.photos.region import object_region
 
@@ -64,8 +65,8 @@ def estimate_depth_maps(
         InputError: a camera names a photo that is not there.
         ScanError: no two photos share enough of the surface, the memory is too small, or no depth is agreed on.
     """
-    views = _load(photos, cameras, config.max_side_px)
     seen = visibility(cameras, cloud)
+    views = _with_exposures(_load(photos, cameras, config.max_side_px), cloud, seen, job)
     pairs = choose_pairs(cameras, cloud, seen, config.neighbours, config.min_shared_points)
     if not pairs:
         hint = "photos about 15 degrees apart work best; is there texture?"
@@ -102,6 +103,21 @@ def _load(photos: PhotoSet, cameras: CameraSet, max_side: int) -> list[StereoVie
             camera = camera.resized(*size)
         views.append(StereoView(gray, camera, pose))
     return views
+
+
+def _with_exposures(views: list[StereoView], cloud: PointCloud, seen: NDArray[np.bool_], job: Job) -> list[StereoView]:
+    """Return the views with how brightly each was exposed, told by the sparse points that it may see."""
+    pixels = np.zeros((*seen.shape, 2))
+    for index, view in enumerate(views):
+        x, y, z = camera_points(cloud.points[seen[index]], view.world_from_cam).T
+        bend = 1.0 + view.camera.k1 * (x**2 + y**2) / z**2
+        lens = view.camera
+        pixels[index, seen[index]] = np.column_stack(
+            [lens.fx * x / z * bend + lens.cx, lens.fy * y / z * bend + lens.cy]
+        )
+    found = exposures([view.gray for view in views], pixels, seen)
+    job.measure(exposure_spread=round(float(found.max() / found.min()), 3))
+    return [replace(view, exposure=float(exposure)) for view, exposure in zip(views, found, strict=True)]
 
 
 def _check_memory(views: list[StereoView], pairs: list[tuple[int, int]], job: Job) -> None:
