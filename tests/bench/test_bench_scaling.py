@@ -15,6 +15,7 @@ from vto_pipeline.bench.scaling.roofline import bandwidth
 from vto_pipeline.bench.scaling.sizes import fit_power_law
 from vto_pipeline.bench.scaling.throughput import _KERNELS, kernel_rows
 from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM
+from vto_pipeline.pipeline.execution.cost import Meter
 
 
 def test_exponent_of_an_exact_power():
@@ -93,8 +94,9 @@ def test_a_solver_that_is_not_installed_is_left_out_with_a_reason(monkeypatch):
 
 def test_a_row_of_a_batch_costs_less_than_it_may():
     """By processor time, which leaves out what else runs on this machine."""
+    before = Meter().peak_mb()  # what other tests have left in this process
     plan, journal, stored = (row.errors for row in batch_rows(500, 3, Watch()))
     assert plan["rows"] == 500
-    assert 0.0 < plan["peak_mb"] < 1000.0
+    assert 0.0 < plan["peak_mb"] < before + 1000.0
     assert 0.0 < journal["row_cpu_ms"] < 5.0
     assert 0.0 < stored["row_cpu_ms"] < 50.0
