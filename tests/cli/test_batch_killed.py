@@ -15,11 +15,14 @@ from pathlib import Path
 import pytest
 
 from vto_pipeline.cli.main import main
+from vto_pipeline.pipeline.batch.cluster import run_rows
 from vto_pipeline.pipeline.batch.ledger import LEDGER, read_ledger
+from vto_pipeline.pipeline.batch.row import RowTask
 from vto_pipeline.pipeline.execution import folder as folder_module
 from vto_pipeline.pipeline.execution.folder import locked_run_folder
 
 pytest.importorskip("distributed")
+import distributed
 import psutil  # distributed brings it along
 
 TESTS = str(Path(__file__).parents[1])
@@ -132,6 +135,22 @@ def test_kills_of_workers_and_clients_lose_nothing(client, rows, kills):
         assert batch.returncode in (-signal.SIGKILL, 6), said
     assert killed
     assert squares(rows) == expected(rows)
+
+
+def test_a_scheduler_that_dies_while_a_result_is_on_its_way_is_told(cluster, tmp_path, monkeypatch):
+    address, scheduler = cluster
+    fetch = distributed.Future.result
+
+    def fetch_from_the_dead(future, *arguments):
+        scheduler.kill()
+        scheduler.wait(PATIENCE)
+        return fetch(future, *arguments)
+
+    monkeypatch.setattr(distributed.Future, "result", fetch_from_the_dead)
+    command = (sys.executable, "-c", "pass")
+    tasks = [RowTask(name, name, command, str(tmp_path / f"{name}.log"), 1, 60.0, 1e3, 0) for name in "ab"]
+    became = list(run_rows(tasks, 1, address, tmp_path))
+    assert {(row.status, row.problem) for row in became} == {("lost", "the scheduler is gone")}
 
 
 def test_two_machines_do_a_batch_and_a_scheduler_that_dies_is_told(client, cluster):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack
+from concurrent.futures import CancelledError
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
@@ -70,20 +71,25 @@ def run_rows(tasks: Sequence[RowTask], workers: int, scheduler: str | None, scra
             for number, task in enumerate(tasks)
         }
         for future in as_completed(futures):
-            task = futures[future]
-            if future.status == "finished":
-                yield future.result()
-            else:
-                yield RowResult(task.name, task.key, "lost", -9, 0.0, 0.0, 1, _loss(future))
+            yield _result(future, futures[future])
 
 
-def _loss(future: Any) -> str:
-    """Return why there is no result of a row."""
+def _result(future: Any, task: RowTask) -> RowResult:
+    """Return what became of a row whose future has ended."""
+    problem = "the scheduler is gone"
+    if future.status == "finished":
+        with suppress(OSError, CancelledError):  # it can still be lost on its way here
+            result: RowResult = future.result()
+            return result
+    elif future.status != "cancelled":
+        problem = _problem(future.exception())
+    return RowResult(task.name, task.key, "lost", -9, 0.0, 0.0, 1, problem)
+
+
+def _problem(error: BaseException) -> str:
+    """Return why a worker gave no result."""
     from distributed import KilledWorker
 
-    if future.status == "cancelled":
-        return "the scheduler is gone"
-    error = future.exception()
     if isinstance(error, KilledWorker):
         return "each worker that it ran on has died"
     return f"its worker could not run it: {error}"
