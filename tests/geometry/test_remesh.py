@@ -35,6 +35,48 @@ def test_a_tube_keeps_its_openings(around, along):
     assert len(self_intersections(even)) == 0
 
 
+def cuffed(flat):
+    """A tube that narrows to a cuff, 0.145 m round, more or less pressed flat."""
+    pipe = shapes.tube(60, 30, radius=0.06, length=0.3, wave=0.0)
+    x, y, z = pipe.vertices.T
+    along = y / 0.3
+    narrow = 1.0 - along * (1.0 - 0.145 / (2.0 * np.pi * 0.06))
+    pressed = narrow * (1.0 - along * (1.0 - flat))
+    return TriangleMesh(np.column_stack([narrow * x, y, pressed * z]), pipe.faces)
+
+
+@pytest.mark.parametrize("flat", [1.0, 0.3, 0.1], ids=["round", "oval", "pressed"])
+@pytest.mark.parametrize("edge_mm", [13.0, 20.0, 30.0])
+def test_a_cuff_that_is_small_beside_the_edges_stays_open(flat, edge_mm):
+    """Its rim has five edges of 30 mm or more: where vertices slide along, they come together in a point."""
+    sleeve = cuffed(flat)
+    even = remesh(sleeve, RemeshConfig(edge_mm=edge_mm, iterations=5), Job())
+    assert is_manifold(even)
+    assert len(self_intersections(even)) == 0
+    cuff, wanted = (
+        min((mesh.vertices[loop] for loop in boundary_loops(mesh)), key=lambda p: -p[:, 1].mean())
+        for mesh in (even, sleeve)
+    )
+    assert np.ptp(cuff[:, 1]) < 1e-9
+    steps = np.linalg.norm(cuff - np.roll(cuff, -1, axis=0), axis=1)
+    length = np.linalg.norm(wanted - np.roll(wanted, -1, axis=0), axis=1).sum()
+    assert length - 1.5 * steps.mean() < steps.sum() < length  # chords cut its two turns, by a part of an edge each
+    for axis in (0, 2):
+        assert np.ptp(wanted[:, axis]) - steps.mean() < np.ptp(cuff[:, axis]) < np.ptp(wanted[:, axis]) + 1e-9
+    assert steps.min() > 0.1e-3 * edge_mm
+
+
+def test_long_edges_of_a_small_rim_are_halved():
+    """A square hole of 30 mm in large triangles becomes one of edges of 10 mm and less, its corners where they were."""
+    sheet = shapes.grid(9, 9, 0.03)
+    middle = np.abs(shapes.centers(sheet)[:, :2] - 0.135).max(axis=1) < 0.015
+    even = remesh(shapes.without(sheet, middle), RemeshConfig(edge_mm=11.0), Job())
+    hole = min(boundary_loops(even), key=lambda loop: perimeter(even, loop))
+    assert_allclose(perimeter(even, hole), 0.12, rtol=1e-6)
+    steps = np.linalg.norm(np.diff(even.vertices[hole], axis=0), axis=1)
+    assert 0.005 < steps.min() <= steps.max() < 0.016
+
+
 def test_a_closed_surface_stays_closed():
     ball = shapes.sphere(4, radius=0.1)
     even = remesh(ball, RemeshConfig(edge_mm=15.0), Job())

@@ -12,6 +12,7 @@ from vto_pipeline.errors import GarmentError, InputError
 from vto_pipeline.geometry.remeshing.decimate import decimate, faces_at
 from vto_pipeline.geometry.remeshing.isotropic import isotropic
 from vto_pipeline.geometry.remeshing.repair import is_manifold
+from vto_pipeline.geometry.remeshing.small_rims import SMALL, even_small_rims
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import (
     boundary_loops,
@@ -43,8 +44,9 @@ class RemeshConfig(Config):
 def remesh(mesh: TriangleMesh, config: RemeshConfig, job: Job) -> TriangleMesh:
     """Return the surface in near-equilateral triangles of one edge length.
 
-    The remesher (`isotropic`) pins open boundaries as they are; so each opening is first closed by a cone, its rim
-    marked as a feature along which vertices may slide, and the cones are taken away again at the end.
+    The remesher (`isotropic`) pins open boundaries as they are, and as `even_small_rims` has left the small ones. Each
+    other opening is first closed by a cone, its rim marked as a feature along which vertices may slide, and the cones
+    are taken away again at the end.
 
     Raises:
         InputError: the mesh is not manifold.
@@ -57,7 +59,8 @@ def remesh(mesh: TriangleMesh, config: RemeshConfig, job: Job) -> TriangleMesh:
     coarse = decimate(mesh, int(DECIMATE_TO * faces_at(mesh, edge)), aggressiveness=3.0)
     if not is_manifold(coarse) or _openings_and_pieces(coarse) != _openings_and_pieces(mesh):
         coarse = mesh  # slower, but whole
-    closed = _close_with_cones(coarse)
+    coarse = even_small_rims(coarse, edge)
+    closed = _close_with_cones(coarse, SMALL * edge)
     job.progress(0.3, "remeshing")
     fine, rim_faces = _remesh_closed(closed, len(coarse.faces), edge, config.iterations)
     result, _ = submesh(fine, rim_faces)
@@ -77,10 +80,15 @@ def perimeter(mesh: TriangleMesh, loop: NDArray[np.int32]) -> float:
     return float(np.linalg.norm(path - np.roll(path, -1, axis=0), axis=1).sum())
 
 
-def _close_with_cones(mesh: TriangleMesh) -> TriangleMesh:
-    """Close each boundary loop by a cone pointing away from the surface; the new vertices and faces come last."""
+def _close_with_cones(mesh: TriangleMesh, least: float) -> TriangleMesh:
+    """Close each boundary loop longer than `least` [m] by a cone pointing away from the surface.
+
+    The new vertices and faces come last.
+    """
     tips, cones, count = [], [], len(mesh.vertices)
     for loop in boundary_loops(mesh):
+        if perimeter(mesh, loop) < least:
+            continue
         points = mesh.vertices[loop]
         middle = points.mean(axis=0)
         # The area over half the perimeter: a circle's cone is as high as its radius.
