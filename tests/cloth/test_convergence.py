@@ -100,7 +100,7 @@ def test_cloth_that_stands_still_out_of_balance_is_not_at_rest(residual, settled
     assert found.settled is settled
     assert found.error == 0.0
     assert len(found.trace) < 20  # waiting longer would bring nothing
-    assert f"a residual force of {residual:.2g} of a vertex's weight" in found.not_settled_warning
+    assert f"a residual force of {residual:.2g} of the weight" in found.not_settled_warning
 
 
 def test_steps_are_as_before_when_it_is_over():

@@ -105,7 +105,7 @@ def drape(
     judged = findings.get("judged_residual")
     if settling.settled and isinstance(judged, float) and judged > _AGREES * config.target_residual:
         findings["settled"] = False
-        job.warn(f"not at rest: the judge finds a residual force of {judged:.2g} of a vertex's weight")
+        job.warn(f"not at rest: the judge finds a residual force of {judged:.2g} of the weight")
     reached.phases.report_collision_work(reached.before)
     job.measure(
         seconds=time.perf_counter() - began,

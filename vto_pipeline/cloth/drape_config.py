@@ -38,7 +38,7 @@ class DrapeConfig(StepConfig, PlaceConfig, Materials):
     max_speed: float = Field(1.0, gt=0, le=1000, description="Top speed of a vertex [m/s]")
     target_error_mm: float = Field(0.5, gt=0, le=100, description="Predicted rms motion below which it is at rest [mm]")
     target_residual: float = Field(
-        0.01, ge=0, le=10, description="Rms residual force below which it is at rest, as a share of a vertex's weight"
+        0.01, ge=0, le=10, description="Residual force below which it is at rest, as a share of weight, rms over mass"
     )
     settle_seconds: float = Field(12.0, gt=0, le=600, description="Longest simulated time to reach rest [s]")
     finest: int = Field(160, ge=1, le=10000, description="Most steps per 1/60 s that refinement may reach")

@@ -17,7 +17,7 @@ class TraceRow:
         seconds: Wall time since the drape began [s].
         step: Steps taken on this mesh.
         error_mm: Predicted distance to the state of rest of this mesh [mm].
-        residual: Residual force, rms over vertices, as a share of a vertex's weight.
+        residual: Residual force as a share of weight, rms over the mass.
         level: 0 on the garment's own mesh, 1 on the next coarser one, and so on.
         contacts: That pushed in the last step, where the method counts them.
         true_mm_median, true_mm_p95, true_mm_max: Distance of the vertices to where they ended [mm]; None until then.

@@ -8,7 +8,7 @@ What the error is taken against:
   little. What is left is the reference's own row. A hanging sheet has one such shape, and so has a shirt that comes to
   rest; the sheet on the ball, undamped and without bending stiffness, buckles into other folds with any change of
   step, so there only the mean height is compared.
-* Residual: the residual force as a share of a vertex's weight; see `cloth.dynamics.residual`.
+* Residual: the residual force as a share of weight; see `cloth.dynamics.residual`.
 """
 
 from __future__ import annotations

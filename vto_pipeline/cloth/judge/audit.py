@@ -51,7 +51,7 @@ def audit(
         body: What it lies on, if anything.
         settled: Whether the drape came to rest.
         energy: Stored in the cloth, says the solver [J].
-        residual: Residual force, rms, as a share of a vertex's weight, says the solver.
+        residual: Residual force as a share of weight, rms over the mass, says the solver.
         fabric: What it is made of, where the judge knows its model (`judge.residual.covers_all_energies`); energy and
             force are then judged.
         friction: Against the body; the fabric's own when None.

@@ -96,7 +96,7 @@ def judged_residual(
     touching: FloatArray,
     free: NDArray[np.bool_],
 ) -> float:
-    """Return the residual force, rms over the free vertices, as a share of a vertex's weight.
+    """Return the residual force as a share of weight: the acceleration left over, rms over the free mass, in g.
 
     A vertex near one place of the body is borne as what slides there; in a hollow, the flanks share what they can.
 
@@ -128,7 +128,7 @@ def judged_residual(
             if end - start > 1 and np.ptp(pushes[start:end], axis=0).max() > _ALIKE:
                 left[i] = residual_after_all_surfaces(forces[i], pushes[start:end], friction)
     share = np.linalg.norm(left[free], axis=1) / (GRAVITY * weave.mass[free])
-    return float(np.sqrt(np.mean(share**2)))
+    return float(np.sqrt(np.average(share**2, weights=weave.mass[free])))
 
 
 def _plane_stiffness(fabric: Fabric) -> FloatArray:

@@ -46,7 +46,7 @@ def audit_outfit(
         body: What they lie on [m].
         config: How they were modelled.
         settled: Whether they came to rest, all together.
-        residual: Residual force of all, rms, as a share of a vertex's weight, says the solver.
+        residual: Residual force of all as a share of weight, rms over the mass, says the solver.
         skin: Distance that the vertices of `joined` keep from the body [m], shape (V,).
         job: Warned of garments that are too small, and of layers out of order.
 

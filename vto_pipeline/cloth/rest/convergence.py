@@ -80,7 +80,7 @@ class SettlingResult:
         """The warning where it did not settle."""
         if self.error_mm is None:
             return f"not at rest, error unknown{self._jam}"
-        left = f"a residual force of {self.residual:.2g} of a vertex's weight"
+        left = f"a residual force of {self.residual:.2g} of the weight"
         return f"not at rest: {self.error_mm:.1f} mm of motion predicted, {left}{self._jam}"
 
     @property

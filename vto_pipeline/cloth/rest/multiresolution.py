@@ -166,7 +166,7 @@ class _CoarseToFine:
             state, stepper, body.final, deadline, (ROUGH,) if level > 0 else (PLACED, REST)
         )
         if level > 0 and (settling.jammed or settling.caught):
-            weights = f"with forces of {settling.residual:.0f} times a vertex's weight"
+            weights = f"with forces of {settling.residual:.0f} times the weight"
             what = "it is caught in the body" if settling.caught else "its layers are jammed"
             self._leave_out(model, f"too coarse: {what}, {weights}")
             return None

@@ -15,7 +15,7 @@ _FALLS = 0.5  # times that after each look
 _SLIGHT = 0.1  # of the left-over force that is enough: less is no sign of going astray
 _SHORTER = 64.0  # times shorter than usual, at most, where cloth is about to buckle
 _STANDS = 1e-5  # m: a move from look to look that is none, rms over vertices
-_PAUSE = 4  # looks with the usual stiffness where the shortest steps were of no use; twice as many after each time
+_PAUSE = 4  # looks in usual steps where the shortest, or the longest, were of no use; twice as many after each time
 _TORN = 100.0  # weights left over: what comes to that in a few short steps has snapped into a place to be torn out of
 _FEW = 3  # of these steps to a look: it is the way that matters there, not the time it takes
 
@@ -35,7 +35,8 @@ class StableNewtonSteps:
     usual stiffness goes on for a while. So it does where short steps snap cloth into a place that it is torn out of.
 
     Thread hardly stretches: what has moved by a micrometre may pull with many times its weight, and is no farther from
-    rest for that. So where cloth all but stands still, steps grow whatever the force, unless it fails to fall then too.
+    rest for that. So where cloth all but stands still, steps grow whatever the force. Where it fails to fall then too,
+    they do again after a while.
 
     Args:
         stepper: The cloth among its colliders, prepared; its steps are changed.
@@ -48,7 +49,6 @@ class StableNewtonSteps:
         self._enough = enough
         self._most = self._before = np.inf
         self._tried = False
-        self._stands = _STANDS
         self._wait, self._pause = 0, _PAUSE
 
     @property
@@ -74,7 +74,7 @@ class StableNewtonSteps:
             moved: How far it went, rms over vertices [m].
         """
         stable, steps = self._stepper.was_positive_definite, self._stepper.substeps
-        strays = stable and steps < self._usual and residual > self._most and moved > self._stands
+        strays = stable and steps < self._usual and residual > self._most and not self._stands(moved)
         tears = not stable and steps > self._usual and residual > max(_TORN, _ASIDE * self._before)
         if strays:
             self._shorten()
@@ -92,9 +92,11 @@ class StableNewtonSteps:
             residual: Left-over force now.
             moved: How far the last look's steps went, rms over vertices [m].
         """
-        stepper, stands = self._stepper, moved <= self._stands
+        self._wait = max(self._wait - 1, 0)
+        stepper, stands = self._stepper, self._stands(moved)
         if self.took_full_step and residual >= self._enough and stands:
-            self._stands, stepper.substeps = 0.0, self._usual
+            self._pause_longer()
+            stepper.substeps = self._usual
             return
         if stepper.was_positive_definite and residual > self._most and not stands:
             self._most = _ASIDE * residual
@@ -109,7 +111,6 @@ class StableNewtonSteps:
             if self._tried and stepper.substeps >= _SHORTER * self._usual:  # not even so: there is no end to that way
                 self._give_up()
             near = near and (self._wait == 0 or residual < self._enough)
-            self._wait = max(self._wait - 1, 0)
             if not near:
                 stepper.substeps = self._usual
             elif self._tried:
@@ -117,9 +118,16 @@ class StableNewtonSteps:
             self._tried = near
             stepper.use_exact_stiffness(near)
 
+    def _stands(self, moved: float) -> bool:
+        """Return whether that is no move, and long steps have not just shown that force is left all the same."""
+        return moved <= _STANDS and self._wait == 0
+
+    def _pause_longer(self) -> None:
+        self._wait, self._pause = self._pause, 2 * self._pause
+
     def _give_up(self) -> None:
         """Go on with the usual steps for a while, longer each time."""
-        self._wait, self._pause = self._pause, 2 * self._pause
+        self._pause_longer()
         self._tried = False
         self.end()
 
