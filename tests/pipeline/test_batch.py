@@ -146,7 +146,15 @@ def test_a_row_ends_with_the_worker_that_started_it(tmp_path: Path) -> None:
     assert has_ended(int(pid.read_text()))
 
 
+def records(batch: Path, *names: str) -> None:
+    """The records of runs in a batch's folder."""
+    for name in names:
+        (batch / "rows" / name).mkdir(parents=True)
+        (batch / "rows" / name / "run.json").write_text("{}")
+
+
 def test_the_ledger_knows_what_is_done(tmp_path: Path) -> None:
+    records(tmp_path, "a")
     ledger = Ledger(tmp_path, ["a", "b"])
     ledger.enter(RowResult("a", "k", "done", 0, 2.5, 90.0, 1), "fits")
     again = Ledger(tmp_path, ["a", "b", "c"])
@@ -155,7 +163,10 @@ def test_the_ledger_knows_what_is_done(tmp_path: Path) -> None:
     assert again.expected_seconds("a") == 2.5
     assert again.expected_seconds("c") == float("inf")
     assert read_ledger(tmp_path)["counts"] == {"done": 1, "waiting": 1}
-    assert (tmp_path / "batch.csv").read_text().splitlines()[1] == "a,done,0,2.5,90.0,1,fits,"
+    shutil.rmtree(tmp_path / "rows" / "a")  # by hand
+    assert read_ledger(tmp_path)["counts"] == {"waiting": 2}
+    assert not Ledger(tmp_path, ["a"]).is_done("a", "k")
+    assert (tmp_path / "batch.csv").read_text().splitlines()[1] == "a,done,0,,2.5,90.0,1,fits,,,"
     (tmp_path / LEDGER).write_text('{"rows": [{}]}')
     with pytest.raises(InputError, match="not the record of a batch"):
         Ledger(tmp_path, ["a"])
@@ -174,6 +185,7 @@ def test_what_ended_before_a_kill_is_in_the_ledger(tmp_path: Path) -> None:
     )
     killed = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, check=False)
     assert killed.returncode == -9
+    records(tmp_path, *(f"r{i}" for i in range(30)))
     assert read_ledger(tmp_path)["counts"] == {"done": 30, "waiting": 10}
     names = [f"r{i}" for i in range(40)]
     again = Ledger(tmp_path, names)
