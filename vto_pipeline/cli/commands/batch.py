@@ -60,6 +60,7 @@ def batch_command(
     from vto_pipeline.pipeline.batch.cluster import default_workers, run_rows
     from vto_pipeline.pipeline.batch.ledger import Ledger
     from vto_pipeline.pipeline.batch.order import read_order
+    from vto_pipeline.pipeline.batch.time_left import TimeLeft
     from vto_pipeline.pipeline.execution.folder import locked_run_folder
     from vto_pipeline.pipeline.execution.store import Store
     from vto_pipeline.stages.entry.batches import plan_rows
@@ -72,7 +73,8 @@ def batch_command(
     with locked_run_folder(folder):
         ledger = Ledger(folder, names)
         missing = [one for one in planned if not ledger.is_done(one.row.name, one.key)]
-        missing.sort(key=lambda one: -ledger.expected_seconds(one.row.name))  # the longest first; stable
+        expected = {one.row.name: _expected(one, ledger) for one in missing}
+        missing.sort(key=lambda one: -expected[one.row.name])  # the longest first; stable
         if len(missing) < len(rows):
             session.say(f"{len(rows) - len(missing)} of {len(rows)} rows are done and unchanged")
         for one in missing:
@@ -84,22 +86,30 @@ def batch_command(
             limits = {"seconds": time_limit, "memory_mb": 1e3 * memory, "retries": retries}
             tasks = [_task(one, folder, force_all, count, limits) for one in missing]
             results = run_rows(tasks, count, scheduler, folder / "workers") if tasks else ()
-            began = time.monotonic()
+            left = TimeLeft({task.name: expected[task.name] for task in tasks}, count)
+            if tasks and left.seconds() is not None:
+                session.say(f"{len(tasks)} rows to run: about {left.seconds():.0f} s, by earlier runs")
             for done, result in enumerate(results, start=1):
                 words: str = ""
                 shown: dict[str, Any] = {}
                 if result.status == "done":
                     words, shown = _shown(open_run(folder / "rows" / result.name), folder)
                 ledger.enter(result, words, shown)
-                left = (time.monotonic() - began) / done * (len(tasks) - done)
+                left.ended(result.name)
                 session.say(
                     f"[{done}/{len(tasks)}] {result.name}: {result.status} after {result.seconds:.1f} s"
-                    f"{': ' if result.problem or words else ''}{result.problem or words}; about {left:.0f} s left"
+                    f"{': ' if result.problem or words else ''}{result.problem or words}"
+                    f"; about {left.seconds() or 0.0:.0f} s left"
                 )
         finally:  # also where it is cancelled
             ledger.save()
             _write_tables(session, folder)
         _answer(session, folder, ledger)
+
+
+def _expected(one: PlannedRow, ledger: Ledger) -> float:
+    """Return the time that a row will take [s]; infinite where nothing like it was run."""
+    return ledger.expected_seconds(one.row.name) if one.seconds is None else one.seconds
 
 
 def _finish_stored(
