@@ -11,13 +11,17 @@ import time
 from pathlib import Path
 
 import pytest
+from toy_tables import TOY
 
 from vto_pipeline.errors import ConfigError, InputError
+from vto_pipeline.io.files import check_inside
 from vto_pipeline.pipeline.batch import ledger as ledger_module
 from vto_pipeline.pipeline.batch.ledger import LEDGER, Ledger, read_ledger
 from vto_pipeline.pipeline.batch.order import read_order
 from vto_pipeline.pipeline.batch.row import RowResult, RowTask, run_row
 from vto_pipeline.pipeline.execution.store import Store
+from vto_pipeline.stages.entry import planning
+from vto_pipeline.stages.entry.batches import plan_rows
 
 RUN = "run: {schema: 1, given: {left: {number: left.txt}}, want: [total]}\n"
 
@@ -82,6 +86,66 @@ def test_a_wrong_batch_is_refused_with_its_place(tmp_path: Path, text: str, tabl
     with pytest.raises(ConfigError, match="^") as caught:
         order(tmp_path, text, table=table)
     assert problem in caught.value.problem
+
+
+@pytest.fixture
+def fenced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """A batch in a folder of its own, read and planned so that it stays there; a file beside that folder."""
+    monkeypatch.setattr(planning, "catalogue", lambda: TOY)
+    (tmp_path / "secret.txt").write_text("7")
+    home = tmp_path / "home"
+    home.mkdir()
+
+    def plan(text: str) -> list:
+        order(home, text)
+        rows = read_order(home / "batch.yaml", home)
+        return plan_rows(rows, Store(tmp_path / "cache"), lambda *_: False, False, home)
+
+    return plan
+
+
+def test_a_batch_with_a_root_reads_what_is_in_it(fenced) -> None:
+    assert len(fenced(f"{RUN}every: {{seed: [1, 2]}}\n")) == 2
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        "../secret.txt",
+        "{home}/../secret.txt",
+        "{outside}",
+        "{outside_from_the_top}",
+        "link.txt",
+        "down/../../secret.txt",
+    ],
+)
+def test_a_batch_with_a_root_reads_nothing_outside_it(fenced, tmp_path: Path, given: str) -> None:
+    (tmp_path / "home" / "down").mkdir()
+    (tmp_path / "home" / "link.txt").symlink_to(tmp_path / "secret.txt")
+    outside = str(tmp_path / "secret.txt")
+    given = given.format(home=tmp_path / "home", outside=outside, outside_from_the_top=outside.lstrip("/"))
+    with pytest.raises(ConfigError, match=r"lies outside .*home"):
+        fenced(f"{RUN}rows: [{{given.left.number: '{given}'}}]\n")
+
+
+@pytest.mark.parametrize("text", ["run: ../run.yaml\nevery: {seed: [1]}\n", f"{RUN}rows: ../table.csv\n"])
+def test_the_parts_of_a_batch_with_a_root_lie_in_it(fenced, tmp_path: Path, text: str) -> None:
+    (tmp_path / "run.yaml").write_text("schema: 1\ngiven: {}\nwant: [total]\n")
+    (tmp_path / "table.csv").write_text("name\na\n")
+    (tmp_path / "home/batch.yaml").write_text(f"schema: 1\n{text}")
+    with pytest.raises(ConfigError, match="lies outside"):
+        read_order(tmp_path / "home/batch.yaml", tmp_path / "home")
+
+
+def test_links_in_a_folder_do_not_lead_out_of_a_root(tmp_path: Path) -> None:
+    (tmp_path / "home/photos").mkdir(parents=True)
+    (tmp_path / "home/a.png").write_bytes(b"1")
+    (tmp_path / "b.png").write_bytes(b"2")
+    (tmp_path / "home/photos/a.png").symlink_to(tmp_path / "home/a.png")
+    check_inside(tmp_path / "home/photos", tmp_path / "home", "here")
+    (tmp_path / "home/photos/b.png").symlink_to("../../b.png")
+    with pytest.raises(ConfigError, match="lies outside"):
+        check_inside(tmp_path / "home/photos", tmp_path / "home", "here")
 
 
 def task(folder: Path, program: str, **limits: float) -> RowTask:

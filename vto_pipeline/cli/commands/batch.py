@@ -34,6 +34,7 @@ PROGRAM = (sys.executable, "-c", "import sys; from vto_pipeline.cli.main import 
 @click.option("--memory", type=click.FloatRange(0.1, 4096), default=6.0, show_default=True, help="Limit of a row [GB].")
 @click.option("--time-limit", type=click.FloatRange(1), default=3600.0, show_default=True, help="Limit of a row [s].")
 @click.option("--retries", type=click.IntRange(0, 10), default=1, show_default=True, help="After a crash of a row.")
+@click.option("--root", type=PATH, metavar="FOLDER", help="Refuse files outside it, for batches from strangers.")
 @force_option
 @message_options
 @pass_session
@@ -46,6 +47,7 @@ def batch_command(
     memory: float,
     time_limit: float,
     retries: int,
+    root: Path | None,
     force_all: bool,
 ) -> None:
     """Run a pipeline document many times, each time with the changes of one row of a table.
@@ -66,10 +68,10 @@ def batch_command(
     from vto_pipeline.stages.entry.batches import plan_rows
     from vto_pipeline.stages.entry.outcome import open_run
 
-    rows = read_order(document)
+    rows = read_order(document, root)
     folder = (output or Path("runs") / document.stem).absolute()
     names, store = [row.name for row in rows], Store(folder / "cache")
-    planned = plan_rows(rows, store, Ledger(folder, names).is_done, force_all)
+    planned = plan_rows(rows, store, Ledger(folder, names).is_done, force_all, root)
     with locked_run_folder(folder):
         ledger = Ledger(folder, names)
         missing = [one for one in planned if not ledger.is_done(one.row.name, one.key)]

@@ -11,6 +11,7 @@ from typing import Any
 
 from vto_pipeline.errors import VtoError
 from vto_pipeline.io.documents import Document
+from vto_pipeline.io.files import check_inside
 from vto_pipeline.pipeline.batch.order import Row
 from vto_pipeline.pipeline.catalogue import Catalogue
 from vto_pipeline.pipeline.execution.cost_model import CostModel, size_of, step_figures
@@ -46,7 +47,11 @@ class PlannedRow:
 
 
 def plan_rows(
-    rows: Sequence[Row], store: Store, is_done: Callable[[str, str], bool], force_all: bool
+    rows: Sequence[Row],
+    store: Store,
+    is_done: Callable[[str, str], bool],
+    force_all: bool,
+    root: Path | None = None,
 ) -> list[PlannedRow]:
     """Plan every row, so that no mistake waits until hours have passed. A file that rows share is read once.
 
@@ -55,6 +60,7 @@ def plan_rows(
         store: Where the rows keep their results.
         is_done: Name and key of a row -> whether it was done before.
         force_all: Of the runs.
+        root: Folder that all given files must lie in; None: they may lie anywhere.
 
     Raises:
         VtoError: of the first row that is wrong.
@@ -65,6 +71,9 @@ def plan_rows(
     for row in rows:
         try:
             request, plan, _ = _plan(row, tables)
+            if root is not None:
+                for path in [path for one in request.given.values() for path in one.paths]:
+                    check_inside(path, root, row.where)
             key = run_key(request, plan, force_all, of_path)
         except VtoError as error:
             error.where = f"row {row.name}, {error.where or row.where}"
