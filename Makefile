@@ -11,7 +11,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
 .PHONY: help install demo test test-all test-processors check-demo check format docs bench figures first-run sample-data \
-	clean
+	image clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -69,6 +69,9 @@ first-run:  ## In a fresh clone: clock `make demo` and `make test` from nothing
 	@began=$$(date +%s) && $(MAKE) demo && demo=$$(($$(date +%s) - began)) && \
 		$(MAKE) test && test=$$(($$(date +%s) - began - demo)) && \
 		$(BIN)/python -m vto_pipeline.bench.first_run --demo $$demo --test $$test
+
+image:  ## Build a Docker image with the command vto
+	docker build --tag vto-pipeline .
 
 sample-data: $(READY)  ## Generate sample_data/ again
 	$(BIN)/python -m vto_pipeline.bench.samples --out sample_data

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from pathlib import Path
 
@@ -53,9 +54,11 @@ def test_a_batch_does_what_can_be_done_and_only_the_rest_again(ordered, tmp_path
     rows = {row["name"]: row for row in record["rows"]}
     assert {name: row["status"] for name, row in rows.items()} == {"a": "done", "b": "done", "c": "failed"}
     assert "sum diverged" in rows["c"]["problem"]
+    assert record["failures"] == [{"kind": "exit 4: sum diverged", "count": 1, "rows": ["c"]}]
+    assert "1 x exit 4: sum diverged (c)" in said.err
     page = Path("november/page.html").read_text()
     assert 'class="bad">failed' in page
-    assert "sum diverged" in page
+    assert '<a href="#row-c">c</a>' in page
     made = len(list(Path("november/cache/right.double").glob("*/manifest.json")))
     assert made == 1  # three rows need it
 
@@ -90,6 +93,17 @@ def test_rows_whose_results_are_stored_start_no_process(ordered, monkeypatch: py
     assert squared("a") == squared("d") == str((2 * 3 + 2 * 4 + 1) ** 2)
     assert CALLS == ["page"] * 4
     assert json.loads(Path("november/documents/d.json").read_text())["stages"] == {"add": {"offset": 1}}
+
+    shutil.rmtree("november/rows/a")  # by hand
+    Path("november/rows/b/out/squared.txt").unlink()
+    rows = {row["name"]: row for row in ordered("status", "november", "--json").data["rows"]}
+    assert [rows[name]["status"] for name in "abcd"] == ["waiting", "waiting", "done", "done"]
+    assert rows["b"]["problem"] == "rows/b/out/squared.txt is gone"
+    third = ordered("batch", "order.yaml", "-o", "november")
+    assert third.code == 0, third.err
+    assert "2 of 4 rows are done and unchanged" in third.err
+    assert squared("a") == str((2 * 3 + 2 * 4 + 1) ** 2)
+    assert squared("b") == str((2 * 4 + 2 * 4 + 2) ** 2)
 
 
 def test_a_row_that_cannot_be_planned_stops_all_before_they_begin(ordered, tmp_path: Path) -> None:

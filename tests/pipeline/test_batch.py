@@ -11,13 +11,17 @@ import time
 from pathlib import Path
 
 import pytest
+from toy_tables import TOY
 
 from vto_pipeline.errors import ConfigError, InputError
+from vto_pipeline.io.files import check_inside
 from vto_pipeline.pipeline.batch import ledger as ledger_module
 from vto_pipeline.pipeline.batch.ledger import LEDGER, Ledger, read_ledger
 from vto_pipeline.pipeline.batch.order import read_order
 from vto_pipeline.pipeline.batch.row import RowResult, RowTask, run_row
 from vto_pipeline.pipeline.execution.store import Store
+from vto_pipeline.stages.entry import planning
+from vto_pipeline.stages.entry.batches import plan_rows
 
 RUN = "run: {schema: 1, given: {left: {number: left.txt}}, want: [total]}\n"
 
@@ -84,6 +88,66 @@ def test_a_wrong_batch_is_refused_with_its_place(tmp_path: Path, text: str, tabl
     assert problem in caught.value.problem
 
 
+@pytest.fixture
+def fenced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """A batch in a folder of its own, read and planned so that it stays there; a file beside that folder."""
+    monkeypatch.setattr(planning, "catalogue", lambda: TOY)
+    (tmp_path / "secret.txt").write_text("7")
+    home = tmp_path / "home"
+    home.mkdir()
+
+    def plan(text: str) -> list:
+        order(home, text)
+        rows = read_order(home / "batch.yaml", home)
+        return plan_rows(rows, Store(tmp_path / "cache"), lambda *_: False, False, home)
+
+    return plan
+
+
+def test_a_batch_with_a_root_reads_what_is_in_it(fenced) -> None:
+    assert len(fenced(f"{RUN}every: {{seed: [1, 2]}}\n")) == 2
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        "../secret.txt",
+        "{home}/../secret.txt",
+        "{outside}",
+        "{outside_from_the_top}",
+        "link.txt",
+        "down/../../secret.txt",
+    ],
+)
+def test_a_batch_with_a_root_reads_nothing_outside_it(fenced, tmp_path: Path, given: str) -> None:
+    (tmp_path / "home" / "down").mkdir()
+    (tmp_path / "home" / "link.txt").symlink_to(tmp_path / "secret.txt")
+    outside = str(tmp_path / "secret.txt")
+    given = given.format(home=tmp_path / "home", outside=outside, outside_from_the_top=outside.lstrip("/"))
+    with pytest.raises(ConfigError, match=r"lies outside .*home"):
+        fenced(f"{RUN}rows: [{{given.left.number: '{given}'}}]\n")
+
+
+@pytest.mark.parametrize("text", ["run: ../run.yaml\nevery: {seed: [1]}\n", f"{RUN}rows: ../table.csv\n"])
+def test_the_parts_of_a_batch_with_a_root_lie_in_it(fenced, tmp_path: Path, text: str) -> None:
+    (tmp_path / "run.yaml").write_text("schema: 1\ngiven: {}\nwant: [total]\n")
+    (tmp_path / "table.csv").write_text("name\na\n")
+    (tmp_path / "home/batch.yaml").write_text(f"schema: 1\n{text}")
+    with pytest.raises(ConfigError, match="lies outside"):
+        read_order(tmp_path / "home/batch.yaml", tmp_path / "home")
+
+
+def test_links_in_a_folder_do_not_lead_out_of_a_root(tmp_path: Path) -> None:
+    (tmp_path / "home/photos").mkdir(parents=True)
+    (tmp_path / "home/a.png").write_bytes(b"1")
+    (tmp_path / "b.png").write_bytes(b"2")
+    (tmp_path / "home/photos/a.png").symlink_to(tmp_path / "home/a.png")
+    check_inside(tmp_path / "home/photos", tmp_path / "home", "here")
+    (tmp_path / "home/photos/b.png").symlink_to("../../b.png")
+    with pytest.raises(ConfigError, match="lies outside"):
+        check_inside(tmp_path / "home/photos", tmp_path / "home", "here")
+
+
 def task(folder: Path, program: str, **limits: float) -> RowTask:
     values = {"seconds": 60.0, "memory_mb": 2000.0, "retries": 0} | limits
     return RowTask("a", "k", (sys.executable, "-c", program), str(folder / "logs" / "a.log"), 1, **values)
@@ -146,7 +210,15 @@ def test_a_row_ends_with_the_worker_that_started_it(tmp_path: Path) -> None:
     assert has_ended(int(pid.read_text()))
 
 
+def records(batch: Path, *names: str) -> None:
+    """The records of runs in a batch's folder."""
+    for name in names:
+        (batch / "rows" / name).mkdir(parents=True)
+        (batch / "rows" / name / "run.json").write_text("{}")
+
+
 def test_the_ledger_knows_what_is_done(tmp_path: Path) -> None:
+    records(tmp_path, "a")
     ledger = Ledger(tmp_path, ["a", "b"])
     ledger.enter(RowResult("a", "k", "done", 0, 2.5, 90.0, 1), "fits")
     again = Ledger(tmp_path, ["a", "b", "c"])
@@ -155,7 +227,10 @@ def test_the_ledger_knows_what_is_done(tmp_path: Path) -> None:
     assert again.expected_seconds("a") == 2.5
     assert again.expected_seconds("c") == float("inf")
     assert read_ledger(tmp_path)["counts"] == {"done": 1, "waiting": 1}
-    assert (tmp_path / "batch.csv").read_text().splitlines()[1] == "a,done,0,2.5,90.0,1,fits,"
+    shutil.rmtree(tmp_path / "rows" / "a")  # by hand
+    assert read_ledger(tmp_path)["counts"] == {"waiting": 2}
+    assert not Ledger(tmp_path, ["a"]).is_done("a", "k")
+    assert (tmp_path / "batch.csv").read_text().splitlines()[1] == "a,done,0,,2.5,90.0,1,fits,,,"
     (tmp_path / LEDGER).write_text('{"rows": [{}]}')
     with pytest.raises(InputError, match="not the record of a batch"):
         Ledger(tmp_path, ["a"])
@@ -174,6 +249,7 @@ def test_what_ended_before_a_kill_is_in_the_ledger(tmp_path: Path) -> None:
     )
     killed = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, check=False)
     assert killed.returncode == -9
+    records(tmp_path, *(f"r{i}" for i in range(30)))
     assert read_ledger(tmp_path)["counts"] == {"done": 30, "waiting": 10}
     names = [f"r{i}" for i in range(40)]
     again = Ledger(tmp_path, names)

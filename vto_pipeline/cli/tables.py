@@ -68,6 +68,6 @@ def _total(expected: Mapping[str, Expected]) -> str:
     unknown = len(rest) - len(known)
     if not known:
         return f"{len(rest)} stages to run; none has run in this folder before, so their time is not known"
-    return f"{len(rest)} stages to run: {sum(known):.0f} s as of last time" + (
+    return f"{len(rest)} stages to run: about {sum(known):.0f} s" + (
         f", and {unknown} whose time is not known" if unknown else ""
     )

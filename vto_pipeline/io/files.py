@@ -10,7 +10,7 @@ from contextlib import ExitStack, contextmanager
 from difflib import get_close_matches
 from pathlib import Path
 
-from vto_pipeline.errors import FormatError, InputError, VtoError
+from vto_pipeline.errors import ConfigError, FormatError, InputError, VtoError
 
 
 def check_file(path: Path, suffixes: Collection[str], limit_bytes: int, *, error: type[VtoError] = InputError) -> Path:
@@ -64,6 +64,24 @@ def resolved(path: Path) -> Path:
         return Path(path).resolve()
     except (RuntimeError, ValueError) as e:
         raise InputError(f"not a path that can be opened: {e}", where=ascii(str(path))) from None
+
+
+def check_inside(path: Path, root: Path, where: str) -> None:
+    """Refuse a file or folder that lies outside a folder, or that links lead out of.
+
+    Args:
+        path: What is to be read; there need be nothing.
+        root: The folder.
+        where: What names it, for the message.
+
+    Raises:
+        ConfigError: it does.
+    """
+    inside = resolved(root)
+    links = (entry for entry in path.rglob("*") if entry.is_symlink()) if path.is_dir() else ()
+    for one in (path, *links):
+        if not resolved(one).is_relative_to(inside):
+            raise ConfigError(f"{one} lies outside {inside}, or links lead there", where=where, hint="see --root")
 
 
 def listed(folder: Path, suffixes: Collection[str]) -> tuple[Path, ...]:

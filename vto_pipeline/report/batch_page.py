@@ -13,17 +13,16 @@ _HERE = Path(__file__).parent
 _TONE = {"done": "good", "waiting": ""}
 
 
-def build_batch_page(batch: Mapping[str, Any], pages: Mapping[str, str]) -> str:
-    """Return the summary of a batch as one HTML document; it refers to the pages of its rows and to nothing else.
+def build_batch_page(batch: Mapping[str, Any]) -> str:
+    """Return the summary of a batch as one HTML document; it refers to the pages and pictures of its rows only.
 
     Args:
-        batch: What batch.json holds.
-        pages: Row -> relative address of its page, for those that have one.
+        batch: What batch.json holds; a row's `page` and `picture` are addresses relative to it, or empty.
     """
     from jinja2 import Environment, StrictUndefined
 
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {"duration": duration, "number": number}
     return environment.from_string((_HERE / "batch.html").read_text(encoding="utf-8")).render(
-        style=(_HERE / "page.css").read_text(encoding="utf-8"), batch=batch, pages=pages, tone=_TONE
+        style=(_HERE / "page.css").read_text(encoding="utf-8"), batch=batch, tone=_TONE
     )

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from vto_pipeline.pipeline.batch.row import RowTask
     from vto_pipeline.pipeline.execution.store import Store
     from vto_pipeline.stages.entry.batches import PlannedRow
+    from vto_pipeline.stages.entry.outcome import Outcome
 
 PROGRAM = (sys.executable, "-c", "import sys; from vto_pipeline.cli.main import main; sys.exit(main())")
 """What runs one row: this program once more, whatever is on the path."""
@@ -33,6 +34,7 @@ PROGRAM = (sys.executable, "-c", "import sys; from vto_pipeline.cli.main import 
 @click.option("--memory", type=click.FloatRange(0.1, 4096), default=6.0, show_default=True, help="Limit of a row [GB].")
 @click.option("--time-limit", type=click.FloatRange(1), default=3600.0, show_default=True, help="Limit of a row [s].")
 @click.option("--retries", type=click.IntRange(0, 10), default=1, show_default=True, help="After a crash of a row.")
+@click.option("--root", type=PATH, metavar="FOLDER", help="Refuse files outside it, for batches from strangers.")
 @force_option
 @message_options
 @pass_session
@@ -45,6 +47,7 @@ def batch_command(
     memory: float,
     time_limit: float,
     retries: int,
+    root: Path | None,
     force_all: bool,
 ) -> None:
     """Run a pipeline document many times, each time with the changes of one row of a table.
@@ -59,18 +62,21 @@ def batch_command(
     from vto_pipeline.pipeline.batch.cluster import default_workers, run_rows
     from vto_pipeline.pipeline.batch.ledger import Ledger
     from vto_pipeline.pipeline.batch.order import read_order
+    from vto_pipeline.pipeline.batch.time_left import TimeLeft
     from vto_pipeline.pipeline.execution.folder import locked_run_folder
     from vto_pipeline.pipeline.execution.store import Store
     from vto_pipeline.stages.entry.batches import plan_rows
+    from vto_pipeline.stages.entry.outcome import open_run
 
-    rows = read_order(document)
+    rows = read_order(document, root)
     folder = (output or Path("runs") / document.stem).absolute()
     names, store = [row.name for row in rows], Store(folder / "cache")
-    planned = plan_rows(rows, store, Ledger(folder, names).is_done, force_all)
+    planned = plan_rows(rows, store, Ledger(folder, names).is_done, force_all, root)
     with locked_run_folder(folder):
         ledger = Ledger(folder, names)
         missing = [one for one in planned if not ledger.is_done(one.row.name, one.key)]
-        missing.sort(key=lambda one: -ledger.expected_seconds(one.row.name))  # the longest first; stable
+        expected = {one.row.name: _expected(one, ledger) for one in missing}
+        missing.sort(key=lambda one: -expected[one.row.name])  # the longest first; stable
         if len(missing) < len(rows):
             session.say(f"{len(rows) - len(missing)} of {len(rows)} rows are done and unchanged")
         for one in missing:
@@ -82,19 +88,30 @@ def batch_command(
             limits = {"seconds": time_limit, "memory_mb": 1e3 * memory, "retries": retries}
             tasks = [_task(one, folder, force_all, count, limits) for one in missing]
             results = run_rows(tasks, count, scheduler, folder / "workers") if tasks else ()
-            began = time.monotonic()
+            left = TimeLeft({task.name: expected[task.name] for task in tasks}, count)
+            if tasks and left.seconds() is not None:
+                session.say(f"{len(tasks)} rows to run: about {left.seconds():.0f} s, by earlier runs")
             for done, result in enumerate(results, start=1):
-                words = _found(folder / "rows" / result.name) if result.status == "done" else ""
-                ledger.enter(result, words)
-                left = (time.monotonic() - began) / done * (len(tasks) - done)
+                words: str = ""
+                shown: dict[str, Any] = {}
+                if result.status == "done":
+                    words, shown = _shown(open_run(folder / "rows" / result.name), folder)
+                ledger.enter(result, words, shown)
+                left.ended(result.name)
                 session.say(
                     f"[{done}/{len(tasks)}] {result.name}: {result.status} after {result.seconds:.1f} s"
-                    f"{': ' if result.problem or words else ''}{result.problem or words}; about {left:.0f} s left"
+                    f"{': ' if result.problem or words else ''}{result.problem or words}"
+                    f"; about {left.seconds() or 0.0:.0f} s left"
                 )
         finally:  # also where it is cancelled
             ledger.save()
-            _write_page(folder)
+            _write_tables(session, folder)
         _answer(session, folder, ledger)
+
+
+def _expected(one: PlannedRow, ledger: Ledger) -> float:
+    """Return the time that a row will take [s]; infinite where nothing like it was run."""
+    return ledger.expected_seconds(one.row.name) if one.seconds is None else one.seconds
 
 
 def _finish_stored(
@@ -113,7 +130,8 @@ def _finish_stored(
             continue
         _write_document(one.row, folder)
         seconds = round(time.monotonic() - began, 3)
-        ledger.enter(RowResult(name, one.key, "done", 0, seconds, 0.0, 0), "; ".join(outcome.verdicts))
+        result = RowResult(name, one.key, "done", 0, seconds, 0.0, 0)
+        ledger.enter(result, *_shown(outcome, folder))
         count += 1
     if count:
         session.say(f"{count} rows had all their results stored")
@@ -152,23 +170,27 @@ def _task(planned: PlannedRow, folder: Path, force_all: bool, workers: int, limi
     )
 
 
-def _found(run: Path) -> str:
-    """Return what a row found in words: its verdicts."""
-    from vto_pipeline.stages.entry.outcome import open_run
+def _shown(outcome: Outcome, folder: Path) -> tuple[str, dict[str, Any]]:
+    """Return the verdicts of a run that has ended, and its page, picture and files as paths in BATCH."""
+    from vto_pipeline.stages.entry.pictures import draw_outcome
 
-    return "; ".join(open_run(run).verdicts)
+    files = [path.relative_to(folder).as_posix() for path in outcome.files]
+    page = next((name for name in files if name.endswith("page.html")), "")
+    return "; ".join(outcome.verdicts), {"page": page, "picture": draw_outcome(outcome, folder), "files": files}
 
 
-def _write_page(folder: Path) -> None:
+def _write_tables(session: Session, folder: Path) -> None:
+    """Write the page and batch.parquet."""
     from vto_pipeline.io.files import replacing
     from vto_pipeline.pipeline.batch.ledger import read_ledger
+    from vto_pipeline.pipeline.batch.summary import write_parquet
     from vto_pipeline.report.batch_page import build_batch_page
 
     batch = read_ledger(folder)
-    pages = {row["name"]: f"rows/{row['name']}/out/page.html" for row in batch["rows"]}
-    pages = {name: page for name, page in pages.items() if (folder / page).is_file()}
     with replacing(folder / "page.html") as beside:
-        beside.write_text(build_batch_page(batch, pages), encoding="utf-8")
+        beside.write_text(build_batch_page(batch), encoding="utf-8")
+    if not write_parquet(batch["rows"], folder / "batch.parquet"):
+        session.say("no batch.parquet: it needs pyarrow")
 
 
 def _answer(session: Session, folder: Path, ledger: Ledger) -> None:
@@ -178,7 +200,10 @@ def _answer(session: Session, folder: Path, ledger: Ledger) -> None:
         BatchError: not every row is done.
     """
     from vto_pipeline.pipeline.batch.ledger import read_ledger
+    from vto_pipeline.pipeline.batch.summary import failure_lines, failures
 
+    for line in failure_lines(failures(ledger.rows.values())):
+        session.say(line)
     done = ledger.counts().get("done", 0)
     if done < len(ledger.rows):
         others = ", ".join(f"{count} {status}" for status, count in sorted(ledger.counts().items()) if status != "done")

@@ -19,7 +19,7 @@ from vto_pipeline.cli.session import Session, pass_session
 def plan_command(session: Session, document: Path, output: Path | None, overrides: tuple[str, ...]) -> None:
     """Show which stages a document would run and which it leaves out, with the reason. Nothing is run.
 
-    Results in the run's folder are named as stored; beside each other stage stands what it took there the last time.
+    Results in the run's folder are named as stored; beside each other stage stands what it will take, by runs there.
 
     \b
     vto plan configs/demo.yaml

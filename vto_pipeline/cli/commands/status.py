@@ -18,6 +18,7 @@ def status_command(session: Session, batch: Path) -> None:
     """Show what has become of every row of a batch, running or ended."""
     from vto_pipeline.cli.tables import table_lines
     from vto_pipeline.pipeline.batch.ledger import read_ledger
+    from vto_pipeline.pipeline.batch.summary import failure_lines
 
     found = read_ledger(batch)
     rows = [
@@ -30,4 +31,5 @@ def status_command(session: Session, batch: Path) -> None:
         for row in found["rows"]
     ]
     counts = ", ".join(f"{count} {status}" for status, count in sorted(found["counts"].items()))
-    session.answer(found, [f"{len(rows)} rows: {counts}", *table_lines(("row", "status", "s", "result"), rows)])
+    lines = [f"{len(rows)} rows: {counts}", *failure_lines(found["failures"])]
+    session.answer(found, [*lines, *table_lines(("row", "status", "s", "result"), rows)])

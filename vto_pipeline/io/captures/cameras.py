@@ -82,7 +82,10 @@ def read_trajectory(path: Path) -> FloatArray:
     Raises:
         FormatError: not what `write_trajectory` wrote.
     """
-    return read_matrix(path, "world_from_cam").reshape(-1, 4, 4)
+    poses = read_matrix(path, "world_from_cam")
+    if poses.size % 16:
+        raise FormatError(f"poses have shape {poses.shape}; expected (N, 4, 4)", where=str(path))
+    return poses.reshape(-1, 4, 4)
 
 
 def read_matrix(path: Path, key: str) -> FloatArray:

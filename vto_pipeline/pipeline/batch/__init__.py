@@ -3,5 +3,7 @@
 order: from a batch document and its table to the documents of all rows
 row: one row in a process of its own, within limits of memory and time
 cluster: all rows on the workers of dask.distributed
+time_left: the forecast of what is still to run
 ledger: batch.json, batch.csv and the journal of rows that have ended
+summary: the columns of every table of rows, and failures of one kind together
 """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, suppress
@@ -13,6 +14,9 @@ from typing import Any
 from vto_pipeline.errors import BatchError, ConfigError, MissingDependencyError
 from vto_pipeline.pipeline.batch.row import RowResult, RowTask, run_row
 
+_GONE = "the scheduler is gone"
+_EACH = 3  # rows that a worker has or waits for
+_LEAST_WINDOW = 4  # also before the first worker has come
 _SHARE_OF_MEMORY = 0.8  # of the machine's that rows may take together
 
 
@@ -66,23 +70,48 @@ def run_rows(tasks: Sequence[RowTask], workers: int, scheduler: str | None, scra
             client = stack.enter_context(Client(address, timeout="20s"))
         except (OSError, TimeoutError, ValueError) as error:
             raise ConfigError(f"no scheduler answers: {error}", where=str(scheduler)) from None
-        futures = {
-            client.submit(run_row, task, key=f"{task.name}-{task.key}", pure=False, priority=-number): task
-            for number, task in enumerate(tasks)
-        }
-        for future in as_completed(futures):
-            yield _result(future, futures[future])
+        waiting = deque(tasks)
+        futures: dict[Any, RowTask] = {}
+        ended = as_completed()
+        while waiting or futures:
+            while waiting and len(futures) < _window(client):
+                task = waiting.popleft()
+                try:
+                    future = client.submit(run_row, task, key=f"{task.name}-{task.key}", pure=False)
+                except Exception:  # its class differs by version; a client that has closed takes nothing
+                    yield from (_lost(one, _GONE) for one in [*futures.values(), task, *waiting])
+                    return
+                futures[future] = task
+                ended.add(future)
+            future = next(ended)
+            result = _result(future, futures.pop(future))
+            yield result
+            if result.problem == _GONE:
+                yield from (_lost(task, _GONE) for task in [*futures.values(), *waiting])
+                return
+
+
+def _window(client: Any) -> int:
+    """Return how many rows the workers hold at once, so that each has its next; as many have joined by now."""
+    try:
+        return max(_LEAST_WINDOW, _EACH * sum(client.nthreads().values()))
+    except OSError:  # the scheduler is gone: the rows it had will tell
+        return _LEAST_WINDOW
 
 
 def _result(future: Any, task: RowTask) -> RowResult:
     """Return what became of a row whose future has ended."""
-    problem = "the scheduler is gone"
+    problem = _GONE
     if future.status == "finished":
         with suppress(OSError, CancelledError):  # it can still be lost on its way here
             result: RowResult = future.result()
             return result
     elif future.status != "cancelled":
         problem = _problem(future.exception())
+    return _lost(task, problem)
+
+
+def _lost(task: RowTask, problem: str) -> RowResult:
     return RowResult(task.name, task.key, "lost", -9, 0.0, 0.0, 1, problem)
 
 

@@ -6,7 +6,6 @@ rarely that a row costs the same in a batch of any size.
 
 from __future__ import annotations
 
-import csv
 import json
 import time
 from collections import Counter
@@ -18,13 +17,14 @@ from typing import Any
 
 from vto_pipeline.errors import InputError
 from vto_pipeline.io.documents import write_json
-from vto_pipeline.io.files import replacing
 from vto_pipeline.pipeline.batch.row import RowResult
+from vto_pipeline.pipeline.batch.summary import failure_kind, failures, write_csv
+from vto_pipeline.pipeline.execution.folder import RECORD
 
 LEDGER = "batch.json"
 JOURNAL = "batch.partial.jsonl"
 
-_COLUMNS = ("name", "status", "exit_code", "seconds", "peak_mb", "tries", "result", "problem")
+_BLANK = {"result": "", "problem": "", "failure": "", "page": "", "picture": ""}
 _REST = 50.0  # times as long as writing both files took, they are left alone
 
 
@@ -40,8 +40,8 @@ class Ledger:
         self._folder = folder
         self._due = 0.0
         known = {row["name"]: row for row in read_ledger(folder)["rows"]} if (folder / LEDGER).is_file() else {}
-        waiting = {"status": "waiting", "key": "", "problem": "", "result": ""}
-        self.rows: dict[str, dict[str, Any]] = {name: known.get(name, {"name": name, **waiting}) for name in names}
+        new = {"status": "waiting", "key": "", **_BLANK}
+        self.rows: dict[str, dict[str, Any]] = {name: known.get(name, {"name": name, **new}) for name in names}
 
     def is_done(self, name: str, key: str) -> bool:
         """Whether a row has been done before, with the same result to be expected."""
@@ -54,11 +54,18 @@ class Ledger:
 
     def wait(self, name: str) -> None:
         """Note that a row is still to be run."""
-        self.rows[name]["status"] = "waiting"
+        self.rows[name] |= {**_BLANK, "status": "waiting"}
 
-    def enter(self, result: RowResult, words: str) -> None:
-        """Note what became of a row, and what it found in words."""
-        self.rows[result.name] = row = {**asdict(result), "result": words}
+    def enter(self, result: RowResult, words: str, shown: Mapping[str, Any] | None = None) -> None:
+        """Note what became of a row.
+
+        Args:
+            result: How it ended.
+            words: What it found.
+            shown: Its `page` and `picture`, and the `files` that it is done with, all as paths in BATCH.
+        """
+        self.rows[result.name] = row = {**asdict(result), "result": words, **(shown or {})}
+        row["failure"] = failure_kind(row)
         with (self._folder / JOURNAL).open("a", encoding="utf-8") as journal:
             journal.write(json.dumps(row, ensure_ascii=False) + "\n")
         if time.monotonic() >= self._due:
@@ -71,11 +78,10 @@ class Ledger:
     def save(self) -> None:
         """Write both files whole, and begin the journal anew."""
         began = time.monotonic()
-        write_json(self._folder / LEDGER, {"schema": 1, "counts": self.counts(), "rows": list(self.rows.values())})
-        with replacing(self._folder / "batch.csv") as beside, beside.open("w", encoding="utf-8", newline="") as stream:
-            writer = csv.DictWriter(stream, _COLUMNS, restval="", extrasaction="ignore")
-            writer.writeheader()
-            writer.writerows(self.rows.values())
+        rows = list(self.rows.values())
+        record = {"schema": 1, "counts": self.counts(), "failures": failures(rows), "rows": rows}
+        write_json(self._folder / LEDGER, record)
+        write_csv(rows, self._folder / "batch.csv")
         (self._folder / JOURNAL).unlink(missing_ok=True)
         ended = time.monotonic()
         self._due = ended + _REST * (ended - began)
@@ -83,6 +89,8 @@ class Ledger:
 
 def read_ledger(folder: Path) -> Mapping[str, Any]:
     """Read batch.json of a batch's folder, and what its journal has on top.
+
+    A row that was done and whose files are no longer there waits again. `failures` has those of one kind together.
 
     Raises:
         InputError: it holds none, or a damaged one.
@@ -97,8 +105,17 @@ def read_ledger(folder: Path) -> Mapping[str, Any]:
         raise InputError("not the folder of a batch: it has no batch.json", where=str(folder)) from None
     except (ValueError, KeyError, TypeError) as e:
         raise InputError(f"not the record of a batch: {e}", where=str(path), hint="remove it, and run again") from None
-    rows = [later.get(row["name"], row) for row in found["rows"]]
-    return {**found, "counts": _counts(rows), "rows": rows}
+    rows = [_BLANK | _with_its_files(later.get(row["name"], row), folder) for row in found["rows"]]
+    return {**found, "counts": _counts(rows), "failures": failures(rows), "rows": rows}
+
+
+def _with_its_files(row: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Return a row as it is, or as waiting where files that it was done with have been removed since."""
+    if row["status"] != "done":
+        return row
+    files = row.get("files", [f"rows/{row['name']}/{RECORD}"])
+    lacking = next((name for name in files if not (folder / name).exists()), None)
+    return row if lacking is None else {**row, **_BLANK, "status": "waiting", "problem": f"{lacking} is gone"}
 
 
 def _journal(path: Path) -> Iterator[dict[str, Any]]:

@@ -16,7 +16,7 @@ from pydantic import Field
 
 from vto_pipeline.errors import ConfigError, MissingDependencyError
 from vto_pipeline.io.documents import Document, check_schema, load_yaml
-from vto_pipeline.io.files import check_file
+from vto_pipeline.io.files import check_file, check_inside
 from vto_pipeline.model.settings import Config
 from vto_pipeline.pipeline.request import number_or_word
 
@@ -53,11 +53,12 @@ class Row:
     where: str
 
 
-def read_order(path: Path) -> list[Row]:
+def read_order(path: Path, root: Path | None = None) -> list[Row]:
     """Read a batch document and its table.
 
     Args:
         path: YAML; paths in it, in its pipeline document and in its table start from its own folder.
+        root: Folder that its pipeline document and its table must lie in; None: they may lie anywhere.
 
     Returns:
         The rows, in their order; `every` repeats each of them.
@@ -69,6 +70,9 @@ def read_order(path: Path) -> list[Row]:
     document = load_yaml(path)
     batch: BatchFile = check_schema(document, BatchFile)
     base = path.resolve().parent
+    for name in (batch.run, batch.rows):
+        if root is not None and isinstance(name, str):
+            check_inside(base / name, root, str(path))
     whole = _pipeline_document(batch.run, document, base)
     changes = list(_changes(batch, document, base))
     rows: list[Row] = []

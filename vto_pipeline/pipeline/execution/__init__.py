@@ -5,5 +5,5 @@ key, digest, store: what decides a result, and where it is kept
 folder, out, final: the folder of a run and what is published there
 record, cost, listener: run.json, wall time and memory, progress
 budget: wall time, shared out
-forecast: what a run would do, and how long it took the last time
+forecast, cost_model: what a run would do, and how long that takes by what earlier runs took
 """

@@ -1,4 +1,4 @@
-"""What a run would do: which results are stored, and how long and large the others were the last time."""
+"""What a run would do: which results are stored, and how long and large the others will be, by earlier runs."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
+from vto_pipeline.pipeline.execution.cost_model import CostModel, step_figures
 from vto_pipeline.pipeline.execution.digest import OfPath, digest_given, digest_path
 from vto_pipeline.pipeline.execution.key import result_key
 from vto_pipeline.pipeline.execution.store import MANIFEST, Result, Store
@@ -21,7 +22,8 @@ class Expected:
 
     Args:
         stored: Whether its result is there already.
-        seconds, peak_mb: Of its latest result in the store, whatever that was made from; None if there is none.
+        seconds: Of its stored result, or as the cost model forecasts it; None where the stage never ran.
+        peak_mb: Of its latest result in the store, whatever that was made from; None if there is none.
     """
 
     stored: bool
@@ -39,9 +41,12 @@ def forecast(request: Request, plan: Plan, store: Store, force_all: bool = False
         force_all: Of the run.
     """
     found = {}
+    model, figures = CostModel(store), step_figures(request, plan)
     for step, result in stored_results(request, plan, store, force_all):
-        record = result.record if result is not None else latest_record(store, step.stage.name)
-        found[step.stage.name] = Expected(result is not None, record.get("seconds"), record.get("peak_mb"))
+        name = step.stage.name
+        record = result.record if result is not None else latest_record(store, name)
+        seconds = record["seconds"] if result is not None else model.seconds(name, figures[name])
+        found[name] = Expected(result is not None, seconds, record.get("peak_mb"))
     return found
 
 

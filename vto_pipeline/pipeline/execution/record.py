@@ -14,6 +14,7 @@ import vto_pipeline
 from vto_pipeline.io.documents import write_json
 from vto_pipeline.model.job import Job
 from vto_pipeline.pipeline.execution.cost import Meter, machine, thread_count
+from vto_pipeline.pipeline.execution.cost_model import step_figures
 from vto_pipeline.pipeline.execution.key import versions
 from vto_pipeline.pipeline.given import Given
 from vto_pipeline.pipeline.plan import Plan
@@ -33,6 +34,7 @@ class StageRecord:
         notes, warnings: What it said; a warning is a verdict on a poor result.
         left_out: Parts of its work that this data did not need: (what, reason).
         key: Of its result.
+        figures: What the plan knew of its work, from which its time is forecast.
     """
 
     name: str
@@ -45,6 +47,7 @@ class StageRecord:
     warnings: list[str] = field(default_factory=list)
     left_out: list[Any] = field(default_factory=list)
     key: str = ""
+    figures: Mapping[str, float | str] = field(default_factory=dict)
 
     def take(self, job: Job, meter: Meter) -> None:
         """Copy a job's messages, metrics and cost."""
@@ -64,7 +67,8 @@ class RunRecord:
     def __init__(self, path: Path, request: Request, plan: Plan, time_budget: float | None = None) -> None:
         self._path, self._meter = path, Meter()
         uses = sorted({name for step in plan.steps for name in step.stage.uses})
-        self.stages = {step.stage.name: StageRecord(step.stage.name) for step in plan.steps}
+        figures = step_figures(request, plan)
+        self.stages = {name: StageRecord(name, figures=known) for name, known in figures.items()}
         for name, reason in plan.left_out.items():
             self.stages[name] = StageRecord(name, "left_out", reason)
         self._head = {

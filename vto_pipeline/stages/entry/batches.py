@@ -7,17 +7,20 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from vto_pipeline.errors import VtoError
 from vto_pipeline.io.documents import Document
+from vto_pipeline.io.files import check_inside
 from vto_pipeline.pipeline.batch.order import Row
 from vto_pipeline.pipeline.catalogue import Catalogue
+from vto_pipeline.pipeline.execution.cost_model import CostModel, size_of, step_figures
 from vto_pipeline.pipeline.execution.digest import digest_path
 from vto_pipeline.pipeline.execution.forecast import stored_results
 from vto_pipeline.pipeline.execution.key import run_key
 from vto_pipeline.pipeline.execution.run import run
 from vto_pipeline.pipeline.execution.store import Store
-from vto_pipeline.pipeline.plan import Plan
+from vto_pipeline.pipeline.plan import Plan, Step
 from vto_pipeline.pipeline.request import Request
 from vto_pipeline.stages.entry import planning
 from vto_pipeline.stages.entry.outcome import Outcome
@@ -32,16 +35,23 @@ class PlannedRow:
         key: Of its result.
         done: Whether it was done before.
         stored: Whether, though it was not, the result of every stage is stored.
+        seconds: Time that it will take, as far as the cost model knows; None where it knows none of its stages. What
+            several rows share counts in the first of them.
     """
 
     row: Row
     key: str
     done: bool
     stored: bool
+    seconds: float | None = None
 
 
 def plan_rows(
-    rows: Sequence[Row], store: Store, is_done: Callable[[str, str], bool], force_all: bool
+    rows: Sequence[Row],
+    store: Store,
+    is_done: Callable[[str, str], bool],
+    force_all: bool,
+    root: Path | None = None,
 ) -> list[PlannedRow]:
     """Plan every row, so that no mistake waits until hours have passed. A file that rows share is read once.
 
@@ -50,24 +60,51 @@ def plan_rows(
         store: Where the rows keep their results.
         is_done: Name and key of a row -> whether it was done before.
         force_all: Of the runs.
+        root: Folder that all given files must lie in; None: they may lie anywhere.
 
     Raises:
         VtoError: of the first row that is wrong.
     """
     tables, of_path = planning.catalogue(), cache(digest_path)
+    forecast = _Forecast(store)
     found = []
     for row in rows:
         try:
             request, plan, _ = _plan(row, tables)
+            if root is not None:
+                for path in [path for one in request.given.values() for path in one.paths]:
+                    check_inside(path, root, row.where)
             key = run_key(request, plan, force_all, of_path)
         except VtoError as error:
             error.where = f"row {row.name}, {error.where or row.where}"
             raise
         done = is_done(row.name, key)
-        results = () if done else stored_results(request, plan, store, force_all, of_path)
-        stored = not done and all(result is not None for step, result in results if not step.stage.final)
-        found.append(PlannedRow(row, key, done, stored))
+        results = [] if done else list(stored_results(request, plan, store, force_all, of_path))
+        missing = [step for step, result in results if result is None]
+        stored = not done and all(step.stage.final for step in missing)
+        found.append(PlannedRow(row, key, done, stored, forecast.seconds(request, plan, missing)))
     return found
+
+
+class _Forecast:
+    """The time of rows, one after another."""
+
+    def __init__(self, store: Store) -> None:
+        self._model, self._size = CostModel(store), cache(size_of)
+        self._counted: set[tuple[Any, ...]] = set()
+
+    def seconds(self, request: Request, plan: Plan, missing: Sequence[Step]) -> float | None:
+        """Return the time [s] of the stages of a row that are to run and that no row before it runs."""
+        if not self._model or not missing:
+            return None
+        figures, known = step_figures(request, plan, self._size), []
+        for step in missing:
+            name = step.stage.name
+            work = (name, *sorted(figures[name].items()))
+            if work not in self._counted and (seconds := self._model.seconds(name, figures[name])) is not None:
+                known.append(seconds)
+            self._counted.add(work)
+        return sum(known) if known else None
 
 
 def finish_stored(row: Row, folder: Path, store: Store, force_all: bool) -> Outcome | None:

@@ -48,6 +48,11 @@ class Outcome:
                 found.append(f"fit{f' of {garment}' if garment else ''}: {self.read(artifact)['verdict']}")
         return found
 
+    @property
+    def files(self) -> list[Path]:
+        """Its record, and the files of what was wanted."""
+        return [self.folder / RECORD, *(self.path(name) for name in self.record["wanted"] if self.made(name))]
+
     def made(self, artifact: str) -> bool:
         """Whether there is a file of an artifact; a run that was interrupted or failed has not made all it should."""
         return (self.folder / "out" / self.tables.kind(artifact).filename).is_file()
