@@ -76,6 +76,33 @@ def test_holes_are_filled_and_the_two_ends_stay(radius, form):
     assert bool(job.warnings) != form  # without the form it is a guess, and said so
 
 
+def half_seen():
+    """A tube with four windows, and which share of the whole tube is left of it."""
+    torn = punched(sleeve(), [[0.1, 0.12, 0], [-0.1, 0.12, 0], [0, 0.28, 0.1], [0, 0.28, -0.1]], 0.07)
+    a, b, c = torn.vertices[torn.faces].transpose(1, 0, 2)
+    return torn, np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / (4 * np.pi * RADIUS * HEIGHT)
+
+
+def test_a_garment_that_was_hardly_seen_is_refused():
+    torn, share = half_seen()
+    assert 0.6 < share < 0.79
+    with pytest.raises(GarmentError, match=r"only 7\d\.\d % of the garment was seen") as refused:
+        close_scan_holes(torn, arm(), OpeningsConfig(), Job())
+    assert_allclose(float(str(refused.value).split()[2]), 100 * share, atol=1)
+    assert refused.value.exit_code == 4
+    assert "openings.least_seen" in refused.value.hint
+
+
+@pytest.mark.parametrize("given", [{"keep": 2}, {"least_seen": 0.5}])
+def test_who_answers_for_it_gets_the_garment_that_was_hardly_seen(given):
+    torn, share = half_seen()
+    job = Job()
+    _, openings, _ = close_scan_holes(torn, arm(), OpeningsConfig(**given), job)
+    assert len(openings) == 2
+    assert_allclose(1 - job.metrics["unobserved_share"], share, atol=0.01)
+    assert any("of the garment was seen" in text for text in job.warnings) == ("keep" in given)
+
+
 def test_a_hole_as_big_as_a_cuff_is_no_cuff():
     cuff = sleeve(0.045, 0.25, 90, 70)
     torso_hole = punched(sleeve(0.16, 0.5, 200, 110), [[0.16, 0.25, 0.0]], 0.045)

@@ -95,6 +95,20 @@ def test_extension_of_a_linear_function_is_that_function(order):
     assert_allclose(extend_smoothly(sheet, blanked, free, order), values, atol=1e-9)
 
 
+def test_a_held_border_bears_no_moment():
+    """As a beam: clamped at one end with a slope, hinged at the other; along a tube nothing depends on the turn."""
+    turn, along = np.meshgrid(np.arange(24) * np.pi / 12, np.arange(43) / 40 - 0.05, indexing="ij")
+    vertices = np.stack([np.cos(turn) / 6.6, along, np.sin(turn) / 6.6], axis=-1).reshape(-1, 3)
+    at = np.arange(24 * 43).reshape(24, 43)
+    a, b, c, d = at[:, :-1], np.roll(at, -1, 0)[:, :-1], np.roll(at, -1, 0)[:, 1:], at[:, 1:]
+    faces = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).reshape(-1, 3).astype(np.int32)
+    y = vertices[:, 1:2]
+    beam = np.where(y < 0, y, y - 1.5 * y**2 + 0.5 * y**3)  # slope 1 at 0; height and bending 0 at 1
+    free = (y[:, 0] > 1e-9) & (y[:, 0] < 1 - 1e-9)
+    found = extend_smoothly(TriangleMesh(vertices, faces), np.where(free[:, None], 9.0, beam), free, 2)
+    assert_allclose(found, beam, atol=0.01)
+
+
 def test_paths_along_edges_are_as_long_as_the_grid_says():
     sheet = shapes.grid(10, 10, 0.1)
     found = distance_from(sheet, np.array([0]), limit=0.55)

@@ -17,7 +17,9 @@ OUTSIDE, INSIDE = 0.15, 0.5
 """It is as deep so many radii before the loop and behind it: what bulges into a hole, or slants across, ends there."""
 RIM_OUTSIDE = 0.9
 """Share of the rim that must stay outside the mannequin while the disc is moved inwards."""
-RINGS = np.arange(0.5, 10.0) / 10.0
+RINGS = np.arange(0.5, 6.0) / 6.0
+AROUND = 36
+"""A loop is looked at in so many places, evenly along it."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +76,7 @@ def encloses(points: FloatArray, distance: SurfaceDistance, reach: float) -> boo
         distance: Signed distances to the mannequin.
         reach: How far inside the body part may end [m].
     """
+    points = _evenly(points)
     if passes_through(points, distance):
         return True
     _, _, normal = _disc(points)
@@ -88,7 +91,7 @@ def encloses(points: FloatArray, distance: SurfaceDistance, reach: float) -> boo
 
 def outside_share(points: FloatArray, distance: SurfaceDistance) -> float:
     """Return which share of a loop (L, 3) lies outside the mannequin, or hardly inside."""
-    return float(np.mean(distance.signed(points).distance > -0.05 * _radius(points)))
+    return float(np.mean(distance.signed(_evenly(points)).distance > -0.05 * _radius(points)))
 
 
 def passes_through(points: FloatArray, distance: SurfaceDistance) -> bool:
@@ -100,6 +103,7 @@ def passes_through(points: FloatArray, distance: SurfaceDistance) -> bool:
         points: The loop in order [m], shape (L, 3).
         distance: Signed distances to the mannequin.
     """
+    points = _evenly(points)
     _, _, normal = _disc(points)
     outward = _radius(points) * normal
     return all(_fills(points, share * outward, distance) for share in (0.0, OUTSIDE, -INSIDE))
@@ -109,9 +113,18 @@ def _fills(points: FloatArray, shift: FloatArray, distance: SurfaceDistance) -> 
     """Return whether the mannequin fills the middle of a loop's disc, when that is moved."""
     _, center, _ = _disc(points)
     disc = (center + RINGS[:, None, None] * (points - center)).reshape(-1, 3)
-    depth = -distance.signed(disc + shift).distance
-    filled = float(np.average(depth > 0.0, weights=np.repeat(RINGS, len(points))))
-    return bool(depth.max() > DEEP * _radius(points) and filled > LEAST_FILLED)
+    inside = distance.inside(disc + shift)
+    if np.average(inside, weights=np.repeat(RINGS, len(points))) <= LEAST_FILLED:
+        return False
+    return bool(distance.nearest((disc + shift)[inside]).distance.max() > DEEP * _radius(points))
+
+
+def _evenly(points: FloatArray) -> FloatArray:
+    """Return a closed curve (L, 3) as points at even distances along it, shape (AROUND, 3)."""
+    closed = np.vstack([points, points[:1]])
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
+    at = np.arange(AROUND) / AROUND * along[-1]
+    return np.column_stack([np.interp(at, along, closed[:, d]) for d in range(3)])
 
 
 def _radius(points: FloatArray) -> float:

@@ -53,13 +53,18 @@ def close_notches(
         reach: How far inside an opening the mannequin may end [m].
     """
     closed = 0
+    done: set[bytes] = set()  # rims without a notch, by their vertices, which keep their numbers
     for _ in range(ROUNDS):
-        rims = [walk for walk in boundary_walks(mesh) if _length(mesh, walk) > least_perimeter]
-        notches = [
-            notch
-            for walk in rims
-            if (notch := _largest_notch(mesh, walk, distance, bare, least_perimeter, reach)) is not None
-        ]
+        notches = []
+        for walk in boundary_walks(mesh):
+            rim = np.sort(half_edges(mesh)[walk, 0]).tobytes()
+            if rim in done or _length(mesh, walk) <= least_perimeter:
+                continue
+            notch = _tightest_notch(mesh, walk, distance, bare, least_perimeter, reach)
+            if notch is None:
+                done.add(rim)
+            else:
+                notches.append(notch)
         for around, directions in notches:
             mesh = _fill_smoothly(mesh, around, directions)
         if not notches:
@@ -73,7 +78,7 @@ def _length(mesh: TriangleMesh, walk: IntArray) -> float:
     return float(np.linalg.norm(mesh.vertices[end] - mesh.vertices[start], axis=1).sum())
 
 
-def _largest_notch(
+def _tightest_notch(
     mesh: TriangleMesh,
     walk: IntArray,
     distance: SurfaceDistance,
@@ -81,30 +86,59 @@ def _largest_notch(
     least_perimeter: float,
     reach: float,
 ) -> tuple[IntArray, FloatArray] | None:
-    """Return the half-edges round the largest notch of a boundary loop, and the directions in which the rim comes to it
-    and goes on after it, shape (2, 3); None when there is no notch."""
+    """Return the half-edges round the notch that leaves the shortest rim, and the directions in which that comes to it
+    and goes on after it, shape (2, 3); None when there is no notch.
+
+    Under an arm the longer ways round it go along the flank, and would web it to the sleeve. Every other place of the
+    rim is looked at, then the places beside the best.
+    """
     points = mesh.vertices[half_edges(mesh)[walk, 0]]
     for _ in range(2):
         points = smooth_curve(points, WAVELENGTH)
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1))])
     at = np.unique(np.searchsorted(along[:-1], np.arange(LOOKED_AT) / LOOKED_AT * along[-1]).clip(max=len(walk) - 1))
-    for start, end in _candidate_notches(points, along, at, distance, least_perimeter)[:TRIED]:
+
+    def is_notch(start: int, end: int) -> bool:
         if bare is not None and np.mean(bare.under(_between(points, along, start, end))) > BARE:
-            continue
+            return False
         left = at[np.argsort(np.mod(at - end, len(walk)))]  # from the notch's end round to its start
         left = left[: np.count_nonzero(np.mod(at - end, len(walk)) <= np.mod(start - end, len(walk)))]
         closing_line = points[start] + np.linspace(0.0, 1.0, 12)[1:-1, None] * (points[end] - points[start])
         path = _path(points, start, end)
         cut_off = np.vstack([path[:: 1 + len(path) // LOOKED_AT], closing_line[::-1]])
-        if passes_through(cut_off, distance):
-            continue
         rim = np.vstack([points[left], closing_line])
-        if encloses(rim, distance, reach) and outside_share(rim, distance) >= RIM_OUTSIDE:
-            before = points[start] - points[_index_along(along, start, -TANGENT)]
-            after = points[_index_along(along, end, TANGENT)] - points[end]
-            notch = np.roll(walk, -start)[: (end - start) % len(walk)]
-            return notch, np.stack([before, after]) / np.linalg.norm([before, after], axis=1, keepdims=True)
-    return None
+        if outside_share(rim, distance) < RIM_OUTSIDE or passes_through(cut_off, distance):
+            return False
+        return encloses(rim, distance, reach)
+
+    def shortest(which: NDArray[np.bool_]) -> int | None:
+        best = None
+        for k in np.flatnonzero(which):
+            if (best is None or length_left[k] < length_left[best]) and is_notch(*candidates[k]):
+                best = int(k)
+        return best
+
+    candidates = _candidate_notches(points, along, at, distance, least_perimeter)[:TRIED]
+    if not candidates:
+        return None
+    begin, finish = np.array(candidates).T
+    length_left = along[-1] - np.mod(along[finish] - along[begin], along[-1])
+    length_left += np.linalg.norm(points[finish] - points[begin], axis=1)
+    place = np.searchsorted(at, np.array(candidates))
+    every_other = np.all(place % 2 == 0, axis=1)
+    best = shortest(every_other)
+    if best is None:
+        best = shortest(~every_other)
+    else:
+        apart = np.abs(place - place[best])
+        best = shortest(np.all(np.minimum(apart, len(at) - apart) <= 2, axis=1))
+    if best is None:
+        return None
+    start, end = candidates[best]
+    before = points[start] - points[_index_along(along, start, -TANGENT)]
+    after = points[_index_along(along, end, TANGENT)] - points[end]
+    notch = np.roll(walk, -start)[: (end - start) % len(walk)]
+    return notch, np.stack([before, after]) / np.linalg.norm([before, after], axis=1, keepdims=True)
 
 
 def _path(points: FloatArray, start: int, end: int) -> FloatArray:

@@ -38,6 +38,9 @@ class OpeningsConfig(Config):
         le=50,
         description="Number of openings that stay, whatever the evidence: the likeliest, then longest",
     )
+    least_seen: float = Field(
+        0.8, ge=0, le=1, description="Share of the garment that must have been seen; `keep` makes less a warning"
+    )
     ledge_mm: float = Field(40.0, ge=0, le=200, description="Widest ledge sought between cloth and mannequin [mm]")
     flap_edges: float = Field(4.0, ge=0, le=50, description="Parts that hang on by less are dropped [edge lengths]")
     fair_mm: float = Field(40.0, ge=0, le=200, description="Zigzags shorter than this are smoothed out of rims [mm]")
@@ -72,7 +75,7 @@ def close_scan_holes(
         The garment in one piece; its openings, highest first; which of its vertices were observed, shape (V,).
 
     Raises:
-        GarmentError: another number of openings than expected, or a hole that cannot be filled.
+        GarmentError: another number of openings than expected, a hole that cannot be filled, or too little was seen.
         InputError: no opening is left that a body could get through.
     """
     job.progress(0.0, "cleaning rims")
@@ -107,14 +110,16 @@ def close_scan_holes(
         raise GarmentError(f"the garment fell apart into {face_components(final)[0]} pieces")
     found = list_openings(final)
     check_wearable(final, found)
+    seen = _area(final, slice(len(clean.faces))) / _area(final)
     job.measure(
         openings=len(found),
         filled_holes=len(shapes) - count,
         filled_notches=notches,
         perimeters_mm=[round(opening.perimeter * 1e3, 1) for opening in found],
         trimmed_cm2=(_area(shell) - _area(clean)) * 1e4,
-        unobserved_share=1.0 - _area(final, np.all(observed[final.faces], axis=1)) / _area(final),
+        unobserved_share=1.0 - seen,
     )
+    _check_seen(seen, final, config, job)
     return final, found, observed
 
 
@@ -151,6 +156,27 @@ def _check_not_through(mesh: TriangleMesh, which: NDArray[np.bool_], distance: S
             f"{problem}{-1e3 * inside.distance[deepest]:.0f} mm inside: too little was seen beside an opening",
             hint="take more photos of that place, from above or below; are scan and mannequin aligned?",
         )
+
+
+def _check_seen(share: float, garment: TriangleMesh, config: OpeningsConfig, job: Job) -> None:
+    """Refuse a garment of which too little was seen: fillings would decide its shape. Who says how many openings it has
+    answers for it.
+
+    Raises:
+        GarmentError: less was seen than `least_seen`, and `keep` is not given.
+    """
+    if share >= config.least_seen:
+        return
+    problem = f"only {100.0 * share:.1f} % of the garment was seen; the rest was filled and may be off by centimetres"
+    if config.keep is not None:
+        job.warn(problem)
+        return
+    raise GarmentError(
+        f"{problem} (the least is {100.0 * config.least_seen:.0f} %)",
+        hint="take more photos or frames of what is missing, often under the arms and from above and below; "
+        "or look at it, and set openings.keep or a lower openings.least_seen",
+        partial={"garment": garment},
+    )
 
 
 def _project_off_mannequin(

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix, diags
 from scipy.sparse.linalg import spsolve
 
-from vto_pipeline.geometry.topology import face_area_vectors
+from vto_pipeline.geometry.topology import edge_face_counts, face_area_vectors
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -42,13 +42,18 @@ def extend_smoothly(mesh: TriangleMesh, values: FloatArray, free: NDArray[np.boo
         mesh: The surface.
         values: Shape (V, D).
         free: Which vertices, shape (V,); each piece of the mesh needs some that are not.
-        order: 1 harmonic (least slope), 2 biharmonic (least bending).
+        order: 1 harmonic (least slope), 2 biharmonic (least bending). A border that is held bears no moment then:
+            the values come to it at any slope.
     """
     if not free.any():
         return values
     matrix, area = laplacian(mesh)
     if order == 2:
-        matrix = csr_matrix(matrix @ diags(1.0 / area) @ matrix)
+        pair, count = edge_face_counts(mesh)
+        hinged = np.zeros(len(values), dtype=bool)
+        hinged[pair[count == 1]] = True
+        hinged &= ~free
+        matrix = csr_matrix(matrix @ diags(np.where(hinged, 0.0, 1.0 / area)) @ matrix)
     rows = matrix[free]
     solved = spsolve(rows[:, free].tocsc(), -np.asarray(rows[:, ~free] @ values[~free]))
     result = np.array(values, dtype=float)

@@ -94,7 +94,7 @@ def _sew_in(mesh: TriangleMesh, rims: list[Rim]) -> TriangleMesh:
         vertices.append(new)
         count += len(new)
     joined = TriangleMesh(np.vstack(vertices), np.vstack(faces))
-    if not is_manifold(joined):
+    if not is_manifold(joined, np.unique(joined.faces[len(mesh.faces) :])):
         raise GarmentError(f"filling {len(rims)} holes left the mesh non-manifold", hint="clean the rims first")
     return joined
 

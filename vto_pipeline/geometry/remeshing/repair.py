@@ -39,15 +39,22 @@ def repair(mesh: TriangleMesh, config: RepairConfig, job: Job) -> TriangleMesh:
     return _orient_outward(_cut_apart(oriented, job), job)
 
 
-def is_manifold(mesh: TriangleMesh) -> bool:
-    """Return whether each edge has one or two faces, and each used vertex one fan of faces."""
+def is_manifold(mesh: TriangleMesh, at: IntArray | None = None) -> bool:
+    """Return whether each edge has one or two faces, and each used vertex one fan of faces; all of them, or those given
+    and the edges there."""
     import igl
 
-    _, counts = edge_face_counts(mesh)
+    faces, used = mesh.faces, at
+    if at is None:
+        used = np.unique(faces)
+    else:
+        here = np.zeros(len(mesh.vertices), dtype=bool)
+        here[at] = True
+        faces = faces[here[faces].any(axis=1)]
+    _, counts = edge_face_counts(TriangleMesh(mesh.vertices, faces))
     if counts.max() > 2:
         return False
-    used = np.unique(mesh.faces)
-    return bool(igl.is_vertex_manifold(mesh.faces.astype(np.int64))[used].all())
+    return bool(igl.is_vertex_manifold(faces.astype(np.int64))[used].all())
 
 
 def is_oriented(mesh: TriangleMesh) -> bool:
