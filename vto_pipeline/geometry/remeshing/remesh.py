@@ -12,6 +12,7 @@ from vto_pipeline.errors import GarmentError, InputError
 from vto_pipeline.geometry.remeshing.decimate import decimate, faces_at
 from vto_pipeline.geometry.remeshing.isotropic import isotropic
 from vto_pipeline.geometry.remeshing.repair import is_manifold
+from vto_pipeline.geometry.remeshing.rim_ears import flip_ears
 from vto_pipeline.geometry.remeshing.small_rims import SMALL, even_small_rims
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import (
@@ -63,7 +64,7 @@ def remesh(mesh: TriangleMesh, config: RemeshConfig, job: Job) -> TriangleMesh:
     closed = _close_with_cones(coarse, SMALL * edge)
     job.progress(0.3, "remeshing")
     fine, rim_faces = _remesh_closed(closed, len(coarse.faces), edge, config.iterations)
-    result, _ = submesh(fine, rim_faces)
+    result = flip_ears(submesh(fine, rim_faces)[0])
     _check(mesh, result, job)
     return result
 
