@@ -43,6 +43,13 @@ def squared(row: str) -> str:
     return Path("november", "rows", row, "out", "squared.txt").read_text()
 
 
+def test_a_file_that_is_missing_is_missing_in_the_folder_of_the_batch(ordered, tmp_path: Path) -> None:
+    (tmp_path / "table.csv").write_text(TABLE.replace("right.txt", "nowhere.txt"))
+    said = ordered("batch", "order.yaml", "-o", "november")
+    assert said.code == 3, said.err
+    assert str(tmp_path / "nowhere.txt") in said.err.replace("\n", "")
+
+
 @pytest.mark.filterwarnings("default")  # of dask and its worker processes
 def test_a_batch_does_what_can_be_done_and_only_the_rest_again(ordered, tmp_path: Path) -> None:
     said = ordered("batch", "order.yaml", "-o", "november", "--workers", "2")

@@ -115,7 +115,12 @@ def test_what_rows_share_is_counted_once(go, tmp_path: Path, monkeypatch: pytest
     (tmp_path / "other.txt").write_text("5")
     source = {"left": {"number": str(tmp_path / "other.txt")}}
     rows = [
-        Row(f"r{i}", {"schema": 1, "given": source, "want": ["squared"], "stages": {"add": {"offset": i}}}, "here")
+        Row(
+            f"r{i}",
+            {"schema": 1, "given": source, "want": ["squared"], "stages": {"add": {"offset": i}}},
+            "here",
+            tmp_path,
+        )
         for i in (1, 2)
     ]
     first, second = plan_rows(rows, Store(tmp_path / "run/cache"), lambda *_: False, False)

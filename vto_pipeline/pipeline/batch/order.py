@@ -46,11 +46,13 @@ class Row:
         name: Of its folder.
         data: Its pipeline document, with absolute paths.
         where: File and line it comes from, for messages.
+        base: Folder that paths would start from of which there is nothing, for messages.
     """
 
     name: str
     data: Mapping[str, Any]
     where: str
+    base: Path
 
 
 def read_order(path: Path, root: Path | None = None) -> list[Row]:
@@ -81,7 +83,7 @@ def read_order(path: Path, root: Path | None = None) -> list[Row]:
         if not _NAME.fullmatch(name):
             hint = "letters, digits, dots, dashes and underscores; a letter or digit first; 100 at most"
             raise ConfigError(f"{name!r} is not a valid name of a row", where=where, hint=hint)
-        rows.append(Row(name, _absolute(_changed(whole, change, where), base), where))
+        rows.append(Row(name, _absolute(_changed(whole, change, where), base), where, base))
     if not rows:
         raise ConfigError("the batch has no rows", where=str(path), hint="give rows: or every:")
     times = Counter(row.name for row in rows)

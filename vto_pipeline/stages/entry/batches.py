@@ -123,4 +123,4 @@ def finish_stored(row: Row, folder: Path, store: Store, force_all: bool) -> Outc
 
 
 def _plan(row: Row, tables: Catalogue) -> tuple[Request, Plan, Catalogue]:
-    return planning.planned_document(Document(row.data, Path(row.where)), Path("/"), (), tables)
+    return planning.planned_document(Document(row.data, Path(row.where)), row.base, (), tables)
