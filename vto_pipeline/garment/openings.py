@@ -173,8 +173,8 @@ def _check_seen(share: float, garment: TriangleMesh, config: OpeningsConfig, job
         return
     raise GarmentError(
         f"{problem} (the least is {100.0 * config.least_seen:.0f} %)",
-        hint="take more photos or frames of what is missing, often under the arms and from above and below; "
-        "or look at it, and set openings.keep or a lower openings.least_seen",
+        hint="take more photos or frames of what is missing, often under the arms and from above and below. "
+        "Or look at it, and set openings.keep or a lower openings.least_seen",
         partial={"garment": garment},
     )
 
