@@ -151,11 +151,11 @@ def test_plan_knows_what_is_stored_and_what_the_rest_took(vto):
     assert [name for name, cost in costs.items() if not cost["stored"]] == ["page"]  # written anew each time
     record = json.loads(Path("runs/toy/run.json").read_text())
     took = {stage["name"]: stage["seconds"] for stage in record["stages"]}
-    assert costs["add"]["seconds"] == pytest.approx(took["add"], rel=1e-12)
+    assert costs["add"]["seconds"] == took["add"]
     changed = vto("plan", "toy.yaml", "--json", "--set", "add.offset=1").data["stages"]
     assert {stage["name"] for stage in changed if stage["expected"]["stored"]} == {"left.double", "right.double"}
     added = next(stage["expected"]["seconds"] for stage in changed if stage["name"] == "add")
-    assert added == pytest.approx(took["add"], rel=1e-12)
+    assert added == pytest.approx(took["add"], abs=1e-3)  # records are in milliseconds, and none counts as no time
     lines = vto("plan", "toy.yaml", "-o", "elsewhere").out
     assert "their time is not known" in lines
     assert not CALLS

@@ -114,7 +114,6 @@ def test_a_batch_with_a_root_reads_what_is_in_it(fenced) -> None:
         "../secret.txt",
         "{home}/../secret.txt",
         "{outside}",
-        "{outside_from_the_top}",
         "link.txt",
         "down/../../secret.txt",
     ],
@@ -123,8 +122,14 @@ def test_a_batch_with_a_root_reads_nothing_outside_it(fenced, tmp_path: Path, gi
     (tmp_path / "home" / "down").mkdir()
     (tmp_path / "home" / "link.txt").symlink_to(tmp_path / "secret.txt")
     outside = str(tmp_path / "secret.txt")
-    given = given.format(home=tmp_path / "home", outside=outside, outside_from_the_top=outside.lstrip("/"))
+    given = given.format(home=tmp_path / "home", outside=outside)
     with pytest.raises(ConfigError, match=r"lies outside .*home"):
+        fenced(f"{RUN}rows: [{{given.left.number: '{given}'}}]\n")
+
+
+def test_what_is_not_in_the_folder_of_a_batch_is_not_looked_for_from_the_top(fenced, tmp_path: Path) -> None:
+    given = str(tmp_path / "secret.txt").lstrip("/")
+    with pytest.raises(InputError, match=f"no such file or folder: {tmp_path}/home/{given}"):
         fenced(f"{RUN}rows: [{{given.left.number: '{given}'}}]\n")
 
 
