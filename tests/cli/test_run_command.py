@@ -155,7 +155,7 @@ def test_plan_knows_what_is_stored_and_what_the_rest_took(vto):
     changed = vto("plan", "toy.yaml", "--json", "--set", "add.offset=1").data["stages"]
     assert {stage["name"] for stage in changed if stage["expected"]["stored"]} == {"left.double", "right.double"}
     added = next(stage["expected"]["seconds"] for stage in changed if stage["name"] == "add")
-    assert added == pytest.approx(took["add"], abs=1e-3)  # records are in milliseconds, and none counts as no time
+    assert added == pytest.approx(max(took["add"], 1e-3))  # clocks tell milliseconds apart: none is forecast shorter
     lines = vto("plan", "toy.yaml", "-o", "elsewhere").out
     assert "their time is not known" in lines
     assert not CALLS
