@@ -56,7 +56,7 @@ def audit(
             force are then judged.
         friction: Against the body; the fabric's own when None.
         skin: Distance that vertices keep from the body, shape (V,) or one for all [m]. A little more may still be
-            borne by it; by the cloth itself, within the least of them.
+            borne by it; by the cloth itself, within as little more than its thickness.
         pinned: Vertices that were held, or that something else may bear.
 
     Returns:
@@ -73,8 +73,8 @@ def audit(
     nearest = None if body is None else SurfaceDistance(body).signed(mesh.vertices)
     crossing = self_crossings(mesh)
     touching = np.broadcast_to(skin, len(mesh.vertices)) + JUST
-    least = float(touching.min())
-    near, gaps = gaps_within(mesh.vertices, rest.positions, mesh.faces, max(_NEAR, least))
+    thick = JUST if fabric is None else fabric.thickness + JUST
+    near, gaps = gaps_within(mesh.vertices, rest.positions, mesh.faces, max(_NEAR, thick))
     gap = 0.0 if len(crossing) else float(gaps.min(initial=np.inf))
     found: dict[str, object] = {
         "finite": bool(np.isfinite(mesh.vertices).all()),
@@ -94,7 +94,7 @@ def audit(
         weave = ElasticEnergies(mesh, rest, fabric)
         free = np.ones(len(mesh.vertices), np.bool_)
         free[list(pinned)] = False
-        free[mesh.faces[near[gaps < least]]] = False
+        free[mesh.faces[near[gaps < thick]]] = False
         free &= weave.mass > 0.0
         mu = fabric.friction if friction is None else friction
         found["judged_energy_j"] = weave.energy(mesh.vertices)
