@@ -11,8 +11,8 @@ from vto_pipeline.garment.openings import OpeningsConfig, close_scan_holes, list
 from vto_pipeline.garment.rims import drop_flaps, smooth_curve, trim_ledges
 from vto_pipeline.garment.simulation_mesh import SimulationMeshConfig, reason_to_skip_remeshing, remesh_for_simulation
 from vto_pipeline.garment.subtract import SubtractConfig, extract_garment, label_garment
-from vto_pipeline.geometry.remeshing.remesh import perimeter
 from vto_pipeline.geometry.remeshing.repair import is_manifold
+from vto_pipeline.geometry.remeshing.rims import perimeter
 from vto_pipeline.geometry.rigid import transform_mesh
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.geometry.signed_distance import SurfaceDistance

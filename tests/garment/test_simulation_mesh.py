@@ -6,8 +6,9 @@ import trimesh
 from numpy.testing import assert_allclose
 
 from vto_pipeline.garment.simulation_mesh import SimulationMeshConfig, least_angles, remesh_for_simulation
-from vto_pipeline.geometry.remeshing.remesh import edge_lengths, perimeter
+from vto_pipeline.geometry.remeshing.remesh import edge_lengths
 from vto_pipeline.geometry.remeshing.repair import is_manifold
+from vto_pipeline.geometry.remeshing.rims import perimeter
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import boundary_loops, edge_face_counts, edge_faces, edges, face_components
 from vto_pipeline.model.job import Job
@@ -135,3 +136,28 @@ def test_all_good_pieces_are_left_as_they_are():
     assert remesh_for_simulation(pair, loose, job) is pair
     assert all("used as it is" in why for _, why in job.left_out)
     assert remesh_for_simulation(pair, loose, Job(force_all=True)) is not pair
+
+
+def with_eyelet(mesh, around):
+    """The mesh without the faces about a few of its vertices, so with a hole about as long around as wanted [m]."""
+    middle = np.linalg.norm(mesh.vertices - mesh.vertices.mean(axis=0) - [0, 0, 0.1], axis=1).argmin()
+    near = np.linalg.norm(mesh.vertices - mesh.vertices[middle], axis=1) < around / (2 * np.pi)
+    return TriangleMesh(mesh.vertices, mesh.faces[~near[mesh.faces].any(axis=1)])
+
+
+def test_an_eyelet_is_filled_and_a_sleeve_is_not():
+    job = Job()
+    fine = tube(around=300, along=150)
+    made = remesh_for_simulation(with_eyelet(fine, 0.018), CONFIG, job)
+    assert len(boundary_loops(made)) == 2
+    assert any(note.startswith("filled 1 openings of ") for note in job.notes)
+    assert len(boundary_loops(remesh_for_simulation(with_eyelet(fine, 0.15), CONFIG, Job()))) == 3
+
+
+def test_the_only_opening_is_never_filled():
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.05)
+    pouch = with_eyelet(TriangleMesh(ball.vertices, ball.faces), 0.02)
+    job = Job()
+    made = remesh_for_simulation(pouch, SimulationMeshConfig(edge_mm=20.0), job)
+    assert len(boundary_loops(made)) == 1
+    assert not [note for note in job.notes if note.startswith("filled")]

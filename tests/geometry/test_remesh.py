@@ -10,8 +10,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.intersections import self_intersections
 from vto_pipeline.geometry.remeshing.decimate import faces_at
-from vto_pipeline.geometry.remeshing.remesh import RemeshConfig, edge_lengths, perimeter, remesh
+from vto_pipeline.geometry.remeshing.remesh import RemeshConfig, edge_lengths, remesh
 from vto_pipeline.geometry.remeshing.repair import is_manifold
+from vto_pipeline.geometry.remeshing.rims import perimeter
 from vto_pipeline.geometry.topology import boundary_loops
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh

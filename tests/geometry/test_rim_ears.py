@@ -7,8 +7,8 @@ import pytest
 import shapes
 from numpy.testing import assert_allclose, assert_array_equal
 
-from vto_pipeline.geometry.remeshing.remesh import perimeter
 from vto_pipeline.geometry.remeshing.rim_ears import flip_ears
+from vto_pipeline.geometry.remeshing.rims import perimeter
 from vto_pipeline.geometry.topology import boundary_loops, face_area_vectors, opposite_half_edges
 from vto_pipeline.model.mesh import TriangleMesh
 

@@ -9,14 +9,18 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from vto_pipeline.errors import GarmentError
-from vto_pipeline.geometry.remeshing.remesh import RemeshConfig, edge_lengths, perimeter, remesh
+from vto_pipeline.geometry.remeshing.holes import fill_holes
+from vto_pipeline.geometry.remeshing.remesh import RemeshConfig, edge_lengths, remesh
 from vto_pipeline.geometry.remeshing.repair import RepairConfig, is_manifold, is_oriented, repair
+from vto_pipeline.geometry.remeshing.rims import perimeter
 from vto_pipeline.geometry.topology import (
     boundary_loops,
+    boundary_walks,
     component_areas,
     concatenate,
     face_area_vectors,
     face_components,
+    half_edges,
     submesh,
 )
 from vto_pipeline.model.job import Job
@@ -26,6 +30,7 @@ from vto_pipeline.model.settings import Config
 _ACROSS = 3.0  # edges that a strap is wide at least: it needs finer triangles than the cloth it holds
 _TRIES = 3  # each with half the edge of the one before
 _LEAST_EDGE_MM = 1.0  # the remesher's
+_PINHOLE = 3.0  # edges around: what triangles of that size cannot go round, and no limb goes through
 
 
 class SimulationMeshConfig(Config):
@@ -120,15 +125,35 @@ def _remesh_piece(piece: TriangleMesh, config: SimulationMeshConfig, job: Job) -
         job.note(f"a piece of {len(piece.faces)} faces is narrow: its edges become {max(edge, _LEAST_EDGE_MM):.1f} mm")
     for k in range(_TRIES):
         tried = Job()
+        wanted = max(0.5**k * edge, _LEAST_EDGE_MM)
         try:
-            made = remesh(piece, RemeshConfig(edge_mm=max(0.5**k * edge, _LEAST_EDGE_MM)), tried)
+            made = remesh(_without_pinholes(piece, 1e-3 * wanted, tried), RemeshConfig(edge_mm=wanted), tried)
         except GarmentError:
             continue
-        for name in ("hausdorff_mm", "deviation_rms_mm"):
+        job.notes += tried.notes
+        for name in ("hausdorff_mm", "deviation_rms_mm", "opening_change"):
             job.measure(**{name: max(_figure(job, name), _figure(tried, name))})
         return made
     job.warn(f"a piece of {len(piece.faces)} faces could not be remeshed and is used as it is")
     return piece
+
+
+def _without_pinholes(piece: TriangleMesh, edge: float, job: Job) -> TriangleMesh:
+    """Return a piece with its eyelets and the ends of its buckles filled, but not the only opening it has.
+
+    Raises:
+        GarmentError: no filling leaves the mesh manifold.
+    """
+    walks = boundary_walks(piece)
+    around = np.array([perimeter(piece, half_edges(piece)[walk, 0]) for walk in walks])
+    small = around < _PINHOLE * edge
+    if not small.any() or small.all():
+        return piece
+    job.note(
+        f"filled {int(small.sum())} openings of {1e3 * around[small].max():.0f} mm around and less: "
+        f"{_PINHOLE:g} edges of {1e3 * edge:.0f} mm cannot go round them"
+    )
+    return fill_holes(piece, [walk for walk, one in zip(walks, small, strict=True) if one])
 
 
 def _width(piece: TriangleMesh) -> float:

@@ -1,7 +1,7 @@
 """Remeshing, repair and hole filling.
 
 remesh, isotropic: triangles of one size
-small_rims, rim_ears: small openings before that, flat triangles at rims after it
+rims, rim_ears: openings before that and how long they stay, flat triangles at rims after it
 decimate: fewer
 clip: along the line where a value changes sign
 holes: filled so that the filling continues the surface; ears and triangulate span them, refine makes triangles even

@@ -13,7 +13,7 @@ from vto_pipeline.geometry.remeshing.decimate import decimate, faces_at
 from vto_pipeline.geometry.remeshing.isotropic import isotropic
 from vto_pipeline.geometry.remeshing.repair import is_manifold
 from vto_pipeline.geometry.remeshing.rim_ears import flip_ears
-from vto_pipeline.geometry.remeshing.small_rims import SMALL, even_small_rims
+from vto_pipeline.geometry.remeshing.rims import SMALL, even_rims, perimeter, rim_change, rim_corners
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import (
     boundary_loops,
@@ -31,6 +31,9 @@ from vto_pipeline.model.settings import Config
 DECIMATE_TO = 5.0
 """A mesh much finer than wanted is first thinned to this many times the wanted number of faces."""
 
+_SAME = 0.02
+"""Of the length of an opening: a smaller change is what chords of a curved rim make."""
+
 ON_RIM = 1e-7
 """Nearer than this to the old rim, a vertex is on it [m]; the remesher projects rim vertices onto it."""
 
@@ -45,28 +48,38 @@ class RemeshConfig(Config):
 def remesh(mesh: TriangleMesh, config: RemeshConfig, job: Job) -> TriangleMesh:
     """Return the surface in near-equilateral triangles of one edge length.
 
-    The remesher (`isotropic`) pins open boundaries as they are, and as `even_small_rims` has left the small ones. Each
-    other opening is first closed by a cone, its rim marked as a feature along which vertices may slide, and the cones
-    are taken away again at the end.
+    The remesher (`isotropic`) pins open boundaries as they are, and as `even_rims` has left the small ones. Each other
+    opening is first closed by a cone, its rim marked as a feature along which vertices may slide, and the cones are
+    taken away again at the end. Sliding vertices cut corners, round for round, and a cone may pass through the surface.
+    So where an opening has not kept its length, corners are held; and where that will not do, all rims are pinned: at
+    the cost of less even triangles beside them. The way that keeps the openings best counts.
 
     Raises:
         InputError: the mesh is not manifold.
-        GarmentError: the result is not manifold or has lost or won an opening.
+        GarmentError: in no way is the result manifold, with the openings and pieces there were.
     """
     if not is_manifold(mesh):
         raise InputError("mesh is not manifold", hint="run geometry.repair first")
     edge = config.edge_mm * 1e-3
     job.progress(0.0, "decimating")
     coarse = decimate(mesh, int(DECIMATE_TO * faces_at(mesh, edge)), aggressiveness=3.0)
-    if not is_manifold(coarse) or _openings_and_pieces(coarse) != _openings_and_pieces(mesh):
+    if _broken(mesh, coarse) or rim_change(mesh, coarse) > _SAME:
         coarse = mesh  # slower, but whole
-    coarse = even_small_rims(coarse, edge)
-    closed = _close_with_cones(coarse, SMALL * edge)
     job.progress(0.3, "remeshing")
-    fine, rim_faces = _remesh_closed(closed, len(coarse.faces), edge, config.iterations)
-    result = flip_ears(submesh(fine, rim_faces)[0])
-    _check(mesh, result, job)
-    return result
+    best: TriangleMesh | None = None
+    change, problem = np.inf, ""
+    for way in (_slid, _slid_between_corners, _pinned):
+        tried = flip_ears(way(coarse, edge, config.iterations))
+        broken = _broken(mesh, tried)
+        problem = problem or broken
+        if not broken and (changed := rim_change(mesh, tried)) < change:
+            best, change = tried, changed
+        if change <= _SAME:
+            break
+    if best is None:
+        raise GarmentError(problem, hint="try an edge length well below the narrowest part of the garment")
+    _measure(mesh, best, change, job)
+    return best
 
 
 def edge_lengths(mesh: TriangleMesh) -> FloatArray:
@@ -75,21 +88,36 @@ def edge_lengths(mesh: TriangleMesh) -> FloatArray:
     return np.linalg.norm(mesh.vertices[pair[:, 0]] - mesh.vertices[pair[:, 1]], axis=1)
 
 
-def perimeter(mesh: TriangleMesh, loop: NDArray[np.int32]) -> float:
-    """Return the length of a closed loop of vertices [m]."""
-    path = mesh.vertices[loop]
-    return float(np.linalg.norm(path - np.roll(path, -1, axis=0), axis=1).sum())
+def _slid(mesh: TriangleMesh, edge: float, rounds: int) -> TriangleMesh:
+    """Remesh with rims whose vertices slide along them."""
+    return _with_cones(mesh, edge, rounds, hold_corners=False)
 
 
-def _close_with_cones(mesh: TriangleMesh, least: float) -> TriangleMesh:
-    """Close each boundary loop longer than `least` [m] by a cone pointing away from the surface.
+def _slid_between_corners(mesh: TriangleMesh, edge: float, rounds: int) -> TriangleMesh:
+    """Remesh with rims whose vertices slide along them, but for their sharp turns."""
+    return _with_cones(mesh, edge, rounds, hold_corners=True)
 
-    The new vertices and faces come last.
-    """
+
+def _pinned(mesh: TriangleMesh, edge: float, rounds: int) -> TriangleMesh:
+    """Remesh with rims as they are, once they are in even edges."""
+    return isotropic(even_rims(mesh, edge, np.inf), edge, rounds, features=None, project=True)
+
+
+def _with_cones(mesh: TriangleMesh, edge: float, rounds: int, hold_corners: bool) -> TriangleMesh:
+    """Remesh with cones over the openings that are not small."""
+    even = even_rims(mesh, edge, SMALL * edge)
+    loops = [loop for loop in boundary_loops(even) if perimeter(even, loop) >= SMALL * edge]
+    corners = [rim_corners(even, loop, edge) for loop in loops] if hold_corners else []
+    closed = _close_with_cones(even, loops)
+    fixed = np.concatenate([np.empty(0, np.int32), *corners])
+    fine, rim_faces = _remesh_closed(closed, len(even.faces), edge, rounds, fixed)
+    return submesh(fine, rim_faces)[0]
+
+
+def _close_with_cones(mesh: TriangleMesh, loops: list[NDArray[np.int32]]) -> TriangleMesh:
+    """Close boundary loops by cones pointing away from the surface; the new vertices and faces come last."""
     tips, cones, count = [], [], len(mesh.vertices)
-    for loop in boundary_loops(mesh):
-        if perimeter(mesh, loop) < least:
-            continue
+    for loop in loops:
         points = mesh.vertices[loop]
         middle = points.mean(axis=0)
         # The area over half the perimeter: a circle's cone is as high as its radius.
@@ -100,7 +128,9 @@ def _close_with_cones(mesh: TriangleMesh, least: float) -> TriangleMesh:
     return TriangleMesh(np.vstack([mesh.vertices, *tips]), np.vstack([mesh.faces, *cones]).astype(np.int32))
 
 
-def _remesh_closed(closed: TriangleMesh, real: int, edge: float, rounds: int) -> tuple[TriangleMesh, NDArray[np.bool_]]:
+def _remesh_closed(
+    closed: TriangleMesh, real: int, edge: float, rounds: int, fixed: NDArray[np.int32]
+) -> tuple[TriangleMesh, NDArray[np.bool_]]:
     """Remesh a surface whose faces from `real` on are cones; return it and which new faces are not of a cone."""
     is_cone = np.arange(len(closed.faces)) >= real
     beside = edge_faces(closed)
@@ -109,7 +139,7 @@ def _remesh_closed(closed: TriangleMesh, real: int, edge: float, rounds: int) ->
         if len(is_cone) > real
         else np.zeros((0, 2), np.int32)
     )
-    fine = isotropic(closed, edge, rounds, features=rim, project=True)
+    fine = isotropic(closed, edge, rounds, features=rim, project=True, fixed=fixed)
     if not len(rim):
         return fine, np.ones(len(fine.faces), dtype=bool)
     looks_real = SurfaceDistance(closed).nearest(fine.vertices[fine.faces].mean(axis=1)).face < real
@@ -144,14 +174,16 @@ def _openings_and_pieces(mesh: TriangleMesh) -> tuple[int, int]:
     return len(boundary_loops(mesh)), face_components(mesh)[0]
 
 
-def _check(before: TriangleMesh, after: TriangleMesh, job: Job) -> None:
-    """Measure what remeshing changed, and refuse a result with other openings or pieces."""
+def _broken(before: TriangleMesh, after: TriangleMesh) -> str:
+    """Return in words why a result is of no use, if it is not."""
+    if not is_manifold(after):
+        return "remeshing broke the surface: it is no manifold"
     was, now = _openings_and_pieces(before), _openings_and_pieces(after)
-    if not is_manifold(after) or was != now:
-        raise GarmentError(
-            f"remeshing broke the surface: (openings, pieces) were {was} and are {now}",
-            hint="try an edge length well below the narrowest part of the garment",
-        )
+    return "" if was == now else f"remeshing broke the surface: (openings, pieces) were {was} and are {now}"
+
+
+def _measure(before: TriangleMesh, after: TriangleMesh, rim_change: float, job: Job) -> None:
+    """Measure what remeshing changed."""
     there = SurfaceDistance(after).nearest(before.vertices).distance
     back = SurfaceDistance(before).nearest(after.vertices).distance
     length = edge_lengths(after)
@@ -163,4 +195,5 @@ def _check(before: TriangleMesh, after: TriangleMesh, job: Job) -> None:
         edge_p95_mm=float(np.percentile(length, 95) * 1e3),
         hausdorff_mm=float(max(there.max(), back.max()) * 1e3),
         deviation_rms_mm=float(np.sqrt(np.mean(there**2)) * 1e3),
+        opening_change=rim_change,
     )
