@@ -4,6 +4,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from cloth_scenes import moved, sheet
 from numpy.testing import assert_allclose
 from scipy.optimize import lsq_linear
 
@@ -34,8 +35,19 @@ def test_faces_that_share_corners_have_a_gap_where_they_are_folded_onto_each_oth
         rest, x = rng.normal(size=(6, 3)), rng.normal(size=(6, 3)) * [1, 1, 0.1]
         pairs, gaps = gaps_within(x, rest, faces, 1.0)
         now, laid = features_apart(x, *faces), features_apart(rest, *faces)
-        assert (len(pairs) == 1) == (now < min(0.5 * laid, 1.0))
+        size = min(np.linalg.norm(x[face] - x[face].mean(axis=0), axis=1).max() for face in faces)
+        assert (len(pairs) == 1) == (now < min(max(0.5 * laid, 0.25 * size), 1.0))
         if len(pairs):
             assert_allclose(gaps, now, rtol=0, atol=1e-6)
             seen += 1
     assert 20 < seen < 180
+
+
+def test_layers_that_touch_at_rest_have_a_gap_and_a_flat_sheet_has_none():
+    one = sheet(9, 9, 0.2, 0.2, upright=False)
+    other = moved(one, 0.013, 1e-3, 0.007)
+    both = np.vstack([one.vertices, other.vertices])
+    _, gaps = gaps_within(both, both, np.vstack([one.faces, other.faces + 81]), 5e-3)
+    assert_allclose(gaps.min(), 1e-3, rtol=1e-9)
+    shrunk = 0.15 * one.vertices  # all nearer than looked for
+    assert len(gaps_within(shrunk, shrunk, one.faces, 5e-3)[0]) == 0

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.numerics.vector import axpy, cross, dot, load, norm, sub
 
-_CLOSER = 0.5  # of the gap at rest: what is not that much nearer are neighbours of a flat sheet
+_CLOSER = 0.5  # of the gap at rest: what is not that much nearer are neighbours of a flat sheet,
+_LAYERS = 0.25  # unless it is nearer than this share of its size, as no neighbours are: layers, at rest too
 
 
 def gaps_within(
@@ -59,7 +60,9 @@ def _near(middle, radius, x, rest, faces, axis, within):  # type: ignore[no-unty
             if apart >= (within + radius[i] + radius[j]) ** 2:
                 continue
             gap = _gap(x, faces[i], faces[j])
-            if gap >= within or gap >= _CLOSER * _gap(rest, faces[i], faces[j]):
+            if gap >= within:
+                continue
+            if gap >= _LAYERS * min(radius[i], radius[j]) and gap >= _CLOSER * _gap(rest, faces[i], faces[j]):
                 continue
             if count == len(pairs):
                 pairs, gaps = np.concatenate((pairs, np.empty_like(pairs))), np.concatenate((gaps, np.empty_like(gaps)))
