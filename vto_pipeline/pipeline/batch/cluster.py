@@ -51,9 +51,7 @@ def run_rows(tasks: Sequence[RowTask], workers: int, scheduler: str | None, scra
         ) from None
     logging.getLogger("distributed").setLevel(logging.WARNING)
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # a scheduler that is gone is told row by row
-    logging.getLogger("distributed.nanny").setLevel(
-        logging.ERROR
-    )  # and so is a worker
+    logging.getLogger("distributed.nanny").setLevel(logging.ERROR)  # and so is a worker
     with ExitStack() as stack:
         try:
             address: Any = scheduler or stack.enter_context(
