@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 from scipy.stats import linregress
@@ -81,8 +83,26 @@ def test_direct_solvers_solve_and_ours_keeps_its_bits():
     assert {"own Cholesky", "SuperLU"} <= set(rows)
     for method, errors in rows.items():
         assert 0.0 < errors["residual"] < 1e-10, method  # rounding times the condition of one step
-        assert errors["factor_s"] > errors["solve_s"] > 0.0, method
     assert rows["own Cholesky"]["same_bits_on_one_thread"]
+
+
+def test_the_times_of_factor_and_solve_are_told_apart(monkeypatch):
+    """On a clock that only the solver moves: 2 s for a factorisation, 1 s for a solve."""
+    now = 0.0
+
+    def prepare(matrix):
+        direct = direct_solvers._SOLVERS["own Cholesky"](matrix)
+
+        def taking(seconds, work, *given):
+            nonlocal now
+            now += seconds
+            return work(*given)
+
+        return direct_solvers.Direct(partial(taking, 2.0, direct.factor), partial(taking, 1.0, direct.solve))
+
+    monkeypatch.setattr("vto_pipeline.bench.timing.time.perf_counter", lambda: now)
+    timing, errors = direct_solvers._measure(prepare, 4)
+    assert (errors["factor_s"], errors["solve_s"], timing.seconds) == (2.0, 1.0, 3.0)
 
 
 def test_a_solver_that_is_not_installed_is_left_out_with_a_reason(monkeypatch):
@@ -95,7 +115,8 @@ def test_a_solver_that_is_not_installed_is_left_out_with_a_reason(monkeypatch):
 def test_a_row_of_a_batch_costs_less_than_it_may():
     """By processor time, which leaves out what else runs on this machine."""
     before = Meter().peak_mb()  # what other tests have left in this process
-    plan, journal, stored = (row.errors for row in batch_rows(500, 3, Watch()))
+    for _ in range(2):  # the first rows of a process pay for what it loads
+        plan, journal, stored = (row.errors for row in batch_rows(500, 3, Watch()))
     assert plan["rows"] == 500
     assert 0.0 < plan["peak_mb"] < before + 1000.0
     assert 0.0 < journal["row_cpu_ms"] < 5.0

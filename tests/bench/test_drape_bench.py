@@ -1,5 +1,6 @@
 """The drape bench: its judgements on made-up drapes, its cases, and the picture of all kinds of rows."""
 
+import time
 from functools import partial
 from pathlib import Path
 
@@ -175,15 +176,16 @@ def test_quick_rows_name_what_they_measure(monkeypatch):
 
 
 def test_a_run_that_takes_too_long_is_a_row(tmp_path):
+    began = time.perf_counter()
     row = drape_row(Path("none.obj"), Path("nobody.obj"), tmp_path / "run", [], 0.01)
     assert row["outcome"] == "unfinished"
-    assert 0.01 <= row["seconds"] < 5.0
+    assert 0.01 <= row["seconds"] < time.perf_counter() - began + 0.1  # it is rounded
     assert row["crossings"] is row["settled"] is row["vertices"] is None
 
 
 def test_a_garment_that_is_refused_is_a_row(tmp_path):
     (tmp_path / "none.obj").write_text("")
-    row = drape_row(tmp_path / "none.obj", tmp_path / "none.obj", tmp_path / "run", [], 60.0)
+    row = drape_row(tmp_path / "none.obj", tmp_path / "none.obj", tmp_path / "run", [], 600.0)
     assert row["outcome"] == "refused"
     assert "none.obj" in (tmp_path / "run.log").read_text()
 

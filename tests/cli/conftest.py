@@ -31,6 +31,7 @@ class Said(NamedTuple):
 def vto(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Callable[..., Said]:
     """Call `vto` with the toy tables, in a folder with toy.yaml, left.txt (3) and right.txt (4)."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")  # of tables, whatever the terminal
     monkeypatch.setattr(planning, "catalogue", lambda: TOY)
     (tmp_path / "left.txt").write_text("3")
     (tmp_path / "right.txt").write_text("4")

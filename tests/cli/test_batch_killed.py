@@ -32,8 +32,13 @@ ROW = (
     "from vto_pipeline.cli.main import main; sys.exit(main())"
 )
 CLIENT = (
-    f"from vto_pipeline.cli.commands import batch; import sys; batch.PROGRAM = (sys.executable, '-c', {ROW!r}); {ROW}"
+    "from vto_pipeline.cli.commands import batch; import sys; batch.PROGRAM = (sys.executable, '-c', {row!r}); " + ROW
 )
+HELD = (
+    "import sys, time; from pathlib import Path; "
+    "any(time.sleep(0.05) for _ in iter(lambda: Path({gate!r}).exists() and 'row_1' not in str(sys.argv), False)); "
+)
+"""All rows but the first wait for as long as there is a gate, so that no test depends on how fast they are."""
 ORDER = """\
 schema: 1
 run:
@@ -46,7 +51,13 @@ PATIENCE = 120.0  # s, for a machine that is busy with other things
 
 
 @pytest.fixture
-def client(tmp_path, monkeypatch) -> Callable[..., subprocess.Popen[str]]:
+def gate(tmp_path) -> Path:
+    """Where a file holds all rows but the first."""
+    return tmp_path / "gate"
+
+
+@pytest.fixture
+def client(tmp_path, gate, monkeypatch) -> Callable[..., subprocess.Popen[str]]:
     """Start `vto batch` on the toy tables, with a row for each offset from 1."""
     monkeypatch.chdir(tmp_path)
     Path("left.txt").write_text("3")
@@ -54,15 +65,16 @@ def client(tmp_path, monkeypatch) -> Callable[..., subprocess.Popen[str]]:
 
     def start(rows: int, *arguments: str) -> subprocess.Popen[str]:
         Path("order.yaml").write_text(ORDER.format(offsets=list(range(1, rows + 1))))
-        command = [sys.executable, "-c", CLIENT, "batch", "order.yaml", "-o", "out", *arguments]
+        row = HELD.format(gate=str(gate)) + ROW
+        command = [sys.executable, "-c", CLIENT.format(row=row), "batch", "order.yaml", "-o", "out", *arguments]
         return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
     return start
 
 
 @pytest.fixture
-def cluster(tmp_path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
-    """A scheduler with two workers, each in a folder of its own, as on two machines: its address, and its process."""
+def cluster(tmp_path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """A scheduler and two workers, each in a folder of its own, as on two machines: the address, and the processes."""
     module, file = [sys.executable, "-m"], tmp_path / "scheduler.json"
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     options = ["--port", "0", "--no-dashboard", "--scheduler-file", str(file)]
@@ -74,7 +86,7 @@ def cluster(tmp_path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
         command = [*module, "distributed.cli.dask_worker", *options]
         processes.append(subprocess.Popen(command, cwd=tmp_path / name, **quiet))
     wait(lambda: file.is_file() and file.read_text().endswith("}"))
-    yield json.loads(file.read_text())["address"], scheduler
+    yield json.loads(file.read_text())["address"], processes
     for process in reversed(processes):
         process.terminate()
         process.wait(PATIENCE)
@@ -112,6 +124,17 @@ def workers(process: subprocess.Popen[str]) -> list[psutil.Process]:
     return []
 
 
+def rows_of(machine: subprocess.Popen[bytes]) -> list[psutil.Process]:
+    """The processes at work on rows under a worker."""
+    found = []
+    with suppress(psutil.NoSuchProcess):
+        for process in psutil.Process(machine.pid).children(recursive=True):
+            with suppress(psutil.NoSuchProcess):
+                if "cli.main" in " ".join(process.cmdline()):
+                    found.append(process)
+    return found
+
+
 @pytest.mark.parametrize(("rows", "kills"), [(4, 2), pytest.param(9, 40, marks=pytest.mark.slow)])
 def test_kills_of_workers_and_clients_lose_nothing(client, rows, kills):
     chance, kept, listed, killed = random.Random(5), {}, [], []
@@ -138,7 +161,7 @@ def test_kills_of_workers_and_clients_lose_nothing(client, rows, kills):
 
 
 def test_a_scheduler_that_dies_while_a_result_is_on_its_way_is_told(cluster, tmp_path, monkeypatch):
-    address, scheduler = cluster
+    address, (scheduler, *_) = cluster
     fetch = distributed.Future.result
 
     def fetch_from_the_dead(future, *arguments):
@@ -153,8 +176,9 @@ def test_a_scheduler_that_dies_while_a_result_is_on_its_way_is_told(cluster, tmp
     assert {(row.status, row.problem) for row in became} == {("lost", "the scheduler is gone")}
 
 
-def test_two_machines_do_a_batch_and_a_scheduler_that_dies_is_told(client, cluster):
-    address, scheduler = cluster
+def test_two_machines_do_a_batch_and_a_scheduler_that_dies_is_told(client, cluster, gate):
+    address, (scheduler, *machines) = cluster
+    gate.touch()
     batch = client(4, "--scheduler", address)
     wait(lambda: done() or batch.poll() is not None)
     scheduler.kill()
@@ -162,8 +186,10 @@ def test_two_machines_do_a_batch_and_a_scheduler_that_dies_is_told(client, clust
     assert batch.returncode == 6, said
     assert "the scheduler is gone" in said
     assert "Traceback" not in said
+    gate.unlink()
+    wait(lambda: not any(map(rows_of, machines)))  # what they had begun ends there, and its folders are free
     kept, listed = results(), done()
-    assert listed
+    assert 0 < len(listed) < 4
     again = client(4)
     said = again.communicate()[0]
     assert again.returncode == 0, said
@@ -172,7 +198,8 @@ def test_two_machines_do_a_batch_and_a_scheduler_that_dies_is_told(client, clust
     assert squares(4) == expected(4)
 
 
-def test_a_batch_that_is_cancelled_ends_and_is_resumed(client, capfd):
+def test_a_batch_that_is_cancelled_ends_and_is_resumed(client, gate, capfd):
+    gate.touch()
     batch = client(3, "--workers", "1")
     wait(lambda: done() or batch.poll() is not None)
     below = psutil.Process(batch.pid).children(recursive=True)
@@ -180,13 +207,14 @@ def test_a_batch_that_is_cancelled_ends_and_is_resumed(client, capfd):
     said = batch.communicate()[0]
     assert json.loads(capfd.readouterr().out) == {"cancelled": True, "process": batch.pid}
     assert batch.returncode == 130, said
-    assert said.splitlines()[-1] == "interrupted; run the same command again to resume"
+    assert "interrupted; run the same command again to resume" in said.splitlines()
     assert not psutil.wait_procs(below, PATIENCE)[1]
     listed = done()
     assert 0 < len(listed) < 3
     assert "waiting" in Path("out/page.html").read_text()
     assert main(["cancel", "out"]) == 0
     assert capfd.readouterr().out == "nothing is at work there\n"
+    gate.unlink()
     again = client(3)
     said = again.communicate()[0]
     assert again.returncode == 0, said

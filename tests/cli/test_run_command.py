@@ -182,6 +182,28 @@ def test_from_makes_a_stage_and_what_depends_on_it_anew(vto):
     assert vto("run", "toy.yaml", "--from", "nothing").code == 2
 
 
+@pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="no peak of a stage elsewhere")
+def test_a_memory_budget_stands_beside_the_peak_and_is_not_begun_where_earlier_runs_took_more(vto):
+    said = vto("run", "toy.yaml", "--memory", "1MB")
+    assert said.code == 0  # nothing is known of stages that never ran,
+    (line,) = (line for line in said.out.splitlines() if "memory budget" in line)
+    record = json.loads(Path("runs/toy/run.json").read_text())
+    most = max(record["stages"], key=lambda stage: stage["peak_mb"])
+    found = f"at most {most['peak_mb'] / 1e3:.2g} GB, in {most['name']}"
+    assert line == f"  of the memory budget of 0.001 GB: {found}, which is over it"
+    said = vto("run", "toy.yaml", "--memory", "1MB", "--set", "add.offset=1")
+    assert (said.code, said.out, CALLS) == (2, "", [])  # and then it is
+    assert "error: add takes about 0." in said.err
+    said = vto("run", "toy.yaml", "--memory", "0.9 TB", "--set", "add.offset=1")
+    assert said.code == 0
+    (line,) = (line for line in said.out.splitlines() if "memory budget" in line)
+    assert line.startswith("  of the memory budget of 900 GB: at most 0.")
+    assert "over" not in line
+    assert not any("memory budget" in line for line in vto("run", "toy.yaml").out.splitlines())
+    for text in ("8", "8gb", "-1GB"):
+        assert vto("run", "toy.yaml", "--memory", text).code == 2
+
+
 def test_quiet_and_a_log(vto):
     said = vto("run", "toy.yaml", "-q", "--log", "log.jsonl")
     assert said.err == ""

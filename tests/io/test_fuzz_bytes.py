@@ -19,7 +19,7 @@ from vto_pipeline.io.arrays import Arrays
 from vto_pipeline.io.sandbox import run_limited
 
 KEPT = sorted((Path(__file__).parent / "fuzz_seeds").glob("*-*"))
-SECONDS_EACH = 0.05  # s of one execution on a busy machine, shrinking among them
+SECONDS_EACH = 0.5  # s of one execution on a busy machine, shrinking among them
 QUICK, LONG = 10, int(os.environ.get("VTO_FUZZ", "2000"))  # executions for each reader
 
 
@@ -47,7 +47,7 @@ def fuzz_all(count: int, seed: int) -> Arrays:
 
 
 def test_every_reader_quickly() -> None:
-    assert counted(run_limited(fuzz_all, QUICK, 1, seconds=120.0)) >= QUICK * len(TARGETS)
+    assert counted(run_limited(fuzz_all, QUICK, 1, seconds=600.0)) >= QUICK * len(TARGETS)
 
 
 @pytest.mark.slow

@@ -63,7 +63,7 @@ def test_too_much_time_is_a_format_error(function: Callable[[int], Arrays]) -> N
     start = time.monotonic()
     with pytest.raises(FormatError, match="longer than 1 s"):
         run_limited(function, 60, seconds=1.0)
-    assert 0.5 < time.monotonic() - start < 10.0  # s: the limit of 1 s, and the start of an interpreter
+    assert 0.5 < time.monotonic() - start < 30.0  # s: the limit of 1 s, and a busy machine; one waits for 60 s
 
 
 def test_too_large_a_file_is_a_format_error() -> None:

@@ -5,7 +5,7 @@ import shutil
 import subprocess
 import sys
 import threading
-import time
+from contextlib import suppress
 from pathlib import Path
 
 import numba
@@ -98,29 +98,39 @@ def test_a_newer_numba_has_a_folder_of_its_own(monkeypatch, tmp_path):
     assert found[0] != found[1]
 
 
-class SlowFile(IndexDataCacheFile):
-    """A cache file that takes its time between choosing a name and telling others which."""
+class MeetingFile(IndexDataCacheFile):
+    """A cache file that waits for another between choosing a name and telling others which."""
+
+    meeting: threading.Barrier
 
     def _save_index(self, overloads):
-        time.sleep(0.2)
+        with suppress(threading.BrokenBarrierError):
+            self.meeting.wait()
         super()._save_index(overloads)
 
 
-class NumbasOwn(SlowFile):
+class NumbasOwn(MeetingFile):
     """As it was before `serialise_cache_writes`."""
 
     save = IndexDataCacheFile.save.__wrapped__
 
 
-@pytest.mark.parametrize(("kind", "safe"), [(NumbasOwn, False), (SlowFile, True)])
-def test_two_that_compile_at_the_same_time_never_load_each_others_code(tmp_path, kind, safe):
-    """The first case shows that Numba alone does not see to it; once it does, `serialise_cache_writes` may go."""
+@pytest.mark.parametrize(("kind", "patience", "safe"), [(NumbasOwn, 60.0, False), (MeetingFile, 0.2, True)])
+def test_two_that_compile_at_the_same_time_never_load_each_others_code(tmp_path, kind, patience, safe):
+    """The first case shows that Numba alone does not see to it; once it does, `serialise_cache_writes` may go.
+
+    There both meet, however late the second is. Where one waits for the other to have written, they cannot.
+    """
     files = [kind(str(tmp_path), "kernel", "stamp") for _ in range(2)]
+    meeting = threading.Barrier(2, timeout=patience)
+    for file in files:
+        file.meeting = meeting
     threads = [threading.Thread(target=file.save, args=(k, f"code {k}")) for k, file in enumerate(files)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
+    assert meeting.broken is safe
     assert all(files[0].load(k) == f"code {k}" for k in (0, 1)) is safe
 
 

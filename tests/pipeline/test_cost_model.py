@@ -53,7 +53,7 @@ def test_the_forecast_of_a_batch_is_within_a_quarter_of_the_truth() -> None:
         cost = fit_cost(others)
         assert cost is not None
         truth.append(seconds)
-        forecasts.append(cost.seconds(figures))
+        forecasts.append(cost.expected(figures))
         medians.append(np.median([taken for _, taken in others]))
     assert len(truth) == 23
     assert sum(forecasts) / sum(truth) == pytest.approx(1.0, abs=0.25)
@@ -75,7 +75,7 @@ def test_a_power_law_with_effects_is_found() -> None:
     cost = fit_cost([*records, (records[0][0], 100 * records[0][1])])  # one that met something else
     assert cost is not None
     for g, b, n in set(cells) - set(kept):
-        got = cost.seconds({"garment": f"g{g}", "body": f"b{b}", "bytes": math.log(n)})
+        got = cost.expected({"garment": f"g{g}", "body": f"b{b}", "bytes": math.log(n)})
         assert got == pytest.approx(law(g, b, n), rel=0.15)  # priors draw effects of 0.7 by a tenth to the mean
     assert cost.terms["bytes"] == pytest.approx(1.3, abs=0.1)
 
@@ -84,7 +84,7 @@ def test_few_records_give_their_median_and_none_nothing() -> None:
     assert fit_cost([]) is None
     few = fit_cost([({"bytes": 1.0}, 2.0), ({"bytes": 9.0}, 4.0), ({"bytes": 5.0}, 300.0)])
     assert few is not None
-    assert few.seconds({"bytes": 100.0}) == pytest.approx(4.0)
+    assert few.expected({"bytes": 100.0}) == pytest.approx(4.0)
 
 
 def take(folder: Path, stage: str, seconds: float) -> None:

@@ -19,7 +19,7 @@ from vto_pipeline.scan.photos.consistency import consensus
 from vto_pipeline.scan.photos.disparity import MatchConfig, _in_second, match_pair
 from vto_pipeline.scan.photos.neighbours import choose_pairs, visibility
 from vto_pipeline.scan.photos.rectify import StereoView, depth_in_view, rectify, warp
-from vto_pipeline.scan.photos.stereo import StereoConfig, estimate_depth_maps
+from vto_pipeline.scan.photos.stereo import PAIR_BYTES, StereoConfig, estimate_depth_maps
 from vto_pipeline.scan.photos.subpixel import refine_disparity
 
 
@@ -73,6 +73,26 @@ def test_same_bits_on_one_core_and_on_all_in_the_stated_memory(maps, shot, true_
     tracemalloc.stop()
     assert again.depth.tobytes() == maps[0].depth.tobytes()
     assert 0.3e6 * job.metrics["memory_bound_mb"] < peak < 1e6 * job.metrics["memory_bound_mb"]
+
+
+def test_less_memory_matches_fewer_pairs_at_a_time_with_the_same_bits(maps, shot, true_cameras, sparse, monkeypatch):
+    monkeypatch.setattr(os, "cpu_count", lambda: 4)
+    pair = PAIR_BYTES * true_cameras.intrinsics[0].width * true_cameras.intrinsics[0].height
+
+    def within(left: float) -> Job:
+        monkeypatch.setattr(Job, "memory_left", lambda _: left)
+        found = estimate_depth_maps(shot[0], true_cameras, sparse, StereoConfig(), job := Job(memory=1e12))
+        assert found.depth.tobytes() == maps[0].depth.tobytes()
+        return job
+
+    ample = within(1e12)
+    whole = 1e6 * ample.metrics["memory_bound_mb"]
+    assert any("4 at a time on 4 cores" in note for note in ample.notes)
+    tight = within(whole - 1.5 * pair)
+    assert any("2 at a time on 4 cores" in note for note in tight.notes)
+    assert 1e6 * tight.metrics["memory_bound_mb"] == pytest.approx(whole - 2 * pair, abs=1e6)  # rounded
+    with pytest.raises(ScanError, match="GB of memory; the budget leaves .* GB"):
+        within(whole - 3.5 * pair)
 
 
 def test_plain_surface_is_refused(tmp_path, true_cameras, sparse):

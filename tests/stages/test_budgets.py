@@ -1,4 +1,4 @@
-"""--time-budget and --target-error, as far as the stages of the project can keep them."""
+"""--time-budget, --target-error and --memory, as far as the stages of the project can keep them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vto_pipeline.stages.entry import commands
 from vto_pipeline.stages.entry.documents import drape_order, fit_order
 from vto_pipeline.stages.entry.outcome import Outcome
 from vto_pipeline.stages.entry.planning import catalogue
-from vto_pipeline.units import LENGTH_M, TIME_S
+from vto_pipeline.units import LENGTH_M, MEMORY_B, TIME_S
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"
 SHIRT, FORM = SAMPLES / "shirt_on_form" / "shirt.ply", SAMPLES / "shirt_on_form" / "form.ply"
@@ -56,7 +56,13 @@ def test_a_run_without_a_drape_promises_nothing(asked, budgets):
 
 @pytest.mark.parametrize(
     ("text", "units", "value"),
-    [("60s", TIME_S, 60.0), ("1.5 min", TIME_S, 90.0), ("1mm", LENGTH_M, 0.001), (".5cm", LENGTH_M, 0.005)],
+    [
+        ("60s", TIME_S, 60.0),
+        ("1.5 min", TIME_S, 90.0),
+        ("1mm", LENGTH_M, 0.001),
+        (".5cm", LENGTH_M, 0.005),
+        ("8GB", MEMORY_B, 8e9),
+    ],
 )
 def test_a_quantity_has_a_unit(text, units, value):
     assert Quantity(units).convert(text, None, None) == pytest.approx(value, rel=1e-12)

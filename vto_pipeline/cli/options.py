@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import click
 
 from vto_pipeline.cli.session import Session
-from vto_pipeline.units import LENGTH_M, TIME_S
+from vto_pipeline.units import LENGTH_M, MEMORY_B, TIME_S
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -42,7 +42,7 @@ def _set_verbose(ctx: click.Context, _: click.Parameter, value: bool) -> None:
 
 
 class Quantity(click.ParamType):
-    """A positive number with its unit, such as 60s or 0.5mm, in SI.
+    """A positive number with its unit, such as 60s, 0.5mm or 8GB, in SI.
 
     Args:
         units: Name of a unit -> SI.
@@ -54,7 +54,7 @@ class Quantity(click.ParamType):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Return the value in SI."""
-        found = re.fullmatch(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*([a-z]+)\s*", str(value))
+        found = re.fullmatch(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*([A-Za-z]+)\s*", str(value))
         if found is None or found[2] not in self._units or float(found[1]) == 0.0:
             self.fail(f"{value!r} is not a positive number with one of the units {', '.join(self._units)}", param, ctx)
         return float(found[1]) * self._units[found[2]]
@@ -88,6 +88,9 @@ until_option = click.option("--until", metavar="STAGE", help="Stop after this st
 afresh_option = click.option(
     "--from", "afresh", metavar="STAGE", help="Make this stage and all that depends on it anew, stored or not."
 )
+memory_option = click.option(
+    "--memory", type=Quantity(MEMORY_B), metavar="8GB", help="Memory of the run; refused where earlier runs took more."
+)
 force_option = click.option("--force-all", is_flag=True, help="Leave no work out, for comparison.")
 
 
@@ -112,4 +115,5 @@ def message_options(function: Function) -> Function:
 def pipeline_options(function: Function) -> Function:
     """Add the options of every command that runs a pipeline; `perform` takes them."""
     own = until_option(afresh_option(force_option(log_option(quiet_option(message_options(function))))))
+    own = memory_option(own)
     return output_option(set_option(own))

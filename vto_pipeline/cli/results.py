@@ -46,6 +46,8 @@ def outcome_lines(outcome: Outcome) -> Iterator[str]:
         yield f"  {artifact:<{width}}  {outcome.path(artifact) if outcome.made(artifact) else 'as given'}"
     if record.get("time_budget_s"):
         yield f"  of the time budget of {record['time_budget_s']:g} s: {', '.join(_bought(record['stages']))}"
+    if record.get("memory_budget_mb"):
+        yield f"  of the memory budget of {record['memory_budget_mb'] / 1e3:g} GB: {_largest(record)}"
     for name, text in outcome.warnings:
         yield f"  warning from {name.replace('_', ' ')}: {text}"
 
@@ -56,6 +58,16 @@ def _bought(stages: Iterable[Mapping[str, Any]]) -> Iterator[str]:
         error = stage["metrics"].get("error_mm")
         reached = "" if error is None else f" ({error:.2g} mm of motion left)"
         yield f"{stage['name']} {stage['seconds']:.1f} s{reached}"
+
+
+def _largest(record: Mapping[str, Any]) -> str:
+    """Return the largest memory that a stage of this run took, and whether that is more than the budget, in words."""
+    ran = [stage for stage in record["stages"] if stage["status"] == "ran"]
+    if not ran:
+        return "nothing ran"
+    most = max(ran, key=lambda stage: stage["peak_mb"])
+    over = ", which is over it" if most["peak_mb"] > record["memory_budget_mb"] else ""
+    return f"at most {most['peak_mb'] / 1e3:.2g} GB, in {most['name']}{over}"
 
 
 def stage_counts(record: Mapping[str, Any]) -> str:

@@ -27,6 +27,7 @@ class Stage:
         skip: Inputs -> the reason why this data does not need the stage, or None. Must be conservative.
         passes: Made artifact -> needed artifact whose file it takes when the stage is skipped.
         final: Runs last, every time, uncached; its inputs also hold "run_record", the dict that run.json holds.
+        fits_memory: It works in what `Job.memory_left` says, or refuses in words.
         idle: Settings -> those of the optional artifacts that it has no use for under these.
     """
 
@@ -41,6 +42,7 @@ class Stage:
     skip: Callable[[Mapping[str, Any]], str | None] | None = None
     passes: Mapping[str, str] = field(default_factory=dict)
     final: bool = False
+    fits_memory: bool = False
     idle: Callable[[Any], tuple[str, ...]] = lambda settings: ()
 
     def __post_init__(self) -> None:

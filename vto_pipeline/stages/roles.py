@@ -27,6 +27,7 @@ def for_each_role(
     uses: tuple[str, ...],
     skip: Callable[[Mapping[str, Any]], str | None] | None = None,
     passes: Mapping[str, str] | None = None,
+    fits_memory: bool = False,
 ) -> tuple[Stage, ...]:
     """One stage per role; the function sees artifact names without the role."""
 
@@ -54,6 +55,7 @@ def for_each_role(
             uses=uses,
             skip=None if skip is None else lambda inputs: skip(bare(inputs)),
             passes={prefix + made: prefix + need for made, need in (passes or {}).items()},
+            fits_memory=fits_memory,
         )
 
     return tuple(bind(role) for role in ROLES)

@@ -94,6 +94,7 @@ STAGES: tuple[Stage, ...] = (
         run=_stereo,
         settings=StereoConfig,
         uses=("opencv-python-headless",),
+        fits_memory=True,
     ),
     *for_each_role(
         "fuse_photos",

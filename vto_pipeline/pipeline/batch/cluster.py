@@ -6,7 +6,6 @@ import logging
 import os
 from collections import deque
 from collections.abc import Iterator, Sequence
-from concurrent.futures import CancelledError
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
@@ -52,6 +51,7 @@ def run_rows(tasks: Sequence[RowTask], workers: int, scheduler: str | None, scra
         ) from None
     logging.getLogger("distributed").setLevel(logging.WARNING)
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # a scheduler that is gone is told row by row
+    logging.getLogger("distributed.nanny").setLevel(logging.ERROR)  # and so is a worker
     with ExitStack() as stack:
         try:
             address: Any = scheduler or stack.enter_context(
@@ -78,7 +78,7 @@ def run_rows(tasks: Sequence[RowTask], workers: int, scheduler: str | None, scra
                 task = waiting.popleft()
                 try:
                     future = client.submit(run_row, task, key=f"{task.name}-{task.key}", pure=False)
-                except Exception:  # its class differs by version; a client that has closed takes nothing
+                except Exception:  # its class differs by version and moment; a client that has closed takes nothing
                     yield from (_lost(one, _GONE) for one in [*futures.values(), task, *waiting])
                     return
                 futures[future] = task
@@ -93,17 +93,16 @@ def run_rows(tasks: Sequence[RowTask], workers: int, scheduler: str | None, scra
 
 def _window(client: Any) -> int:
     """Return how many rows the workers hold at once, so that each has its next; as many have joined by now."""
-    try:
+    with suppress(Exception):  # the scheduler is gone: the rows it had will tell; the class differs by moment, as below
         return max(_LEAST_WINDOW, _EACH * sum(client.nthreads().values()))
-    except OSError:  # the scheduler is gone: the rows it had will tell
-        return _LEAST_WINDOW
+    return _LEAST_WINDOW
 
 
 def _result(future: Any, task: RowTask) -> RowResult:
     """Return what became of a row whose future has ended."""
     problem = _GONE
     if future.status == "finished":
-        with suppress(OSError, CancelledError):  # it can still be lost on its way here
+        with suppress(Exception):  # `run_row` raises none, but what it returned can still be lost on its way here
             result: RowResult = future.result()
             return result
     elif future.status != "cancelled":

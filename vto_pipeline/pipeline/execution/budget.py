@@ -1,14 +1,17 @@
-"""The wall time of a run, and what of it is left for the stage that can stop in time."""
+"""The wall time of a run, and what of it is left for the stage that can stop in time; and the memory of a run."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Collection
 
+from vto_pipeline.errors import ConfigError
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.settings import Config
-from vto_pipeline.pipeline.execution.forecast import latest_record
+from vto_pipeline.pipeline.execution.forecast import forecast, latest_record
 from vto_pipeline.pipeline.execution.store import Store
 from vto_pipeline.pipeline.plan import Plan, Step
+from vto_pipeline.pipeline.request import Request
 
 SETTING = "time_budget_s"
 """A stage whose settings have this can stop in time; all others take as long as they take."""
@@ -46,3 +49,30 @@ class Budget:
         if left <= 0.0:
             job.warn(f"nothing is left for it of the time budget of {self.seconds:g} s")
         return step.settings.model_copy(update={SETTING: max(left, _AT_LEAST)})
+
+
+def check_memory(
+    budget: float, request: Request, plan: Plan, store: Store, force_all: bool, renewed: Collection[str]
+) -> None:
+    """Refuse a run that would take more memory, by what its stages took before.
+
+    Of a stage that never ran nothing is known, and one that fits itself into a budget is let begin.
+
+    Args:
+        budget: Of the process's resident memory [B].
+        request, plan, store, force_all: Of the run.
+        renewed: Stages that are made anew, though stored.
+
+    Raises:
+        ConfigError: a stage took more, for the size of what is given.
+    """
+    expected = forecast(request, plan, store, force_all)
+    for step in plan.steps:
+        name, known = step.stage.name, expected[step.stage.name]
+        idle = step.stage.fits_memory or (known.stored and name not in renewed)
+        if not idle and known.peak_mb is not None and 1e6 * known.peak_mb > budget:
+            raise ConfigError(
+                f"{name} takes about {known.peak_mb / 1e3:.3g} GB of memory, by earlier runs; "
+                f"the budget is {budget / 1e9:.3g} GB",
+                hint="give more memory, or less to do: `vto plan` shows what each stage takes",
+            )

@@ -1,9 +1,9 @@
-"""How long stages will take: learnt from what they took, by what a plan knows of their inputs.
+"""How long stages will take, and how much memory: learnt from what they took, by what a plan knows of their inputs.
 
-The logarithm of a stage's time is a sum: a constant, a multiple of the logarithm of each size and of each setting, and
-an effect of each thing that was given, such as one body under many garments. All are estimated together with normal
-priors (ridge regression), so that few records give no wild exponents, and with Huber's weights, so that a run that
-compiled its kernels, or met a busy machine, counts as one and not as ten.
+The logarithm of a stage's time, or of its peak memory, is a sum: a constant, a multiple of the logarithm of each size
+and of each setting, and an effect of each thing that was given, such as one body under many garments. All are
+estimated together with normal priors (ridge regression), so that few records give no wild exponents, and with Huber's
+weights, so that a run that compiled its kernels, or met a busy machine, counts as one and not as ten.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ class StageCost:
     """The fitted cost of one stage.
 
     Args:
-        constant: Of the logarithm of the time.
+        constant: Of the logarithm of the time, or of the memory.
         means: Size or setting -> mean of its logarithm.
         terms: Size or setting -> power; (given key, name) as "key = name" -> effect.
     """
@@ -113,8 +113,8 @@ class StageCost:
     means: Mapping[str, float]
     terms: Mapping[str, float]
 
-    def seconds(self, figures: Figures) -> float:
-        """Return the expected time [s]; what was never met counts as average."""
+    def expected(self, figures: Figures) -> float:
+        """Return the expected time [s] or memory [MB]; what was never met counts as average."""
         total = self.constant
         for name, value in figures.items():
             if isinstance(value, str):
@@ -128,7 +128,7 @@ def fit_cost(records: Iterable[tuple[Figures, float]]) -> StageCost | None:
     """Fit what a stage took.
 
     Args:
-        records: Figures and time [s] of each time it ran.
+        records: Figures and time [s], or memory [MB], of each time it ran.
 
     Returns:
         The fit; the median where there are few; None where there are none.
@@ -136,7 +136,7 @@ def fit_cost(records: Iterable[tuple[Figures, float]]) -> StageCost | None:
     rows = list(records)
     if not rows:
         return None
-    logs = np.log(np.maximum([seconds for _, seconds in rows], _SHORTEST))
+    logs = np.log(np.maximum([taken for _, taken in rows], _SHORTEST))
     middle = float(np.median(logs))
     columns = _columns([figures for figures, _ in rows])
     if len(rows) < _LEAST_RECORDS or not columns:
@@ -176,20 +176,26 @@ class CostModel:
 
     def __init__(self, store: Store) -> None:
         stages = sorted(path.name for path in store.folder.glob("*/") if not path.name.startswith("."))
-        fits = {stage: fit_cost(_records(store, stage)) for stage in stages}
-        self._stages = {stage: cost for stage, cost in fits.items() if cost is not None}
+        records = {stage: list(_records(store, stage)) for stage in stages}
+        self._seconds = {stage: fit_cost((one, seconds) for one, seconds, _ in of) for stage, of in records.items()}
+        self._peaks = {stage: fit_cost((one, peak) for one, _, peak in of) for stage, of in records.items()}
 
     def __bool__(self) -> bool:
-        return bool(self._stages)
+        return any(cost is not None for cost in self._seconds.values())
 
     def seconds(self, stage: str, figures: Figures) -> float | None:
         """Return how long a stage will take [s]; None where it has never run."""
-        cost = self._stages.get(stage)
-        return None if cost is None else cost.seconds(figures)
+        cost = self._seconds.get(stage)
+        return None if cost is None else cost.expected(figures)
+
+    def peak_mb(self, stage: str, figures: Figures) -> float | None:
+        """Return how much memory the process will take while a stage runs [MB]; None where it has never run."""
+        cost = self._peaks.get(stage)
+        return None if cost is None else cost.expected(figures)
 
 
-def _records(store: Store, stage: str) -> Iterator[tuple[Figures, float]]:
-    """Yield figures and time of a stage's latest results that were not skipped."""
+def _records(store: Store, stage: str) -> Iterator[tuple[Figures, float, float]]:
+    """Yield figures, time [s] and peak memory [MB] of a stage's latest results that were not skipped."""
     dated = []
     for manifest in (store.folder / stage).glob(f"*/{MANIFEST}"):
         with suppress(OSError):  # gone meanwhile
@@ -198,4 +204,4 @@ def _records(store: Store, stage: str) -> Iterator[tuple[Figures, float]]:
         with suppress(OSError, ValueError, KeyError, TypeError):  # not ours
             record = json.loads(manifest.read_text(encoding="utf-8"))["record"]
             if not record["reason"]:
-                yield record["figures"], float(record["seconds"])
+                yield record["figures"], float(record["seconds"]), float(record["peak_mb"])

@@ -22,8 +22,7 @@ class Expected:
 
     Args:
         stored: Whether its result is there already.
-        seconds: Of its stored result, or as the cost model forecasts it; None where the stage never ran.
-        peak_mb: Of its latest result in the store, whatever that was made from; None if there is none.
+        seconds, peak_mb: Of its stored result, or as the cost model forecasts them; None where the stage never ran.
     """
 
     stored: bool
@@ -44,9 +43,10 @@ def forecast(request: Request, plan: Plan, store: Store, force_all: bool = False
     model, figures = CostModel(store), step_figures(request, plan)
     for step, result in stored_results(request, plan, store, force_all):
         name = step.stage.name
-        record = result.record if result is not None else latest_record(store, name)
-        seconds = record["seconds"] if result is not None else model.seconds(name, figures[name])
-        found[name] = Expected(result is not None, seconds, record.get("peak_mb"))
+        if result is not None:
+            found[name] = Expected(True, result.record["seconds"], result.record["peak_mb"])
+        else:
+            found[name] = Expected(False, model.seconds(name, figures[name]), model.peak_mb(name, figures[name]))
     return found
 
 

@@ -29,7 +29,8 @@ class StageRecord:
         name: The stage.
         status: "planned", "ran", "cached", "left_out" or "failed".
         reason: Why it was left out, or how it failed.
-        seconds, peak_mb: Wall time [s] and largest memory [MB]; of the run that made it where cached.
+        seconds, peak_mb: Wall time [s], and largest resident memory of the whole process meanwhile [MB]; of the run
+            that made it where cached.
         metrics: Figures it measured.
         notes, warnings: What it said; a warning is a verdict on a poor result.
         left_out: Parts of its work that this data did not need: (what, reason).
@@ -64,7 +65,9 @@ class StageRecord:
 class RunRecord:
     """All of run.json, kept in step with the run."""
 
-    def __init__(self, path: Path, request: Request, plan: Plan, time_budget: float | None = None) -> None:
+    def __init__(
+        self, path: Path, request: Request, plan: Plan, time_budget: float | None = None, memory: float | None = None
+    ) -> None:
         self._path, self._meter = path, Meter()
         uses = sorted({name for step in plan.steps for name in step.stage.uses})
         figures = step_figures(request, plan)
@@ -80,6 +83,7 @@ class RunRecord:
             "given": {artifact: _given(one) for artifact, one in request.given.items()},
             "seed": request.seed,
             "time_budget_s": time_budget,
+            "memory_budget_mb": None if memory is None else memory / 1e6,
         }
 
     def as_dict(self) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -12,7 +13,7 @@ from vto_pipeline.errors import ComputationError, ConfigError, InputError, VtoEr
 from vto_pipeline.io.documents import suggest
 from vto_pipeline.model.job import Job
 from vto_pipeline.pipeline.catalogue import Catalogue
-from vto_pipeline.pipeline.execution.budget import Budget
+from vto_pipeline.pipeline.execution.budget import Budget, check_memory
 from vto_pipeline.pipeline.execution.cost import Meter
 from vto_pipeline.pipeline.execution.digest import digest_given
 from vto_pipeline.pipeline.execution.final import make_final
@@ -37,6 +38,7 @@ def run(
     cache: Path | None = None,
     afresh: str | None = None,
     time_budget: float | None = None,
+    memory: float | None = None,
 ) -> dict[str, Any]:
     """Run a plan in a folder, resuming from the results of earlier runs.
 
@@ -51,12 +53,14 @@ def run(
         afresh: Stage that is made anew, with all that depends on it, though results are stored.
         time_budget: Wall time of the whole run [s]; what other stages leave of it is the budget of one that can stop in
             time. None: each has what its settings say.
+        memory: Budget of the process's resident memory [B], for each stage; None: what the machine has.
 
     Returns:
         What run.json holds.
 
     Raises:
-        ConfigError: the folder is in use, or is no run's folder; or the plan has no stage `afresh`.
+        ConfigError: the folder is in use, or is no run's folder; the plan has no stage `afresh`; or a stage took more
+            than `memory` in earlier runs.
         InputError: something given cannot be read.
         ComputationError: a stage failed; its partial result is under RUN/out/partial.
     """
@@ -64,7 +68,11 @@ def run(
     with locked_run_folder(folder, [path for one in request.given.values() for path in one.paths]):
         store = Store(folder / "cache" if cache is None else cache)
         budget = None if time_budget is None else Budget(time_budget, plan, store)
-        runner = _Run(request, plan, catalogue, folder, store, force_all, listener or Listener(), renewed, budget)
+        if memory is not None:
+            check_memory(memory, request, plan, store, force_all, renewed)
+        runner = _Run(
+            request, plan, catalogue, folder, store, force_all, listener or Listener(), renewed, budget, memory
+        )
         return runner.run_all()
 
 
@@ -95,12 +103,14 @@ class _Run:
         listener: Listener,
         renewed: frozenset[str],
         budget: Budget | None,
+        memory: float | None,
     ) -> None:
         self.request, self.plan, self.catalogue = request, plan, catalogue
         self.force_all, self.listener, self.renewed = force_all, listener, renewed
         self.store, self.budget = store, budget
+        self.memory = math.inf if memory is None else memory
         self.out = OutputFolder(folder / "out", catalogue)
-        self.record = RunRecord(folder / RECORD, request, plan, None if budget is None else budget.seconds)
+        self.record = RunRecord(folder / RECORD, request, plan, None if budget is None else budget.seconds, memory)
         self.results: dict[str, Result] = {}
         self.given_digests: dict[str, str] = {}
 
@@ -165,7 +175,7 @@ class _Run:
         """Read the inputs, call the stage, write what it returns."""
         name, meter = step.stage.name, Meter()
         with self.store.making(name) as unfinished, self.store.making(name) as scratch:
-            job = Job(self.listener.progress, scratch, self.request.seed, self.force_all)
+            job = Job(self.listener.progress, scratch, self.request.seed, self.force_all, self.memory)
             try:
                 with self._unchanged(step):
                     outputs, reason = self._call(step, job)
@@ -216,7 +226,7 @@ class _Run:
         for number, step in steps:
             record, meter = self.record.stages[step.stage.name], Meter()
             self.listener.started(number, len(self.plan.steps), step.stage)
-            job = Job(self.listener.progress, None, self.request.seed, self.force_all)
+            job = Job(self.listener.progress, None, self.request.seed, self.force_all, self.memory)
             make_final(step.stage, step.settings, self.out, self.request.given, self.record.as_dict(), job)
             record.take(job, meter)
             record.status = "ran"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -71,9 +72,9 @@ def estimate_depth_maps(
     if not pairs:
         hint = "photos about 15 degrees apart work best; is there texture?"
         raise ScanError(f"no two of {len(views)} photos share {config.min_shared_points} sparse points", hint=hint)
-    _check_memory(views, pairs, job)
+    threads = _threads(views, pairs, job)
     pinholes = tuple(view.camera.without_distortion() for view in views)
-    depth = _merge(cameras.names, views, pairs, cloud, seen, config, job)
+    depth = _merge(cameras.names, views, pairs, cloud, seen, config, threads, job)
     merged = DepthMaps(cameras.names, pinholes, cameras.world_from_cam, depth)
     checked = _check(merged, pairs, config, job)
     measured, kept = int((merged.depth > 0).sum()), int((checked > 0).sum())
@@ -120,11 +121,11 @@ def _with_exposures(views: list[StereoView], cloud: PointCloud, seen: NDArray[np
     return [replace(view, exposure=float(exposure)) for view, exposure in zip(views, found, strict=True)]
 
 
-def _check_memory(views: list[StereoView], pairs: list[tuple[int, int]], job: Job) -> None:
-    """State the largest memory that matching needs, which follows from the pairs alone.
+def _threads(views: list[StereoView], pairs: list[tuple[int, int]], job: Job) -> int:
+    """Return how many pairs are matched at once: one a core, as memory allows. What it needs follows from the pairs.
 
     Raises:
-        ScanError: the machine has less.
+        ScanError: it does not even allow one.
     """
     pixels = max(view.gray.shape[0] for view in views) * max(view.gray.shape[1] for view in views)
     left = np.bincount(np.array(pairs).ravel(), minlength=len(views))
@@ -138,15 +139,16 @@ def _check_memory(views: list[StereoView], pairs: list[tuple[int, int]], job: Jo
             if found[index] == left[index]:
                 waiting -= left[index]
     kept = (1 + 4 + 4) * len(views) + 4 * (most + left.max())  # grey, merged, checked; maps, and those being merged
-    needed = pixels * (kept + PAIR_BYTES * (os.cpu_count() or 1))
-    present = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    cores, free = os.cpu_count() or 1, job.memory_left()
+    threads = min(cores, int((free / pixels - kept) / PAIR_BYTES))
+    needed = pixels * (kept + PAIR_BYTES * max(1, threads))
+    if threads < 1:
+        has = "this machine has" if math.isinf(job.memory) else "the budget leaves"
+        problem = f"{len(views)} photos need up to {needed / 1e9:.1f} GB of memory; {has} {max(0.0, free) / 1e9:.1f} GB"
+        raise ScanError(problem, hint="lower stereo.max_side_px, or give more memory")
     job.measure(memory_bound_mb=round(needed / 1e6))
-    if needed > present:
-        problem = (
-            f"{len(views)} photos need up to {needed / 1e9:.1f} GB of memory; this machine has {present / 1e9:.1f} GB"
-        )
-        raise ScanError(problem, hint="lower stereo.max_side_px")
-    job.note(f"{len(pairs)} pairs in at most {needed / 1e9:.1f} GB of memory")
+    job.note(f"{len(pairs)} pairs in at most {needed / 1e9:.1f} GB of memory, {threads} at a time on {cores} cores")
+    return threads
 
 
 def _merge(
@@ -156,6 +158,7 @@ def _merge(
     cloud: PointCloud,
     seen: NDArray[np.bool_],
     config: StereoConfig,
+    threads: int,
     job: Job,
 ) -> NDArray[np.float32]:
     """Match all pairs and merge the findings of each photo's neighbours, shape (C, H, W)."""
@@ -174,7 +177,7 @@ def _merge(
         except (cv2.error, ScanError) as error:
             return library_message(error) if isinstance(error, cv2.error) else error.problem
 
-    for done, (pair, matched) in enumerate(_in_order(work, pairs)):
+    for done, (pair, matched) in enumerate(_in_order(work, pairs, threads)):
         if isinstance(matched, str):
             job.warn(f"left out the pair {names[pair[0]]} and {names[pair[1]]}: {matched}")
         for side, index in enumerate(pair):
@@ -191,17 +194,18 @@ def _merge(
     return merged
 
 
-def _in_order(work: Callable[[Any], Any], pairs: list[tuple[int, int]]) -> Iterator[tuple[tuple[int, int], Any]]:
-    """Run pairs on all cores and give the results in the order of the pairs, so that sums are reproducible.
+def _in_order(
+    work: Callable[[Any], Any], pairs: list[tuple[int, int]], threads: int
+) -> Iterator[tuple[tuple[int, int], Any]]:
+    """Run pairs side by side and give the results in the order of the pairs, so that sums are reproducible.
 
-    No more than two pairs a core are under way or waiting for their turn: that bounds the memory.
+    No more than two pairs a thread are under way or waiting for their turn: that bounds the memory.
     """
-    cores = os.cpu_count() or 1
-    with ThreadPoolExecutor(cores) as pool:
+    with ThreadPoolExecutor(threads) as pool:
         running: deque[tuple[tuple[int, int], Future[Any]]] = deque()
         for pair in pairs:
             running.append((pair, pool.submit(work, pair)))
-            if len(running) == 2 * cores:
+            if len(running) == 2 * threads:
                 pair, future = running.popleft()
                 yield pair, future.result()
         while running:

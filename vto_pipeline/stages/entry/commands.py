@@ -149,6 +149,7 @@ def run_order(
     afresh: str | None = None,
     time_budget: float | None = None,
     target_error: float | None = None,
+    memory: float | None = None,
 ) -> Outcome:
     """Run a document in a folder, resuming from the results of earlier runs.
 
@@ -164,6 +165,7 @@ def run_order(
         afresh: Stage that is made anew with all that depends on it, though results are stored.
         time_budget: Wall time of the whole run [s]: the drape takes what the other stages leave of it.
         target_error: Error of the drape [m] at which it may end.
+        memory: Budget of memory [B], for each stage.
 
     Raises:
         VtoError: of whatever kind; a failed computation is recorded in run.json and its partial result named.
@@ -186,6 +188,7 @@ def run_order(
             cache=cache,
             afresh=afresh,
             time_budget=time_budget,
+            memory=memory,
         )
     except ComputationError as error:
         if error.partial:
