@@ -12,6 +12,7 @@ from vto_pipeline.avatar.measuring.avatar_measurements import fit_levels
 from vto_pipeline.avatar.template.regions import trunk_vertices
 from vto_pipeline.cloth.judge.worn import vertex_maps
 from vto_pipeline.cloth.rest_shape.edge_length_embedding import lengths_in_space
+from vto_pipeline.geometry.seams import textured_part
 from vto_pipeline.geometry.topology import face_area_vectors
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -26,7 +27,8 @@ Outputs = Mapping[str, Any]
 
 
 def _transfer(inputs: Inputs, settings: DressConfig, job: Job) -> Outputs:
-    return {"render_mesh": deform_render_mesh(inputs["garment"], inputs["sim_mesh"], inputs["draped"], settings, job)}
+    garment = inputs.get("garment_texture", inputs["garment"])
+    return {"render_mesh": deform_render_mesh(garment, inputs["sim_mesh"], inputs["draped"], settings, job)}
 
 
 def _assess(inputs: Inputs, settings: FitConfig, job: Job) -> Outputs:
@@ -61,6 +63,8 @@ def _observed_share(inputs: Inputs) -> float | None:
 
 def _page(inputs: Inputs, settings: Config, job: Job) -> Outputs:
     parts = {name: value for name, value in inputs.items() if name != "run_record"}
+    if "garment_texture" in parts and "render_mesh" not in parts:
+        parts["garment"] = [textured_part("garment", parts["garment_texture"])]
     places = _crossings(inputs.get("audit", {}))
     if places:
         parts["crossings"] = mark_places(np.array(places))
@@ -78,6 +82,7 @@ STAGES: tuple[Stage, ...] = (
         name="transfer",
         about="the detailed garment follows the draped simulation mesh",
         needs=("garment", "sim_mesh", "draped"),
+        optional=("garment_texture",),
         makes=("render_mesh",),
         run=_transfer,
         settings=DressConfig,
@@ -103,6 +108,7 @@ STAGES: tuple[Stage, ...] = (
             "mannequin_surface",
             "labels",
             "garment",
+            "garment_texture",
             "openings",
             "avatar",
             "measurements",
