@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.testing import assert_allclose
 
+from vto_pipeline.geometry.remeshing.seams import split_at_seams, textured_part
 from vto_pipeline.geometry.rigid import transform_cameras, transform_mesh
-from vto_pipeline.geometry.seams import split_at_seams, textured_part
 from vto_pipeline.model.camera import CameraSet, Intrinsics
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.texture import TexturedMesh

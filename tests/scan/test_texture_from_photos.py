@@ -59,13 +59,13 @@ def test_neither_post_nor_backdrop_is_on_it(half: TexturedMesh) -> None:
 def test_what_no_photo_shows_is_marked(half: TexturedMesh) -> None:
     points, _, seen = texels(half)
     eyes = scene.cameras(12, 150.0).world_from_cam[:, :3, 3]
-    normal = points * (1, 0, 1) / scene.RADIUS
+    normal = points * (1, 0, 1) / np.hypot(points[:, 0], points[:, 2])[:, None]
     sight = eyes[:, None] - points
     cosine = np.einsum("cnd,nd->cn", sight, normal) / np.linalg.norm(sight, axis=2)
     best = cosine.max(axis=0)
     inner = np.abs(points[:, 1] - 0.5 * scene.HEIGHT) < 0.45 * scene.HEIGHT
     limit = np.cos(np.radians(TextureConfig().max_angle_deg))
-    assert seen[inner & (best > limit + 0.03)].all()
+    assert seen[inner & (best > limit + 0.1)].all()  # in between, the outline is too near
     assert not seen[best < limit - 0.03].any()
 
 

@@ -7,7 +7,6 @@ section, hull: where a plane cuts; the path of a taut tape
 binding: one mesh rides on another
 metres: surfaces of unknown unit, refused
 rigid: moving a mesh, or cameras, as a whole
-seams: a textured mesh with a vertex for each side of a seam
 floor: the floor under a scan
 remeshing/: other triangles for the same surface
 """

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pydantic import Field
 
 from vto_pipeline.geometry.remeshing.decimate import decimate
-from vto_pipeline.geometry.seams import textured_part
+from vto_pipeline.geometry.remeshing.seams import textured_part
 from vto_pipeline.geometry.topology import vertex_normals
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh

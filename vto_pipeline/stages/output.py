@@ -12,7 +12,7 @@ from vto_pipeline.avatar.measuring.avatar_measurements import fit_levels
 from vto_pipeline.avatar.template.regions import trunk_vertices
 from vto_pipeline.cloth.judge.worn import vertex_maps
 from vto_pipeline.cloth.rest_shape.edge_length_embedding import lengths_in_space
-from vto_pipeline.geometry.seams import textured_part
+from vto_pipeline.geometry.remeshing.seams import textured_part
 from vto_pipeline.geometry.topology import face_area_vectors
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh

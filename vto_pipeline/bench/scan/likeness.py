@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from vto_pipeline.geometry.topology import opposite_half_edges
+from vto_pipeline.geometry.topology import half_edges
 from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.texture import TexturedMesh
 
@@ -55,9 +55,10 @@ def seam_steps(textured: TexturedMesh, sample: Callable[[ByteArray, FloatArray],
     """
     mesh = textured.mesh
     assert mesh.texture is not None
-    opposite = opposite_half_edges(mesh)
-    here = np.flatnonzero(opposite > np.arange(len(opposite)))
-    there = opposite[here]
+    ends = np.sort(half_edges(mesh), axis=1)
+    order = np.lexsort([ends[:, 1], ends[:, 0]])
+    twin = np.flatnonzero((np.diff(ends[order], axis=0) == 0).all(axis=1))
+    here, there = order[twin], order[twin + 1]
     start, end = mesh.texture.reshape(-1, 2), np.roll(mesh.texture, -1, axis=1).reshape(-1, 2)
     cut = (start[here] != end[there]).any(axis=1) | (end[here] != start[there]).any(axis=1)
     here, there = here[cut], there[cut]

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from vto_pipeline.bench.scan.likeness import likeness, seam_steps
 from vto_pipeline.geometry.rigid import transform_cameras, transform_mesh
+from vto_pipeline.geometry.topology import face_area_vectors
 from vto_pipeline.io.captures.cameras import read_cameras, read_matrix
 from vto_pipeline.io.captures.images import read_image
 from vto_pipeline.io.captures.photos import read_photos
@@ -116,7 +117,7 @@ def draw(textured: TexturedMesh, camera: Intrinsics, world_from_cam: FloatArray)
     """Draw a textured mesh, unlit, as a camera without distortion sees it.
 
     Returns:
-        sRGB, shape (H, W, 3), and which pixels show texels that a photo had shown, shape (H, W).
+        sRGB, shape (H, W, 3), and which pixels show the outside, and texels that a photo had shown, shape (H, W).
     """
     fine = camera.without_distortion().resized(SAMPLES * camera.width, SAMPLES * camera.height)
     cam_from_world = np.linalg.inv(world_from_cam)
@@ -130,9 +131,13 @@ def draw(textured: TexturedMesh, camera: Intrinsics, world_from_cam: FloatArray)
     share = share * corner / (share * corner).sum(axis=1, keepdims=True)
     assert textured.mesh.texture is not None
     place = np.einsum("nk,nkd->nd", share, textured.mesh.texture[face[shown]])
+    outside = (
+        face_area_vectors(textured.mesh) * (world_from_cam[:3, 3] - textured.mesh.vertices[textured.mesh.faces[:, 0]])
+    ).sum(axis=1) > 0
     picture, seen = np.zeros((fine.height, fine.width, 3)), np.zeros((fine.height, fine.width))
     picture[shown] = sample(textured.picture, place)
     seen[shown] = sample(np.where(textured.seen, 255, 0).astype(np.uint8)[..., None], place)[:, 0] > 128
+    seen[shown] *= outside[face[shown]]
     block = (camera.height, SAMPLES, camera.width, SAMPLES)
     whole = seen.reshape(block).min(axis=(1, 3)) > 0
     return np.rint(picture.reshape(*block, 3).mean(axis=(1, 3))).astype(np.uint8), whole

@@ -9,6 +9,7 @@ from vto_pipeline.geometry.laplace import extend_smoothly
 from vto_pipeline.geometry.topology import face_components
 from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.scan.texture.charts import nearest_pixel
 
 
 def fill_vertices(mesh: TriangleMesh, colors: FloatArray, seen: NDArray[np.bool_]) -> FloatArray:
@@ -35,11 +36,4 @@ def fill_vertices(mesh: TriangleMesh, colors: FloatArray, seen: NDArray[np.bool_
 
 def fill_between(picture: ByteArray, inside: NDArray[np.bool_]) -> ByteArray:
     """Return a picture, shape (H, W, 3), whose pixels outside the charts have the colour of the nearest one inside."""
-    import cv2
-
-    _, label = cv2.distanceTransformWithLabels(
-        (~inside).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    source = np.zeros(int(label.max()) + 1, dtype=np.int64)
-    source[label[inside]] = np.flatnonzero(inside)
-    return np.asarray(picture.reshape(-1, 3)[source[label]])
+    return np.asarray(picture.reshape(-1, 3)[nearest_pixel(inside)[1]])

@@ -148,8 +148,8 @@ def _assemble(
     picture[texels.row, texels.column] = np.rint(color[:count])
     inside[texels.row, texels.column] = True
     mask[texels.row, texels.column] = known[:count]
-    area = 1.0 - float(unseen.mean())
-    job.measure(texture_px=max(size), texels=count, textured_share=round(area, 4))
-    job.measure(photos_per_texel=round(float(seen[:count][~unseen].mean()) if area else 0.0, 2))
+    shown = seen[:count][texels.inside]
+    job.measure(texture_px=max(size), texels=len(shown), textured_share=round(float((shown > 0).mean()), 4))
+    job.measure(photos_per_texel=round(float(shown[shown > 0].mean()) if shown.any() else 0.0, 2))
     surface = TriangleMesh(mesh.vertices, mesh.faces, np.rint(vertices).astype(np.uint8), corners, mesh.metric)
     return TexturedMesh(surface, fill_between(picture, inside), mask)
