@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import painted_tube as scene
 import pytest
+from numpy.testing import assert_allclose
 
+from vto_pipeline.bench.scan.likeness import seam_steps
+from vto_pipeline.bench.scan.look import sample
+from vto_pipeline.geometry.rigid import transform_cameras, transform_mesh
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.texture import TexturedMesh
 from vto_pipeline.scan.texture.charts import texels_of
 from vto_pipeline.scan.texture.project import TextureConfig, texture_surface
+from vto_pipeline.stages import CATALOGUE
+from vto_pipeline.stages.entry.planning import catalogue, planned
 
 
 def textured(folder: Path, arc_deg: float, occluder: TriangleMesh | None = None, **photos: object) -> TexturedMesh:
@@ -70,12 +77,10 @@ def test_what_no_photo_shows_is_marked(half: TexturedMesh) -> None:
 
 
 def test_seams_do_not_show(half: TexturedMesh) -> None:
-    """Texels of different charts that lie on the same place have the same colour, and the gutter has it, too."""
-    from vto_pipeline.bench.scan.likeness import seam_steps
-    from vto_pipeline.bench.scan.look import sample
-
-    step = seam_steps(half, sample)
-    assert 0 < step["seam_step_p95"] < 12
+    """Both charts beside a seam have its colours; without margins they differ by 8 steps of a byte."""
+    assert seam_steps(half, sample)["seam_step_p95"] < 3
+    loose = replace(half, picture=np.random.default_rng(0).integers(0, 256, half.picture.shape).astype(np.uint8))
+    assert seam_steps(loose, sample)["seam_step_p95"] > 100  # there are seams
 
 
 def test_a_known_occluder_hides_what_is_behind_it(tmp_path: Path) -> None:
@@ -96,3 +101,33 @@ def test_the_same_bits_twice(tmp_path: Path, half: TexturedMesh) -> None:
     again = textured(tmp_path, 150.0, gains=gains, with_post=True)
     assert np.array_equal(again.picture, half.picture)
     assert np.array_equal(again.mesh.texture, half.mesh.texture)
+
+
+def test_the_row_brings_cameras_and_scene_into_the_frame_of_the_garment(tmp_path: Path) -> None:
+    """The scan has a frame and a unit of its own; the garment was placed in the form's, in metres."""
+    garment_from_scan = np.eye(4)
+    garment_from_scan[:3, :3] = 2.5 * np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    garment_from_scan[:3, 3] = (0.3, -0.2, 0.1)
+    taken, back = scene.cameras(2, 16.0), np.linalg.inv(garment_from_scan)
+    inputs = {
+        "garment": scene.tube(),
+        "garment_photos": scene.photograph(tmp_path, taken, with_post=True),
+        "garment_cameras": transform_cameras(taken, back),
+        "garment_surface": transform_mesh(scene.post(), back),
+        "garment_placement": garment_from_scan,
+    }
+    row = next(stage for stage in CATALOGUE.stages if stage.name == "texture")
+    job = Job()
+    points, color, seen = texels(row.run(inputs, TextureConfig(), job)["garment_texture"])
+    assert np.abs(color[seen] - scene.paint(points[seen])).max() < 60
+    assert 0.2 < job.metrics["textured_share"] < 0.5  # less than half of a tube is seen from one side
+    assert_allclose(job.metrics["textured_share"], seen.mean(), rtol=0, atol=0.02)  # margins are counted in one
+
+
+def test_photos_are_laid_on_and_frames_are_not() -> None:
+    for name, made in (("demo", True), ("garment_from_depth", False)):
+        _, plan = planned(Path(__file__).parents[2] / "configs" / f"{name}.yaml", (), catalogue())
+        steps = {step.stage.name: step.inputs for step in plan.steps}
+        assert ("texture" in steps) == made
+        assert ("garment_texture" in steps["transfer"]) == made
+    assert "photos" in plan.left_out["texture"]
