@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.testing import assert_allclose
 
-from vto_pipeline.geometry.remeshing.seams import split_at_seams, textured_part
+from vto_pipeline.geometry.remeshing.seams import cut_open, split_at_seams
 from vto_pipeline.geometry.rigid import transform_cameras, transform_mesh
 from vto_pipeline.model.camera import CameraSet, Intrinsics
 from vto_pipeline.model.mesh import TriangleMesh
-from vto_pipeline.model.texture import TexturedMesh
 
 
 def folded_sheet() -> TriangleMesh:
@@ -32,7 +31,7 @@ def test_every_corner_keeps_its_place_in_space_and_in_the_picture() -> None:
 
 def test_normals_do_not_break_at_a_seam() -> None:
     mesh = folded_sheet()
-    part = textured_part("sheet", TexturedMesh(mesh, np.zeros((4, 4, 3), np.uint8), np.ones((4, 4), bool)))
+    part = cut_open("sheet", mesh, np.zeros((4, 4, 3), np.uint8))
     assert part.normals is not None
     twins = [np.flatnonzero((part.mesh.vertices == mesh.vertices[k]).all(axis=1)) for k in (1, 2)]
     for one, other in twins:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pydantic import Field
 
 from vto_pipeline.geometry.remeshing.decimate import decimate
-from vto_pipeline.geometry.remeshing.seams import textured_part
+from vto_pipeline.geometry.remeshing.seams import cut_open
 from vto_pipeline.geometry.topology import vertex_normals
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -38,17 +38,18 @@ def deform_render_mesh(
         job: Takes figures and what was left out.
 
     Returns:
-        One part, "garment", with normals and the scan's picture, or else its colours.
+        One part, "garment", with normals and the picture, or else the scan's colours; texture coordinates stay.
     """
     if isinstance(garment, TexturedMesh):
         job.leave_out("thinning out", "the picture lies on these triangles; texture.max_triangles bounds them")
-        moved = apply(bind(garment.mesh, sim_mesh), draped.vertices)
-        job.measure(triangles=len(garment.mesh.faces))
-        return [textured_part("garment", replace(garment, mesh=replace(garment.mesh, vertices=moved)))]
+        moved = replace(garment.mesh, vertices=apply(bind(garment.mesh, sim_mesh), draped.vertices))
+        job.measure(triangles=len(moved.faces))
+        return [cut_open("garment", moved, garment.picture)]
     if len(garment.faces) <= config.max_triangles:
         job.leave_out("thinning out", f"{len(garment.faces)} triangles, {config.max_triangles} are allowed")
     detailed = decimate(garment, config.max_triangles)
-    binding = bind(detailed, sim_mesh)
-    mesh = TriangleMesh(apply(binding, draped.vertices), detailed.faces, detailed.colors)
-    job.measure(triangles=len(mesh.faces))
-    return [GlbPart("garment", mesh, normals=vertex_normals(mesh))]
+    moved = replace(detailed, vertices=apply(bind(detailed, sim_mesh), draped.vertices))
+    job.measure(triangles=len(moved.faces))
+    if moved.texture is not None:
+        return [cut_open("garment", moved, None)]
+    return [GlbPart("garment", moved, normals=vertex_normals(moved))]

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from vto_pipeline.geometry.topology import vertex_normals
-from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.arrays import ByteArray, FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.render import GlbPart
-from vto_pipeline.model.texture import TexturedMesh
 
 
 def split_at_seams(mesh: TriangleMesh) -> tuple[IntArray, IntArray, FloatArray]:
@@ -33,14 +32,14 @@ def split_at_seams(mesh: TriangleMesh) -> tuple[IntArray, IntArray, FloatArray]:
     return source, corner.reshape(-1, 3), rows[first, 1:] * (1.0, -1.0) + (0.0, 1.0)
 
 
-def textured_part(name: str, textured: TexturedMesh) -> GlbPart:
-    """Return a mesh and its picture as a part, cut open where the picture is."""
-    mesh = textured.mesh
+def cut_open(name: str, mesh: TriangleMesh, picture: ByteArray | None) -> GlbPart:
+    """Return a mesh with texture coordinates, and its picture if it has one, as a part, with a vertex for each place.
+
+    Its normals are those of the whole surface: vertices at one place share them, however the mesh was cut before.
+    """
     source, faces, uv = split_at_seams(mesh)
-    return GlbPart(
-        name,
-        TriangleMesh(mesh.vertices[source], faces),
-        normals=vertex_normals(mesh)[source],
-        uv=uv,
-        texture=textured.picture,
-    )
+    points, whole = np.unique(mesh.vertices, axis=0, return_inverse=True)
+    normals = vertex_normals(TriangleMesh(points, whole.reshape(-1)[mesh.faces]))
+    colors = None if mesh.colors is None or picture is not None else mesh.colors[source]
+    cut = TriangleMesh(mesh.vertices[source], faces, colors)
+    return GlbPart(name, cut, normals=normals[whole.reshape(-1)[source]], uv=uv, texture=picture)

@@ -86,7 +86,7 @@ def texture_surface(
     least = float(np.cos(np.radians(config.max_angle_deg)))
     masks = []
     for index, (camera, pose) in enumerate(zip(cameras.intrinsics, cameras.world_from_cam, strict=True)):
-        job.progress(0.2 + 0.4 * index / len(paths), "which photos show each texel")
+        job.progress(0.2 + 0.4 * index / len(cameras.names), "which photos show each texel")
         view = look(mesh, occluder, camera, pose, 1e-3 * config.slack_mm)
         rank_view(
             index, mesh.vertices, normals, mesh.faces, *samples, lens_of(camera), view.cam_from_world,
@@ -97,7 +97,7 @@ def texture_surface(
     for index, (name, camera, pose) in enumerate(
         zip(cameras.names, cameras.intrinsics, cameras.world_from_cam, strict=True)
     ):
-        job.progress(0.6 + 0.3 * index / len(paths), "colours")
+        job.progress(0.6 + 0.3 * index / len(cameras.names), "colours")
         picture = read_image(paths[name])
         mask = np.unpackbits(masks[index], axis=1, count=camera.width)
         coarse = coarse_band(undistorted(picture, camera), mask, config.band_pixels)
@@ -105,7 +105,7 @@ def texture_surface(
             index, mesh.vertices, mesh.faces, *samples, lens_of(camera), camera.k1, np.linalg.inv(pose),
             picture, coarse, best, low, high,
         )  # fmt: skip
-    gain = _gains(best, low, len(texels.face), len(paths))
+    gain = _gains(best, low, len(texels.face), len(cameras.names))
     color, seen = blend(best, score, low, high, gain, config.tolerance, config.detail_power)
     return _assemble(mesh, corners, size, texels, color, seen, job)
 
@@ -145,8 +145,9 @@ def _assemble(
     color[:count][unseen] = np.einsum("nk,nkc->nc", texels.weight[unseen], around)
     width, height = size
     picture, inside, mask = np.zeros((height, width, 3), np.uint8), *np.zeros((2, height, width), dtype=bool)
-    picture[texels.row, texels.column] = np.rint(color[:count])
-    inside[texels.row, texels.column] = True
+    own = texels.inside | known[:count]  # where no photo shows a margin, its chart's edge goes on
+    picture[texels.row[own], texels.column[own]] = np.rint(color[:count][own])
+    inside[texels.row[own], texels.column[own]] = True
     mask[texels.row, texels.column] = known[:count]
     shown = seen[:count][texels.inside]
     job.measure(texture_px=max(size), texels=len(shown), textured_share=round(float((shown > 0).mean()), 4))
