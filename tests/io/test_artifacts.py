@@ -21,6 +21,7 @@ from vto_pipeline.model.garment import Opening, RestShape, SurfaceLabels
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud, TriangleMesh
 from vto_pipeline.model.render import GlbPart
+from vto_pipeline.model.texture import TexturedMesh
 
 KINDS = {kind.name: kind for kind in ARTIFACTS}
 RNG = np.random.default_rng(9)
@@ -34,7 +35,14 @@ CAMERAS = CameraSet(("a.jpg", "é.jpg"), LENSES, POSES, metric=False, unregister
 CLOUD = PointCloud(POINTS, -POINTS, COLORS)
 DEPTH = RNG.random((2, 6, 8)).astype(np.float32)
 
+TEXTURED = TexturedMesh(
+    TriangleMesh(POINTS, FACES, COLORS, RNG.random((9, 3, 2))),
+    RNG.integers(0, 256, (6, 8, 3)).astype(np.uint8),
+    RNG.random((6, 8)) > 0.5,
+)
+
 VALUES: dict[str, Any] = {
+    "garment_texture": TEXTURED,
     "garment_sparse": (CAMERAS, CLOUD),
     "garment_cameras": CAMERAS,
     "garment_points": CLOUD,

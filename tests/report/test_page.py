@@ -9,10 +9,12 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from PIL import Image
 from report_parts import all_parts, run_record, stage, tube
 from scipy.spatial import cKDTree
 
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.render import GlbPart
 from vto_pipeline.report.page import build_page
 from vto_pipeline.report.scene import script_json
 
@@ -134,6 +136,29 @@ def test_layers_and_what_shows_first() -> None:
     assert [layer["name"] for layer in marked if layer["visible"]] == ["Garment", "Body", "Crossings"]
     only_scan = scene_of(build_page(run_record(), {"garment_surface": tube(0.2, 0.3, 1.7)}))["layers"]
     assert [layer["visible"] for layer in only_scan] == [True]
+
+
+def test_a_picture_and_its_places_come_back() -> None:
+    from base64 import b64decode
+    from io import BytesIO
+
+    mesh = tube(0.2, 0.3, 1.7, around=400, rings=100)  # more triangles than another mesh may keep
+    uv = np.column_stack([np.linspace(-0.5, 2.0, len(mesh.vertices)), np.linspace(0, 1, len(mesh.vertices))])
+    stripes = np.zeros((300, 4000, 3), np.uint8)
+    stripes[:, 2000:, 0] = 200
+    skinned = GlbPart("garment", mesh, uv=uv, texture=stripes)
+    scene = scene_of(build_page(run_record(), {"render_mesh": [skinned], "avatar": tube(0.1, 0, 1.8)}))
+    layer = scene["layers"][0]
+    assert len(unpack(scene["geometries"][layer["geometry"]])[1]) == len(mesh.faces)
+    grid = np.frombuffer(b64decode(layer["places"]), "<u2").reshape(-1, 2)
+    places = np.array(layer["placesLow"]) + np.array(layer["placesSize"]) * grid / 65535
+    assert_allclose(places, uv, rtol=0, atol=2.5 / 65535, err_msg="half a step of 16 bits, and rounding")
+    kind, _, data = layer["picture"].partition(",")
+    assert kind == "data:image/jpeg;base64"
+    shown = np.asarray(Image.open(BytesIO(b64decode(data)))).astype(float)
+    assert shown.shape == (154, 2048, 3)
+    assert_allclose(shown[:, [100, 1900], 0].mean(axis=0), [0, 200], atol=4)  # JPEG
+    assert "picture" not in scene["layers"][1]
 
 
 def test_a_vertex_without_a_face_is_not_packed() -> None:

@@ -6,7 +6,7 @@ signed_distance, closest, geodesic, sampling, laplace, smooth: distances and fun
 section, hull: where a plane cuts; the path of a taut tape
 binding: one mesh rides on another
 metres: surfaces of unknown unit, refused
-rigid: moving a mesh as a whole
+rigid: moving a mesh, or cameras, as a whole
 floor: the floor under a scan
 remeshing/: other triangles for the same surface
 """

@@ -27,7 +27,7 @@ from vto_pipeline.io.gltf.read import parse_gltf
 from vto_pipeline.io.lengths import to_metres
 from vto_pipeline.io.sandbox import run_limited
 from vto_pipeline.model.job import Job
-from vto_pipeline.model.mesh import PointCloud, TriangleMesh
+from vto_pipeline.model.mesh import PointCloud, Skin, TriangleMesh
 
 PARSERS: dict[str, Callable[[str], Arrays]] = {
     ".ply": parse_ply,
@@ -82,7 +82,8 @@ def read_mesh(path: Path, *, unit: str | None = None, job: Job | None = None) ->
             job.warn(f"{path.name}: {count - len(vertices)} vertices belong to no face: is the file truncated?")
     try:
         texture = arrays.get("texture")
-        return TriangleMesh(vertices, arrays["faces"], arrays.get("colors"), texture, metric)
+        skin = Skin(arrays["places"], arrays["picture"]) if "picture" in arrays else None
+        return TriangleMesh(vertices, arrays["faces"], arrays.get("colors"), texture, metric, skin)
     except InputError as e:
         raise FormatError(e.problem, where=str(path), hint=e.hint) from None
 

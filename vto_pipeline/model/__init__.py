@@ -2,6 +2,6 @@
 
 mesh, camera, frames: surfaces, clouds and captures
 body, garment, outfit, fabric, cloth: what is fitted and draped
-render: what is drawn
+render, texture: what is drawn; a surface with a picture on it
 artifact, job, settings, arrays: how nouns are kept; long work; the base of settings; checks
 """

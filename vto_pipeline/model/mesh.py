@@ -9,6 +9,24 @@ from vto_pipeline.model.arrays import ByteArray, FloatArray, IntArray, freeze
 
 
 @dataclass(frozen=True)
+class Skin:
+    """A picture on a mesh, as a file gave it.
+
+    Args:
+        places: Where each face's corners are in it, (0, 0) the lower left corner, (1, 1) the upper right one, repeated
+            beyond, shape (F, 3, 2).
+        picture: sRGB, the upper row first, shape (H, W, 3).
+    """
+
+    places: FloatArray
+    picture: ByteArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "places", freeze("places in the picture", self.places, (None, 3, 2), "f8"))
+        object.__setattr__(self, "picture", freeze("picture", self.picture, (None, None, 3), "u1"))
+
+
+@dataclass(frozen=True)
 class TriangleMesh:
     """A triangle mesh in metres, +Y up.
 
@@ -19,6 +37,7 @@ class TriangleMesh:
         texture: Texture coordinates of each face's corners, v up, in whatever unit, shape (F, 3, 2), or None. What
             makes another mesh of this one does without them.
         metric: Whether lengths are metres; if not, their unit is unknown, as of photos without a scale.
+        skin: Its picture, or None. What makes another mesh of this one does without it, too.
 
     Raises:
         InputError: wrong shape, not finite, no face, or an index out of range.
@@ -29,6 +48,7 @@ class TriangleMesh:
     colors: ByteArray | None = None
     texture: FloatArray | None = None
     metric: bool = True
+    skin: Skin | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vertices", freeze("vertices", self.vertices, (None, 3), "f8"))
@@ -44,6 +64,8 @@ class TriangleMesh:
         if self.texture is not None:
             shape = (len(self.faces), 3, 2)
             object.__setattr__(self, "texture", freeze("texture coordinates", self.texture, shape, "f8"))
+        if self.skin is not None and len(self.skin.places) != len(self.faces):
+            raise InputError(f"{len(self.skin.places)} places in the picture for {len(self.faces)} faces")
 
 
 @dataclass(frozen=True)

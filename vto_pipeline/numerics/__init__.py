@@ -3,7 +3,7 @@
 vector, planar, distance: three-vectors, plane points, nearest points
 ccd, separation: continuous collision detection
 line_search: how much of a descent step to take
-rasterise: the visible triangle of each pixel
+rasterise, resample: the visible triangle of each pixel; values of a picture between its pixels
 solids, volume: signed distance to solids with a formula; what a surface encloses
 srgb: bytes of pictures and linear light
 linear/, spatial/, mechanics/: linear algebra, what is near what, formulas of one stencil

@@ -39,6 +39,7 @@ class PageLayer:
         mesh: Its shape.
         group: One of _GROUPS; of each one layer is shown at a time.
         paint: Colour of all, as #rrggbb, or of each vertex, shape (V, 3).
+        skin: The part with the picture on it, where there is one; it has the mesh's vertices.
         scale: Explains the colours.
     """
 
@@ -47,6 +48,7 @@ class PageLayer:
     group: str
     paint: str | ByteArray
     scale: Ramp | Key | None = None
+    skin: GlbPart | None = None
 
 
 def list_layers(parts: Mapping[str, Any]) -> list[PageLayer]:
@@ -58,8 +60,8 @@ def list_layers(parts: Mapping[str, Any]) -> list[PageLayer]:
     layers = []
     for artifact, name, group, color in _PLAIN:
         if artifact in parts:
-            mesh = _surface(parts[artifact])
-            layers.append(PageLayer(name, mesh, group, color if mesh.colors is None else mesh.colors))
+            mesh, skin = _surface(parts[artifact]), _skin(parts[artifact])
+            layers.append(PageLayer(name, mesh, group, color if mesh.colors is None else mesh.colors, skin=skin))
     avatar = parts.get("avatar")
     if isinstance(avatar, Avatar) and avatar.loops:
         layers.append(PageLayer("Where it was measured", loop_ribbons(avatar), "marks", _TAPE))
@@ -71,6 +73,13 @@ def list_layers(parts: Mapping[str, Any]) -> list[PageLayer]:
         surface = parts["garment_surface"]
         layers.append(PageLayer("Labels", surface, "scan", SCAN.paint(np.where(parts["labels"].garment, 0, 1)), SCAN))
     return sorted(layers, key=lambda layer: _GROUPS.index(layer.group))
+
+
+def _skin(value: Any) -> GlbPart | None:
+    """Return the only part of a render mesh, if it has a picture."""
+    if isinstance(value, TriangleMesh | Avatar) or len(value) != 1:
+        return None
+    return value[0] if value[0].texture is not None else None
 
 
 def _surface(value: TriangleMesh | Avatar | Sequence[GlbPart]) -> TriangleMesh:

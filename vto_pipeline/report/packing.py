@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from base64 import b64encode
 from dataclasses import dataclass
+from io import BytesIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +12,11 @@ from scipy.spatial import cKDTree
 
 from vto_pipeline.geometry.remeshing.decimate import decimate
 from vto_pipeline.geometry.topology import submesh
-from vto_pipeline.model.arrays import ByteArray
+from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 
 _STEPS = 65535  # of a 16-bit coordinate: 0.03 mm on a body of two metres
+_PICTURE_PX, _PICTURE_QUALITY = 2048, 85  # longest side, and JPEG quality: one or two megabytes
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,25 @@ def pack_colors(colors: ByteArray) -> str:
     padded = np.full((len(colors), 4), 255, dtype=np.uint8)
     padded[:, :3] = colors
     return _base64(padded)
+
+
+def pack_places(uv: FloatArray) -> dict[str, object]:
+    """Return texture coordinates, v down, shape (V, 2), as two numbers of 16 bit per vertex, with their range."""
+    low = uv.min(axis=0)
+    size = np.maximum(uv.max(axis=0) - low, 1e-9)
+    grid = np.rint((uv - low) / size * _STEPS).astype("<u2")
+    return {"places": _base64(grid), "placesLow": low.tolist(), "placesSize": size.tolist()}
+
+
+def pack_picture(pixels: ByteArray) -> str:
+    """Return a picture, shape (H, W, 3), as the address of a JPEG; one that is too large for a page is scaled down."""
+    from PIL import Image
+
+    image = Image.fromarray(pixels)
+    image.thumbnail((_PICTURE_PX, _PICTURE_PX), Image.Resampling.BOX)
+    stream = BytesIO()
+    image.save(stream, "JPEG", quality=_PICTURE_QUALITY)
+    return "data:image/jpeg;base64," + b64encode(stream.getvalue()).decode("ascii")
 
 
 def _base64(array: NDArray[np.generic]) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from vto_pipeline.report.layers import PageLayer
-from vto_pipeline.report.packing import pack, pack_colors
+from vto_pipeline.report.packing import pack, pack_colors, pack_picture, pack_places
 
 _TRIANGLES = 60_000  # of one mesh
 _TRIANGLES_ALL = 240_000  # of all meshes; keeps the page under 8 MB
@@ -17,11 +17,12 @@ def build_page_scene(layers: Sequence[PageLayer]) -> dict[str, Any]:
     """Return geometries, and layers that refer to them by number.
 
     A mesh that several layers show is packed once. The first layer of each group starts visible, a scan only when there
-    is nothing else: what was made from it lies in the same place.
+    is nothing else: what was made from it lies in the same place. A mesh with a picture keeps its triangles.
     """
     meshes = {id(layer.mesh): layer.mesh for layer in layers}
+    whole = {id(layer.mesh) for layer in layers if layer.skin is not None}
     budget = min(_TRIANGLES, _TRIANGLES_ALL // max(len(meshes), 1))
-    packed = {key: pack(mesh, budget) for key, mesh in meshes.items()}
+    packed = {key: pack(mesh, len(mesh.faces) if key in whole else budget) for key, mesh in meshes.items()}
     numbers = {key: number for number, key in enumerate(packed)}
     groups: set[str] = set()
     described = []
@@ -29,9 +30,12 @@ def build_page_scene(layers: Sequence[PageLayer]) -> dict[str, Any]:
         visible = layer.group not in groups and not (layer.group == "scan" and groups)
         groups.add(layer.group)
         if isinstance(layer.paint, str):
-            paint = {"color": layer.paint}
+            paint: dict[str, Any] = {"color": layer.paint}
         else:
             paint = {"colors": pack_colors(layer.paint[packed[id(layer.mesh)].source])}
+        if layer.skin is not None and layer.skin.uv is not None and layer.skin.texture is not None:
+            paint |= pack_places(layer.skin.uv[packed[id(layer.mesh)].source])
+            paint["picture"] = pack_picture(layer.skin.texture)
         described.append(
             {
                 "name": layer.name,

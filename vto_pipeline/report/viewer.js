@@ -67,29 +67,52 @@
     shape: geometries[layer.geometry],
     flat: layer.color ? channels(layer.color) : null,
     painted: layer.colors ? buffer(gl.ARRAY_BUFFER, bytes(layer.colors)) : null,
+    laid: layer.places ? buffer(gl.ARRAY_BUFFER, bytes(layer.places)) : null,
+    skin: layer.picture ? texture(layer.picture) : null,
   }));
+
+  /** A texture that takes its picture when the browser has decoded it; until then `ready` is false. */
+  function texture(address) {
+    const skin = { made: gl.createTexture(), ready: false };
+    const image = new Image();
+    image.onload = () => {
+      gl.bindTexture(gl.TEXTURE_2D, skin.made);
+      gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, image);
+      gl.generateMipmap(gl.TEXTURE_2D);
+      gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
+      const sharper = gl.getExtension("EXT_texture_filter_anisotropic");
+      if (sharper) gl.texParameterf(gl.TEXTURE_2D, sharper.TEXTURE_MAX_ANISOTROPY_EXT, 8);
+      skin.ready = true;
+      draw();
+    };
+    image.src = address;
+    return skin;
+  }
 
   // ---- drawing -----------------------------------------------------------------------------------------------
 
   const VERTEX = `#version 300 es
-    in vec3 position; in vec3 normal; in vec3 color;
-    uniform vec3 low, size; uniform mat4 eye, lens;
-    out vec3 towards; out vec3 shade;
+    in vec3 position; in vec3 normal; in vec3 color; in vec2 place;
+    uniform vec3 low, size; uniform vec4 places; uniform mat4 eye, lens;
+    out vec3 towards; out vec3 shade; out vec2 at;
     void main() {
       vec4 placed = eye * vec4(low + size * position, 1.0);
       towards = mat3(eye) * normal;
       shade = color;
+      at = places.xy + places.zw * place;
       gl_Position = lens * placed;
     }`;
   const FRAGMENT = `#version 300 es
     precision highp float;
-    in vec3 towards; in vec3 shade; out vec4 pixel;
+    uniform sampler2D picture; uniform bool skinned;
+    in vec3 towards; in vec3 shade; in vec2 at; out vec4 pixel;
     void main() {
       vec3 n = normalize(towards) * (gl_FrontFacing ? 1.0 : -1.0);
       float light = 0.40 * (0.75 + 0.25 * n.y)
         + 0.64 * max(dot(n, normalize(vec3(-0.45, 0.55, 0.70))), 0.0)
         + 0.22 * max(dot(n, normalize(vec3(0.75, 0.15, 0.65))), 0.0);
-      pixel = vec4(shade * min(light, 1.0) * (gl_FrontFacing ? 1.0 : 0.7), 1.0);
+      vec3 own = skinned ? texture(picture, at).rgb : shade;
+      pixel = vec4(own * min(light, 1.0) * (gl_FrontFacing ? 1.0 : 0.7), 1.0);
     }`;
 
   function compile(kind, source) {
@@ -101,14 +124,14 @@
   const program = gl.createProgram();
   gl.attachShader(program, compile(gl.VERTEX_SHADER, VERTEX));
   gl.attachShader(program, compile(gl.FRAGMENT_SHADER, FRAGMENT));
-  ["position", "normal", "color"].forEach((name, slot) => gl.bindAttribLocation(program, slot, name));
+  ["position", "normal", "color", "place"].forEach((name, slot) => gl.bindAttribLocation(program, slot, name));
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS)) {
     say("The 3D view does not work with this graphics driver. The rest of the page is complete.");
     return;
   }
   const uniform = (name) => gl.getUniformLocation(program, name);
-  const [lowAt, sizeAt, eyeAt, lensAt] = ["low", "size", "eye", "lens"].map(uniform);
+  const [lowAt, sizeAt, eyeAt, lensAt, placesAt, skinnedAt] = ["low", "size", "eye", "lens", "places", "skinned"].map(uniform);
 
   const FIELD = (30 * Math.PI) / 180; // of view, vertical
   const camera = { turn: 0, tilt: 0, distance: 1, target: [0, 0, 0], radius: 1 };
@@ -157,6 +180,15 @@
       gl.uniform3fv(sizeAt, shape.size);
       attribute(0, shape.positions, 3, gl.UNSIGNED_SHORT, true, 8);
       attribute(1, shape.normals, 3, gl.FLOAT, false, 0);
+      const skinned = Boolean(layer.skin && layer.skin.ready);
+      gl.uniform1i(skinnedAt, skinned);
+      if (skinned) {
+        gl.bindTexture(gl.TEXTURE_2D, layer.skin.made);
+        gl.uniform4f(placesAt, ...layer.placesLow, ...layer.placesSize);
+        attribute(3, layer.laid, 2, gl.UNSIGNED_SHORT, true, 4);
+      } else {
+        gl.disableVertexAttribArray(3);
+      }
       if (layer.painted) {
         attribute(2, layer.painted, 3, gl.UNSIGNED_BYTE, true, 4);
       } else {

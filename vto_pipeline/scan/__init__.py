@@ -1,6 +1,7 @@
 """From photos, depth frames and clouds to a surface in metres.
 
 photos/, depth/: cameras and depth, from each kind of capture
+texture/: the photos laid on the surface
 keyframes: photos from a video
 exposure: how brightly each photo was exposed
 fuse, level_set: one surface from many depth maps

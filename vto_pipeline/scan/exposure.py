@@ -39,6 +39,15 @@ def exposures(pictures: Sequence[NDArray[np.uint8]], pixels: FloatArray, seen: N
         value = blurred[row[inside], column[inside]].astype(float)
         usable = (value > DARKEST) & (value < BRIGHTEST)
         log[index, which[inside][usable]] = np.log(value[usable])
+    return relative_levels(log)
+
+
+def relative_levels(log: FloatArray) -> FloatArray:
+    """Return the factor by which each photo's values exceed those of the photos on the whole, shape (C,).
+
+    Args:
+        log: Logarithms of what each photo shows of each point, NaN where it shows nothing, shape (C, N).
+    """
     measured = np.isfinite(log)
     log = log[:, measured.sum(axis=0) > 1]
     own = np.zeros(len(log))

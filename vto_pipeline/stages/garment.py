@@ -17,10 +17,12 @@ from vto_pipeline.garment.subtract import SubtractConfig, extract_garment, label
 from vto_pipeline.garment.wearable import check_wearable
 from vto_pipeline.geometry.metres import need_metres
 from vto_pipeline.geometry.remeshing.repair import RepairConfig, repair
-from vto_pipeline.geometry.rigid import transform_mesh
+from vto_pipeline.geometry.rigid import transform_cameras, transform_mesh
+from vto_pipeline.geometry.topology import concatenate
 from vto_pipeline.model.garment import SurfaceLabels
 from vto_pipeline.model.job import Job
 from vto_pipeline.pipeline.stage import Stage
+from vto_pipeline.scan.texture.project import TextureConfig, texture_surface
 
 Inputs = Mapping[str, Any]
 Outputs = Mapping[str, Any]
@@ -55,6 +57,17 @@ def _openings(inputs: Inputs, settings: OpeningsConfig, job: Job) -> Outputs:
         bare = BareParts(scan, inputs["labels"], mannequin)
     garment, openings, observed = close_scan_holes(inputs["garment_shell"], mannequin, settings, job, bare)
     return {"garment": garment, "openings": openings, "observed": observed}
+
+
+def _texture(inputs: Inputs, settings: TextureConfig, job: Job) -> Outputs:
+    cameras, scene = inputs["garment_cameras"], inputs.get("garment_surface")
+    if "garment_placement" in inputs:
+        cameras = transform_cameras(cameras, inputs["garment_placement"])
+        scene = None if scene is None else transform_mesh(scene, inputs["garment_placement"])
+    things = [thing for thing in (scene, inputs.get("mannequin_surface")) if thing is not None]
+    occluder = concatenate(things) if things else None
+    texture = texture_surface(inputs["garment"], occluder, inputs["garment_photos"], cameras, settings, job)
+    return {"garment_texture": texture}
 
 
 def _take_mesh(inputs: Inputs, settings: RepairConfig, job: Job) -> Outputs:
@@ -111,6 +124,16 @@ STAGES: tuple[Stage, ...] = (
         run=_openings,
         settings=OpeningsConfig,
         uses=("libigl",),
+    ),
+    Stage(
+        name="texture",
+        about="the garment laid flat in charts, each texel coloured from the photos that show it",
+        needs=("garment", "garment_photos", "garment_cameras"),
+        optional=("garment_surface", "garment_placement", "mannequin_surface"),
+        makes=("garment_texture",),
+        run=_texture,
+        settings=TextureConfig,
+        uses=("xatlas", "opencv-python-headless", "pyfqmr"),
     ),
     Stage(
         name="take_mesh",

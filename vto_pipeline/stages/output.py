@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,10 +13,12 @@ from vto_pipeline.avatar.measuring.avatar_measurements import fit_levels
 from vto_pipeline.avatar.template.regions import trunk_vertices
 from vto_pipeline.cloth.judge.worn import vertex_maps
 from vto_pipeline.cloth.rest_shape.edge_length_embedding import lengths_in_space
+from vto_pipeline.geometry.remeshing.seams import cut_open
 from vto_pipeline.geometry.topology import face_area_vectors
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
+from vto_pipeline.model.texture import TexturedMesh
 from vto_pipeline.pipeline.stage import Stage
 from vto_pipeline.render.dress import DressConfig, deform_render_mesh
 from vto_pipeline.render.marks import mark_places
@@ -26,7 +29,21 @@ Outputs = Mapping[str, Any]
 
 
 def _transfer(inputs: Inputs, settings: DressConfig, job: Job) -> Outputs:
-    return {"render_mesh": deform_render_mesh(inputs["garment"], inputs["sim_mesh"], inputs["draped"], settings, job)}
+    garment = _most_detailed(inputs)
+    return {"render_mesh": deform_render_mesh(garment, inputs["sim_mesh"], inputs["draped"], settings, job)}
+
+
+def _most_detailed(inputs: Inputs) -> TriangleMesh | TexturedMesh:
+    """Return the garment with its picture, from photos or from its file, or else as it was repaired."""
+    if "garment_texture" in inputs:
+        textured: TexturedMesh = inputs["garment_texture"]
+        return textured
+    given: TriangleMesh | None = inputs.get("garment_mesh")
+    if given is not None and given.skin is not None:
+        mesh = replace(given, texture=given.skin.places, skin=None)
+        return TexturedMesh(mesh, given.skin.picture, np.ones(given.skin.picture.shape[:2], dtype=bool))
+    garment: TriangleMesh = inputs["garment"] if given is None or given.texture is None else given
+    return garment
 
 
 def _assess(inputs: Inputs, settings: FitConfig, job: Job) -> Outputs:
@@ -61,6 +78,9 @@ def _observed_share(inputs: Inputs) -> float | None:
 
 def _page(inputs: Inputs, settings: Config, job: Job) -> Outputs:
     parts = {name: value for name, value in inputs.items() if name != "run_record"}
+    if "garment_texture" in parts and "render_mesh" not in parts:
+        textured: TexturedMesh = parts["garment_texture"]
+        parts["garment"] = [cut_open("garment", textured.mesh, textured.picture)]
     places = _crossings(inputs.get("audit", {}))
     if places:
         parts["crossings"] = mark_places(np.array(places))
@@ -78,6 +98,7 @@ STAGES: tuple[Stage, ...] = (
         name="transfer",
         about="the detailed garment follows the draped simulation mesh",
         needs=("garment", "sim_mesh", "draped"),
+        optional=("garment_texture", "garment_mesh"),
         makes=("render_mesh",),
         run=_transfer,
         settings=DressConfig,
@@ -103,6 +124,7 @@ STAGES: tuple[Stage, ...] = (
             "mannequin_surface",
             "labels",
             "garment",
+            "garment_texture",
             "openings",
             "avatar",
             "measurements",

@@ -8,4 +8,5 @@ holes: filled so that the filling continues the surface; ears and triangulate sp
 fold: how much two triangles fold
 flat_faces: the panels of a mesh carried over onto another
 repair: from a triangle soup to an oriented manifold
+seams: a textured mesh with a vertex for each side of a seam
 """

@@ -60,7 +60,7 @@ def turn_outward(arrays: Arrays) -> tuple[Arrays, list[str]]:
     volumes, area = axis_volumes(arrays["vertices"], faces, np.zeros(len(faces), np.int32), 1)
     if np.median(volumes) >= -FLAT * area[0] ** 1.5:
         return arrays, []
-    turned: Arrays = {name: arrays[name][:, ::-1] for name in ("faces", "texture") if name in arrays}
+    turned: Arrays = {name: arrays[name][:, ::-1] for name in ("faces", "texture", "places") if name in arrays}
     return {**arrays, **turned}, ["the surface was inside out: its faces are turned over"]
 
 
@@ -76,8 +76,7 @@ def drop_degenerate(arrays: Arrays) -> tuple[Arrays, list[str]]:
     if not proper.all():
         notes.append(f"dropped {int((~proper).sum())} faces that use a vertex twice")
         faces = faces[proper]
-        if "texture" in arrays:
-            arrays = {**arrays, "texture": arrays["texture"][proper]}
+        arrays = {**arrays, **{name: arrays[name][proper] for name in ("texture", "places") if name in arrays}}
     used = np.zeros(len(arrays["vertices"]), dtype=bool)
     used[faces.ravel()] = True
     if used.all() or not len(faces):

@@ -2,6 +2,7 @@
 
 document: chunks, buffers and accessors, checked against the bytes
 read, skin: triangles of a scene; skeletons at rest
+pictures: base colours of a scene's parts, as one picture
 draco: compressed meshes, unpacked
 write: parts with normals, colours, textures and materials
 """

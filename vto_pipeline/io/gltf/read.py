@@ -12,6 +12,7 @@ from vto_pipeline.errors import FormatError
 from vto_pipeline.io.arrays import Arrays
 from vto_pipeline.io.gltf.document import GltfDocument, open_gltf
 from vto_pipeline.io.gltf.draco import unpack_draco
+from vto_pipeline.io.gltf.pictures import scene_picture
 from vto_pipeline.io.gltf.skin import Skin, read_skin, read_weights
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.numerics.srgb import encode_srgb
@@ -21,7 +22,7 @@ _NODES = 10_000  # visits: a node may be reached by many parents in a broken fil
 
 
 def parse_gltf(name: str) -> Arrays:
-    """Read the triangles of the default scene; morph targets, images and animations are ignored.
+    """Read the triangles of the default scene; morph targets, animations, other maps than base colour are ignored.
 
     A skinned part stands as its skeleton at rest holds it.
 
@@ -30,7 +31,7 @@ def parse_gltf(name: str) -> Arrays:
 
     Returns:
         vertices (V, 3), placed by their nodes; faces (F, 3); colors (V, 3) uint8 and texture (F, 3, 2), where every
-        part has them; notes.
+        part has them; with it, if there is any, picture (H, W, 3) uint8 and the places there (F, 3, 2); notes.
         Where every part hangs on one skin also joint_names, joints (J, 3), parents (J,), weights (V, J).
 
     Raises:
@@ -40,6 +41,7 @@ def parse_gltf(name: str) -> Arrays:
     vertices, faces, notes = [], [], []
     colors: list[np.ndarray] = []
     textures: list[np.ndarray] = []
+    parts = []
     count = 0
     worlds = dict(_placed_nodes(document))
     skins: dict[int, Skin] = {}
@@ -66,6 +68,7 @@ def parse_gltf(name: str) -> Arrays:
             faces.append(triangles + count)
             colors += [] if color is None else [color]
             textures += [] if texture is None else [texture[triangles]]
+            parts.append(primitive)
             count += len(points)
     if not faces:
         raise FormatError("the scene has no triangles", where=name)
@@ -76,6 +79,12 @@ def parse_gltf(name: str) -> Arrays:
         arrays["colors"] = np.concatenate(colors)
     if len(textures) == len(faces):
         arrays["texture"] = np.concatenate(textures)
+        try:
+            shown = scene_picture(document, parts, textures)
+            if shown is not None:
+                arrays["picture"], arrays["places"] = shown
+        except FormatError as e:  # the shape is whole without it
+            notes.append(f"pictures are ignored: {e.problem}")
     if len(skins) == 1 and len(weights) == len(faces):
         (skin,) = skins.values()
         arrays |= {

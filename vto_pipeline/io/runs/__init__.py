@@ -2,4 +2,5 @@
 
 artifacts: the table of all artifacts, their names and how they are kept
 garments, traces: labels, openings, rest shapes; error against run time
+textures: a surface with its picture
 """

@@ -22,7 +22,7 @@ from vto_pipeline.io.documents import read_json, write_json
 from vto_pipeline.io.fabrics import read_fabric
 from vto_pipeline.io.files import check_file, listed, replacing
 from vto_pipeline.io.gltf.write import read_glb, write_glb
-from vto_pipeline.io.runs import garments, traces
+from vto_pipeline.io.runs import garments, textures, traces
 from vto_pipeline.model.artifact import ArtifactKind
 from vto_pipeline.model.body import Avatar
 from vto_pipeline.model.job import Job
@@ -191,6 +191,17 @@ ARTIFACTS: tuple[ArtifactKind, ...] = (
         garments.write_observed,
     ),
     ArtifactKind("openings", "openings.json", "neck, hem, cuffs", garments.read_openings, garments.write_openings),
+    ArtifactKind(
+        "garment_texture",
+        "texture.npz",
+        "the garment with a picture on it, from the photos",
+        textures.read_texture,
+        textures.write_texture,
+        previews=(
+            ("texture.png", textures.write_texture_picture),
+            ("texture_seen.png", textures.write_texture_mask),
+        ),
+    ),
     _mesh("sim_mesh", "sim_mesh.ply", "the garment remeshed for simulation"),
     ArtifactKind(
         "rest_shape", "rest_shape.npz", "the cloth without forces", garments.read_rest_shape, garments.write_rest_shape

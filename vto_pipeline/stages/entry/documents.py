@@ -67,6 +67,8 @@ def scan_order(
         notes.append("no mannequin, board or distance is given: the surface has no scale, and no garment is cut out")
     elif role == "garment":
         wanted = ["garment", "openings"]
+    if "garment" in wanted and kind in ("photos", "video"):
+        wanted.append("garment_texture")
     given = {"mannequin.surface": mannequin, f"{role}.{kind}": source}
     settings = {"scale": {"lengths": [dict(length) for length in lengths]}} if lengths else {}
     # what a scan makes of a body or a form has one name, whichever it was

@@ -1,0 +1,77 @@
+"""Likeness of pictures against scikit-image and closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.ndimage import gaussian_filter
+
+from vto_pipeline.bench.scan.likeness import likeness, seam_steps
+from vto_pipeline.bench.scan.look import draw, sample
+from vto_pipeline.model.camera import Intrinsics
+from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.texture import TexturedMesh
+
+RNG = np.random.default_rng(2)
+PHOTO = np.clip(gaussian_filter(RNG.normal(128, 300, (60, 80, 3)), (1, 1, 0)), 0, 255).astype(np.uint8)
+NOISY = np.clip(PHOTO + RNG.normal(0, 9, PHOTO.shape), 0, 255).astype(np.uint8)
+EVERYWHERE = np.ones(PHOTO.shape[:2], bool)
+
+
+def test_psnr_and_ssim_are_those_of_scikit_image() -> None:
+    metrics = pytest.importorskip("skimage.metrics")
+    found = likeness(PHOTO, NOISY, EVERYWHERE)
+    assert_allclose(found["psnr_db"], metrics.peak_signal_noise_ratio(PHOTO, NOISY), rtol=1e-9)  # the same formula
+    gray = [picture @ np.array([0.299, 0.587, 0.114]) for picture in (PHOTO, NOISY)]
+    options = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False, "data_range": 255, "full": True}
+    whole = metrics.structural_similarity(*gray, **options)[1]
+    assert_allclose(found["ssim"], whole[5:-5, 5:-5].mean(), rtol=0.01)  # ours leaves out another margin
+
+
+def test_brightness_is_levelled_and_blur_is_less_sharp() -> None:
+    dark = np.rint(0.7 * PHOTO).astype(np.uint8)
+    found = likeness(PHOTO, dark, EVERYWHERE)
+    assert found["psnr_db"] < 18 < 45 < found["psnr_levelled_db"]
+    assert_allclose(found["sharpness"], 0.49, rtol=0.02)  # gradients scale; rounding to bytes
+    blurred = gaussian_filter(PHOTO, (2, 2, 0))
+    assert likeness(PHOTO, blurred, EVERYWHERE)["sharpness"] < 0.5
+
+
+def test_only_what_is_asked_for_is_compared() -> None:
+    half = EVERYWHERE.copy()
+    half[:, 40:] = False
+    spoilt = PHOTO.copy()
+    spoilt[:, 40:] = 0
+    found = likeness(PHOTO, spoilt, half)
+    assert found["psnr_db"] > 80
+    assert found["wrong_share"] == 0
+    assert found["compared_share"] == 0.5
+
+
+def square(gap: float) -> TexturedMesh:
+    """A square of two triangles before the camera, with its picture upright; the second one's place moved."""
+    points = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    place = 0.25 + 0.25 * (points[faces][..., :2] + 1)
+    place[1, :, 0] += gap
+    ramp = np.zeros((100, 100, 3), np.uint8)
+    ramp[...] = np.rint(2.5 * np.arange(100) + 1.25)[None, :, None]
+    return TexturedMesh(TriangleMesh(points, faces, texture=place), ramp, np.ones((100, 100), bool))
+
+
+def test_a_step_at_a_seam_is_what_the_picture_has_there() -> None:
+    assert seam_steps(square(0.0), sample) == {"seam_step_median": 0.0, "seam_step_p95": 0.0}
+    found = seam_steps(square(0.1), sample)
+    assert_allclose(found["seam_step_median"], 25.0, atol=0.1)  # a tenth of a ramp from 0 to 250; bytes
+
+
+def test_a_square_is_drawn_where_the_camera_sees_it() -> None:
+    camera = Intrinsics(40, 40, 40.0, 40.0, 19.5, 19.5)
+    pose = np.diag([1.0, -1.0, -1.0, 1.0])  # looks along -Z, picture upright
+    pose[2, 3] = 4.0
+    picture, seen = draw(square(0.0), camera, pose)
+    assert seen[10:30, 10:30].all()
+    assert seen.sum() == 400
+    expected = 250 * (0.25 + 0.5 * (np.arange(20) + 0.5) / 20)
+    assert_allclose(picture[15, 10:30, 0], expected, atol=2)  # half a texel, and bytes

@@ -1,0 +1,102 @@
+"""Pictures in glTF files, written by trimesh or by us: each corner has the colour that its part's picture has there."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from numpy.testing import assert_allclose
+from PIL import Image
+
+from vto_pipeline.io.meshes import read_mesh
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+
+RNG = np.random.default_rng(4)
+
+
+def part(at: float, picture: np.ndarray | None, repeat: float = 0.0) -> trimesh.Trimesh:
+    """A square of 16 triangles, a picture on it from edge to edge, shifted by whole pictures."""
+    mesh = trimesh.creation.box((1, 1, 1))
+    mesh = trimesh.Trimesh(mesh.vertices[:, [0, 1, 2]] + [at, 0, 0], mesh.faces, process=False)
+    place = np.column_stack([mesh.vertices[:, 0] - at + 0.5, mesh.vertices[:, 1] + 0.5]) * 0.9 + 0.05 + repeat
+    material = trimesh.visual.material.PBRMaterial(baseColorFactor=[64, 128, 255, 255])
+    if picture is not None:
+        material = trimesh.visual.material.PBRMaterial(baseColorTexture=Image.fromarray(picture))
+    mesh.visual = trimesh.visual.TextureVisuals(uv=place, material=material)
+    return mesh
+
+
+def written(path: Path, *parts: trimesh.Trimesh) -> Path:
+    path.write_bytes(trimesh.Scene(list(parts)).export(file_type="glb"))
+    return path
+
+
+def color_at(picture: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Colours at texture coordinates, v up, of the pixel that holds each."""
+    height, width = picture.shape[:2]
+    place = places % 1.0
+    return picture[((1 - place[..., 1]) * height).astype(int), (place[..., 0] * width).astype(int)]
+
+
+def test_pictures_of_several_parts_are_one_picture(tmp_path: Path) -> None:
+    pictures = [RNG.integers(0, 256, size).astype(np.uint8) for size in ((32, 48, 3), (64, 16, 3))]
+    parts = [part(0.0, pictures[0]), part(2.0, pictures[1], repeat=3.0), part(4.0, None)]
+    mesh = read_mesh(written(tmp_path / "a.glb", *parts), unit="m")
+    assert mesh.skin is not None
+    found = color_at(mesh.skin.picture, mesh.skin.places)
+    count = len(parts[0].faces)
+    for k, (one, picture) in enumerate(zip(parts[:2], pictures, strict=True)):
+        own = slice(k * count, (k + 1) * count)
+        assert_allclose(mesh.vertices[mesh.faces[own]], one.vertices[one.faces], rtol=0, atol=1e-6)  # single precision
+        assert (found[own] == color_at(picture, one.visual.uv[one.faces])).all()
+    linear = np.array([64, 128, 255]) / 255  # a factor is linear light: IEC 61966-2-1
+    assert_allclose(
+        found[2 * count :], np.broadcast_to(255 * (1.055 * linear ** (1 / 2.4) - 0.055), (count, 3, 3)), atol=1
+    )
+    assert mesh.texture is not None  # as the file has them: flat pieces are found by them
+    assert_allclose(mesh.texture[count : 2 * count], parts[1].visual.uv[parts[1].faces], rtol=0, atol=1e-6)
+
+
+def test_one_picture_may_repeat(tmp_path: Path) -> None:
+    picture = RNG.integers(0, 256, (16, 16, 3)).astype(np.uint8)
+    wide = part(0.0, picture)
+    wide.visual.uv = 5.0 * wide.visual.uv
+    mesh = read_mesh(written(tmp_path / "a.glb", wide), unit="m")
+    assert mesh.skin is not None
+    assert (mesh.skin.picture == picture).all()
+    assert_allclose(mesh.skin.places, wide.visual.uv[wide.faces], rtol=0, atol=1e-6)  # single precision in the file
+
+
+def change(path: Path, edit: object) -> None:
+    """Change the JSON of a GLB, the same length kept by spaces."""
+    data = path.read_bytes()
+    length = int.from_bytes(data[12:16], "little")
+    tree = json.loads(data[20 : 20 + length])
+    edit(tree)  # type: ignore[operator]
+    text = json.dumps(tree, separators=(",", ":")).encode().ljust(length)
+    assert len(text) == length
+    path.write_bytes(data[:20] + text + data[20 + length :])
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda tree: tree["images"].__setitem__(0, {"uri": "a.png"}),
+        lambda tree: tree["images"].__setitem__(0, {"uri": "data:image/png;base64,####"}),
+        lambda tree: tree["images"][0].__setitem__("bufferView", 0),
+        lambda tree: tree["textures"][0].__setitem__("source", 7),
+        lambda tree: tree.__setitem__("materials", [[]]),
+    ],
+)
+def test_a_wrong_picture_is_ignored_and_told(tmp_path: Path, edit: object) -> None:
+    path = written(tmp_path / "a.glb", part(0.0, RNG.integers(0, 256, (16, 16, 3)).astype(np.uint8)))
+    change(path, edit)
+    job = Job()
+    mesh: TriangleMesh = read_mesh(path, unit="m", job=job)
+    assert mesh.skin is None
+    assert mesh.texture is not None
+    assert any("pictures are ignored" in note for note in job.notes)
