@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from scan_scene import orbit, render
+import pycolmap
+from scan_scene import make_scene, orbit, render
 
 from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
+from vto_pipeline.scan.photos import sfm
 from vto_pipeline.scan.photos.consistency import rays
+from vto_pipeline.scan.photos.matching.features import FAINT, FeatureConfig, detect
 from vto_pipeline.scan.photos.matching.fixed_camera import moving_matches, still_features
+from vto_pipeline.scan.photos.matching.mapping import map_photos
+from vto_pipeline.scan.photos.matching.still_background import paint_over, still_pixels
 from vto_pipeline.scan.photos.sfm import SfmConfig, estimate_cameras
 from vto_pipeline.scan.similarity import fit_similarity
 
@@ -93,3 +98,66 @@ def test_photos_from_a_turntable_are_placed_round_the_object(scene, tmp_path):
     scale, motion = fit_similarity(cameras.world_from_cam[:, :3, 3], poses[:, :3, 3])
     off = scale * cameras.world_from_cam[:, :3, 3] @ motion[:3, :3].T + motion[:3, 3] - poses[:, :3, 3]
     assert np.median(np.linalg.norm(off, axis=1)) < 5e-3  # at 1 m and 1.9 mm per pixel
+
+
+def test_the_pixels_that_stay_are_the_background_and_not_the_object(scene, tmp_path):
+    photos, poses = on_turntable(scene, tmp_path / "photos", count=8)
+    masks = still_pixels(photos)
+    assert masks is not None
+    for mask, pose in zip(masks, poses, strict=True):
+        _, depth = render(scene, PHOTO, pose, samples=1)
+        points = (rays(PHOTO.matrix, 360, 480) * depth[..., None]) @ pose[:3, :3].T + pose[:3, 3]
+        tube = (depth > 0) & (points[..., 1] > 0.01)
+        assert mask[tube].mean() < 0.001
+        assert mask[~tube].mean() > 0.8  # what the tube crosses in half of the photos is not known
+
+
+def test_photos_that_differ_in_size_are_not_compared(tmp_path):
+    paths = tuple(tmp_path / f"{k}.png" for k in range(3))
+    for k, path in enumerate(paths):
+        cv2.imwrite(str(path), np.full((60, 80 + k, 3), 90, np.uint8))
+    assert still_pixels(PhotoSet(paths, (None,) * 3)) is None
+
+
+def test_a_faint_object_has_features_once_the_strong_wall_is_painted_over(tmp_path):
+    """As many as are kept, the largest first, are mostly the wall's; over paint there are none."""
+    photos, poses = on_turntable(make_scene(contrast=0.2), tmp_path / "photos", count=8)
+    masks = still_pixels(photos)
+    assert masks is not None
+    (tmp_path / "painted").mkdir()
+    painted = paint_over(photos, masks, tmp_path / "painted")
+    on_tube, beside = [], []
+    for number, name in enumerate(("photos", "painted")):
+        shown = PhotoSet((photos, painted)[number].paths[:2], photos.intrinsics[:2])
+        database = tmp_path / f"{name}.db"
+        detect(shown, database, FAINT, FeatureConfig(max_features=600))
+        with pycolmap.Database.open(str(database)) as opened:
+            place = opened.read_keypoints(1)[:, :2].astype(int)
+        _, depth = render(make_scene(), PHOTO, poses[0], samples=1)
+        points = (rays(PHOTO.matrix, 360, 480) * depth[..., None]) @ poses[0][:3, :3].T + poses[0][:3, 3]
+        tube = cv2.dilate(((depth > 0) & (points[..., 1] > 0.01)).astype(np.uint8), np.ones((9, 9)))
+        inside = tube[place[:, 1].clip(0, 359), place[:, 0].clip(0, 479)] > 0
+        on_tube.append(int(inside.sum()))
+        beside.append(int((~inside).sum()))
+    assert on_tube[1] > 2 * on_tube[0]
+    assert beside[1] < 0.2 * beside[0]
+
+
+def test_photos_that_fail_before_their_background_are_placed_beside_it(scene, tmp_path, monkeypatch):
+    photos, poses = on_turntable(scene, tmp_path / "photos")
+    photos, poses, job = PhotoSet(photos.paths[:6], photos.intrinsics[:6]), poses[:6], Job()
+    folders = []
+
+    def fails_first(database, *rest):
+        folders.append(database.parent.name)
+        return map_photos(database, *rest) if len(folders) > 1 else None
+
+    monkeypatch.setattr(sfm, "map_photos", fails_first)
+    cameras, _ = estimate_cameras(photos, SfmConfig(), job)
+    assert folders[1:] == ["beside"]
+    assert job.metrics["still_share"] > 0.2
+    assert job.metrics["background_share"] > 0.3
+    assert len(cameras.names) == len(poses)
+    scale, motion = fit_similarity(cameras.world_from_cam[:, :3, 3], poses[:, :3, 3])
+    off = scale * cameras.world_from_cam[:, :3, 3] @ motion[:3, :3].T + motion[:3, 3] - poses[:, :3, 3]
+    assert np.median(np.linalg.norm(off, axis=1)) < 1e-2  # at 1 m and 1.9 mm per pixel

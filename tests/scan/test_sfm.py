@@ -140,7 +140,7 @@ def test_a_pair_whose_matches_contradict_each_other_is_dropped(tmp_path, turned,
         cv2.imwrite(str(path), picture)
     found, database = PhotoSet(paths, (None, None)), tmp_path / "x.db"
     assert min(detect(found, database, SURE, FeatureConfig())) > 500
-    assert match(found, database, FeatureConfig(), Job()) == kept
+    assert match(found, database, FeatureConfig(), Job()).pairs == kept
 
 
 @pytest.mark.parametrize("copies", [2, 5])

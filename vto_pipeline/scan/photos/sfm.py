@@ -20,6 +20,7 @@ from vto_pipeline.model.mesh import PointCloud
 from vto_pipeline.model.settings import Config
 from vto_pipeline.scan.photos.matching.features import FAINT, SURE, FeatureConfig, detect, match
 from vto_pipeline.scan.photos.matching.mapping import MIN_PHOTOS, map_photos
+from vto_pipeline.scan.photos.matching.still_background import paint_over, still_pixels
 from vto_pipeline.scan.photos.region import object_region
 from vto_pipeline.scan.upright import upright_from_scan
 
@@ -63,9 +64,13 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
             database = Path(scratch) / "faint.db"
             counts = detect(photos, database, FAINT, config.features)
         job.progress(0.3, f"matching {len(photos.paths)} photos")
-        pairs = match(photos, database, config.features, job)
+        pairs, fixed_camera = match(photos, database, config.features, job)
         job.progress(0.7, f"placing cameras, {pairs} matched pairs")
         model = map_photos(database, photos.paths[0].parent, len(photos.paths), job)
+        if fixed_camera and (model is None or model.num_reg_images() < len(photos.paths)):
+            again, found, matched = _beside_background(photos, Path(scratch), config, job)
+            if again is not None and (model is None or again.num_reg_images() > model.num_reg_images()):
+                model, counts, pairs = again, found, matched
     names = [path.name for path in photos.paths]
     if model is None or model.num_reg_images() < MIN_PHOTOS:
         each = ", ".join(f"{name} {count}" for name, count in zip(names, counts, strict=True))
@@ -88,6 +93,29 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
         reprojection_px=round(float(model.compute_mean_reprojection_error()), 3),
     )
     return cameras, cloud
+
+
+def _beside_background(
+    photos: PhotoSet, scratch: Path, config: SfmConfig, job: Job
+) -> tuple[Any | None, list[int], int]:
+    """Try again with the background painted over: its many features hide that the object has few, and faint ones.
+
+    Returns:
+        The model or None, features per photo, and matched pairs.
+    """
+    masks = still_pixels(photos)
+    if masks is None:
+        return None, [], 0
+    job.progress(0.8, "features beside the background")
+    share = float(np.mean([mask.mean() for mask in masks]))
+    job.measure(background_share=round(share, 3))
+    job.note(f"looking for fainter features beside the background, which is {100 * share:.0f} % of the photos")
+    beside = scratch / "beside"
+    (beside / "photos").mkdir(parents=True)
+    painted, database = paint_over(photos, masks, beside / "photos"), beside / "faint.db"
+    counts = detect(painted, database, FAINT, config.features)
+    pairs, _ = match(painted, database, config.features, Job(seed=job.seed))
+    return map_photos(database, photos.paths[0].parent, len(photos.paths), job), counts, pairs
 
 
 def load_colmap(seed: int) -> None:

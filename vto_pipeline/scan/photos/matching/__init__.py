@@ -1,6 +1,7 @@
 """From photos to cameras and sparse points, by COLMAP.
 
 fixed_camera: a background that stays where it is, found by its matches
+still_background: which pixels show it, so that it can be painted over
 features: features, and pairs of photos that share them
 mapping: cameras and points from the pairs
 """

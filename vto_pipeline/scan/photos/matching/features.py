@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,18 @@ SURE, FAINT = 0.0067, 0.0015
 MIN_AGREEMENT = 0.7
 """Share of two photos' matches that one geometry must explain. A match has passed the test of ratios and of both
 directions: where a third of them contradict, a print repeats, or the background did not turn with the object."""
+
+
+class Matched(NamedTuple):
+    """What matching found.
+
+    Args:
+        pairs: Number of pairs of photos that one two-view geometry explains.
+        fixed_camera: Whether the camera did not move, so that the background was left out.
+    """
+
+    pairs: int
+    fixed_camera: bool
 
 
 class FeatureConfig(Config):
@@ -90,7 +102,7 @@ def detect(photos: PhotoSet, database: Path, contrast: float, config: FeatureCon
     return [counts.get(name, 0) for name in names]
 
 
-def match(photos: PhotoSet, database: Path, config: FeatureConfig, job: Job) -> int:
+def match(photos: PhotoSet, database: Path, config: FeatureConfig, job: Job) -> Matched:
     """Match features between photos, and keep the pairs that one two-view geometry explains.
 
     Where the camera did not move, the background is left out first.
@@ -100,9 +112,6 @@ def match(photos: PhotoSet, database: Path, config: FeatureConfig, job: Job) -> 
         database: Holds their features.
         config: Settings.
         job: Seeds the RANSAC; notified when the camera did not move.
-
-    Returns:
-        Number of matched pairs.
 
     Raises:
         ScanError: COLMAP cannot match them.
@@ -136,7 +145,7 @@ def match(photos: PhotoSet, database: Path, config: FeatureConfig, job: Job) -> 
                 kept += inliers > 0
             else:
                 opened.delete_two_view_geometry(first, second)
-    return kept
+    return Matched(kept, moving is not None)
 
 
 def _drop_background(database: Path, photos: PhotoSet, job: Job) -> list[Pair] | None:
