@@ -33,7 +33,7 @@ def test_brightness_is_levelled_and_blur_is_less_sharp() -> None:
     dark = np.rint(0.7 * PHOTO).astype(np.uint8)
     found = likeness(PHOTO, dark, EVERYWHERE)
     assert found["psnr_db"] < 18 < 45 < found["psnr_levelled_db"]
-    assert_allclose(found["sharpness"], 0.49, rtol=0.02)  # gradients scale; rounding to bytes
+    assert_allclose(found["sharpness"], 1.0, rtol=0.01)  # a darker picture is as sharp; rounding to bytes
     blurred = gaussian_filter(PHOTO, (2, 2, 0))
     assert likeness(PHOTO, blurred, EVERYWHERE)["sharpness"] < 0.5
 

@@ -28,18 +28,18 @@ def likeness(photo: ByteArray, picture: ByteArray, where: NDArray[np.bool_]) -> 
 
     Returns:
         psnr_db over all channels, and with each channel's brightness fitted (psnr_levelled_db); ssim (Wang et al. 2004)
-        of the grey pictures; sharpness, the gradient energy as a share of the photo's; wrong_share; share of the
-        picture's pixels that were compared.
+        of the grey pictures; sharpness, the gradient energy as a share of the photo's, with the brightness fitted;
+        wrong_share; share of the picture's pixels that were compared.
     """
     one, other = photo.astype(float), picture.astype(float)
     gain = (one * other)[where].sum(axis=0) / np.maximum((other**2)[where].sum(axis=0), 1e-9)
-    gray = [values @ (0.299, 0.587, 0.114) for values in (one, other)]
+    gray = [values @ (0.299, 0.587, 0.114) for values in (one, other, gain * other)]
     inside = _interior(where)
-    energy = [_gradient_energy(values)[inside].sum() for values in gray]
+    energy = [_gradient_energy(gray[k])[inside].sum() for k in (0, 2)]
     return {
         "psnr_db": _psnr((one - other)[where]),
         "psnr_levelled_db": _psnr((one - gain * other)[where]),
-        "ssim": float(_ssim(*gray)[inside].mean()),
+        "ssim": float(_ssim(gray[0], gray[1])[inside].mean()),
         "sharpness": float(energy[1] / energy[0]),
         "wrong_share": float((np.abs(one - other).max(axis=2)[where] > WRONG).mean()),
         "compared_share": float(where.mean()),

@@ -22,7 +22,7 @@ def split_at_seams(mesh: TriangleMesh) -> tuple[IntArray, IntArray, FloatArray]:
     """
     assert mesh.texture is not None
     places = mesh.texture.reshape(-1, 2)
-    order = np.lexsort([places[:, 1], places[:, 0], mesh.faces.reshape(-1)])
+    order = np.lexsort((places[:, 1], places[:, 0], mesh.faces.reshape(-1)))
     rows = np.column_stack([mesh.faces.reshape(-1), places])[order]
     first = np.ones(len(rows), dtype=bool)
     first[1:] = (rows[1:] != rows[:-1]).any(axis=1)
@@ -38,8 +38,9 @@ def cut_open(name: str, mesh: TriangleMesh, picture: ByteArray | None) -> GlbPar
     Its normals are those of the whole surface: vertices at one place share them, however the mesh was cut before.
     """
     source, faces, uv = split_at_seams(mesh)
-    points, whole = np.unique(mesh.vertices, axis=0, return_inverse=True)
-    normals = vertex_normals(TriangleMesh(points, whole.reshape(-1)[mesh.faces]))
+    points, inverse = np.unique(mesh.vertices, axis=0, return_inverse=True)
+    whole = inverse.reshape(-1).astype(np.int32)
+    normals = vertex_normals(TriangleMesh(points, whole[mesh.faces]))
     colors = None if mesh.colors is None or picture is not None else mesh.colors[source]
     cut = TriangleMesh(mesh.vertices[source], faces, colors)
-    return GlbPart(name, cut, normals=normals[whole.reshape(-1)[source]], uv=uv, texture=picture)
+    return GlbPart(name, cut, normals=normals[whole[source]], uv=uv, texture=picture)

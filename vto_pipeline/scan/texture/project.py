@@ -20,7 +20,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
 from vto_pipeline.model.texture import TexturedMesh
 from vto_pipeline.scan.exposure import relative_levels
-from vto_pipeline.scan.texture.charts import Texels, texels_of, unwrap
+from vto_pipeline.scan.texture.charts import Texels, nearest_pixel, texels_of, unwrap
 from vto_pipeline.scan.texture.colors import blend, coarse_band, coarse_logs, read_colors
 from vto_pipeline.scan.texture.fill import fill_between, fill_vertices
 from vto_pipeline.scan.texture.views import Samples, lens_of, look, no_photo, pixel_size, rank_view
@@ -145,7 +145,7 @@ def _assemble(
     color[:count][unseen] = np.einsum("nk,nkc->nc", texels.weight[unseen], around)
     width, height = size
     picture, inside, mask = np.zeros((height, width, 3), np.uint8), *np.zeros((2, height, width), dtype=bool)
-    own = texels.inside | known[:count]  # where no photo shows a margin, its chart's edge goes on
+    own = texels.inside | (known[:count] & _edge_known(size, texels, known[:count]))  # or the edge's colour goes on
     picture[texels.row[own], texels.column[own]] = np.rint(color[:count][own])
     inside[texels.row[own], texels.column[own]] = True
     mask[texels.row, texels.column] = known[:count]
@@ -154,3 +154,11 @@ def _assemble(
     job.measure(photos_per_texel=round(float(shown[shown > 0].mean()) if shown.any() else 0.0, 2))
     surface = TriangleMesh(mesh.vertices, mesh.faces, np.rint(vertices).astype(np.uint8), corners, mesh.metric)
     return TexturedMesh(surface, fill_between(picture, inside), mask)
+
+
+def _edge_known(size: tuple[int, int], texels: Texels, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return for each texel whether a photo shows its chart there, shape (N,): a margin lies beside the surface."""
+    chart, lit = np.zeros((2, size[1], size[0]), dtype=bool)
+    chart[texels.row[texels.inside], texels.column[texels.inside]] = True
+    lit[texels.row, texels.column] = known
+    return np.asarray(lit.reshape(-1)[nearest_pixel(chart)[1][texels.row, texels.column]])

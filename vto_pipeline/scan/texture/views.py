@@ -63,7 +63,8 @@ def look(
     """
     import cv2
 
-    pinhole, cam_from_world = camera.without_distortion(), np.linalg.inv(world_from_cam)
+    pinhole = camera.without_distortion()
+    cam_from_world: FloatArray = np.asarray(np.linalg.inv(world_from_cam), dtype=np.float64)
     depth = _depth(mesh, pinhole, cam_from_world)
     if occluder is not None:
         depth[_depth(occluder, pinhole, cam_from_world) < depth - slack] = np.inf
