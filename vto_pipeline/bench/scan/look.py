@@ -151,8 +151,8 @@ def sample(picture: ByteArray, place: FloatArray) -> FloatArray:
     x = (place[:, 0] * width - 0.5).astype(np.float32)
     y = ((1.0 - place[:, 1]) * height - 0.5).astype(np.float32)
     rows = -(-len(x) // 30_000)  # cv2 takes no longer columns
-    filled = [np.resize(one, (rows, 30_000)) for one in (x, y)]
-    found = cv2.remap(picture, *filled, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    columns, lines = (np.resize(one, (rows, 30_000)) for one in (x, y))
+    found = cv2.remap(picture, columns, lines, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(found, dtype=np.float64).reshape(rows * 30_000, -1)[: len(x)]
 
 
@@ -187,17 +187,18 @@ def _open3d(ours: TexturedMesh, capture: Capture, kept: NDArray[np.int64]) -> Te
     import open3d as o3d
 
     mesh = o3d.t.geometry.TriangleMesh(
-        o3d.core.Tensor(ours.mesh.vertices.astype(np.float32)), o3d.core.Tensor(ours.mesh.faces.astype(np.int64))
+        o3d.core.Tensor.from_numpy(ours.mesh.vertices.astype(np.float32)),
+        o3d.core.Tensor.from_numpy(ours.mesh.faces.astype(np.int64)),
     )
     assert ours.mesh.texture is not None
-    mesh.triangle.texture_uvs = o3d.core.Tensor(ours.mesh.texture.astype(np.float32))
+    mesh.triangle.texture_uvs = o3d.core.Tensor.from_numpy(ours.mesh.texture.astype(np.float32))
     paths = {path.name: path for path in capture.photos.paths}
     cameras = choose(capture.cameras, kept)
     pictures, inner, outer = [], [], []
     for name, camera, pose in zip(cameras.names, cameras.intrinsics, cameras.world_from_cam, strict=True):
         pictures.append(o3d.t.geometry.Image(np.ascontiguousarray(undistorted(read_image(paths[name]), camera))))
-        inner.append(o3d.core.Tensor(camera.matrix))
-        outer.append(o3d.core.Tensor(np.linalg.inv(pose)))
+        inner.append(o3d.core.Tensor.from_numpy(camera.matrix))
+        outer.append(o3d.core.Tensor.from_numpy(np.ascontiguousarray(np.linalg.inv(pose))))
     size = max(ours.picture.shape[:2])
     albedo = np.asarray(mesh.project_images_to_albedo(pictures, inner, outer, size, False).as_tensor().numpy())
     return replace(ours, picture=np.ascontiguousarray(albedo[..., :3]), seen=np.ones(albedo.shape[:2], dtype=bool))
