@@ -151,8 +151,8 @@ def sample(picture: ByteArray, place: FloatArray) -> FloatArray:
     x = (place[:, 0] * width - 0.5).astype(np.float32)
     y = ((1.0 - place[:, 1]) * height - 0.5).astype(np.float32)
     rows = -(-len(x) // 30_000)  # cv2 takes no longer columns
-    across, down = np.resize(x, (rows, 30_000)), np.resize(y, (rows, 30_000))
-    found = cv2.remap(picture, across, down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    columns, lines = (np.resize(one, (rows, 30_000)) for one in (x, y))
+    found = cv2.remap(picture, columns, lines, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(found, dtype=np.float64).reshape(rows * 30_000, -1)[: len(x)]
 
 
@@ -198,7 +198,7 @@ def _open3d(ours: TexturedMesh, capture: Capture, kept: NDArray[np.int64]) -> Te
     for name, camera, pose in zip(cameras.names, cameras.intrinsics, cameras.world_from_cam, strict=True):
         pictures.append(o3d.t.geometry.Image(np.ascontiguousarray(undistorted(read_image(paths[name]), camera))))
         inner.append(o3d.core.Tensor.from_numpy(camera.matrix))
-        outer.append(o3d.core.Tensor.from_numpy(np.linalg.inv(pose)))
+        outer.append(o3d.core.Tensor.from_numpy(np.ascontiguousarray(np.linalg.inv(pose))))
     size = max(ours.picture.shape[:2])
     albedo = np.asarray(mesh.project_images_to_albedo(pictures, inner, outer, size, False).as_tensor().numpy())
     return replace(ours, picture=np.ascontiguousarray(albedo[..., :3]), seen=np.ones(albedo.shape[:2], dtype=bool))
