@@ -6,6 +6,7 @@ keyframes: photos from a video
 exposure: how brightly each photo was exposed
 fuse, level_set: one surface from many depth maps
 depth_views, in_order: maps that are read when they are needed
+disagreement: the error to expect, from how far the maps are from their surface
 object_sphere: what the cameras look at, without the room
 normals, surface: a surface through an unorganised cloud
 upright, similarity: which way is up; one set of points mapped on another

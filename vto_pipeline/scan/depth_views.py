@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from vto_pipeline.errors import ScanError
 from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.camera import Intrinsics
+from vto_pipeline.model.frames import DepthMaps
 from vto_pipeline.scan.in_order import in_order
 from vto_pipeline.scan.photos.consistency import views_on_surface
 
@@ -45,6 +46,18 @@ class DepthViews:
         """Some maps, evenly spread."""
         count = len(self.names)
         return np.unique(np.linspace(0, count - 1, min(count, SAMPLED)).round().astype(int))
+
+
+def depth_only(maps: DepthMaps) -> DepthViews:
+    """Return the depth maps of photos as views without colours."""
+
+    def depth_of(index: int) -> NDArray[np.float32]:
+        lens = maps.intrinsics[index]
+        return np.ascontiguousarray(maps.depth[index, : lens.height, : lens.width])
+
+    return DepthViews(
+        maps.names, maps.intrinsics, maps.world_from_cam, depth_of, lambda _: np.empty((0, 0, 3), np.uint8)
+    )
 
 
 def pixel_on_surface(views: DepthViews) -> float:

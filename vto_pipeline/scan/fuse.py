@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
@@ -19,7 +21,8 @@ from vto_pipeline.model.mesh import PointCloud, TriangleMesh
 from vto_pipeline.model.settings import Config
 from vto_pipeline.scan.canonical import drop_small_pieces, drop_vertices
 from vto_pipeline.scan.depth.depth_mask import clean_depth
-from vto_pipeline.scan.depth_views import DepthViews, pixel_on_surface, supporting_views
+from vto_pipeline.scan.depth_views import DepthViews, depth_only, pixel_on_surface, supporting_views
+from vto_pipeline.scan.disagreement import predicted_error
 from vto_pipeline.scan.level_set import count_blocks, level_set
 from vto_pipeline.scan.library_message import library_message
 from vto_pipeline.scan.object_sphere import inside_sphere, object_sphere
@@ -81,12 +84,7 @@ def fuse_depth_maps(
         name = maps.names[index]
         return undistorted(read_image(paths[name]), lenses[name])
 
-    def depth_of(index: int) -> NDArray[np.float32]:
-        lens = maps.intrinsics[index]
-        return np.ascontiguousarray(maps.depth[index, : lens.height, : lens.width])
-
-    views = DepthViews(maps.names, maps.intrinsics, maps.world_from_cam, depth_of, color_of)
-    return _fuse(views, config, job)
+    return _fuse(replace(depth_only(maps), color_of=color_of), config, job)
 
 
 def check_coverage(
@@ -154,7 +152,9 @@ def fuse_depth_frames(frames: DepthFrameSet, world_from_cam: FloatArray, config:
         depth_of,
         color_of,
     )
-    return _fuse(views, config, job)
+    surface = _fuse(views, config, job)
+    job.measure(predicted_error_mm=predicted_error(views, surface))
+    return surface
 
 
 def _fuse(views: DepthViews, config: FuseConfig, job: Job) -> TriangleMesh:

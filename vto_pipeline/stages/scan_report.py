@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
+
+from vto_pipeline.geometry.topology import submesh
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.settings import Config
 from vto_pipeline.pipeline.stage import Stage
+from vto_pipeline.scan.depth_views import depth_only
+from vto_pipeline.scan.disagreement import predicted_error
 from vto_pipeline.stages.roles import ROLES
 
 Inputs = Mapping[str, Any]
@@ -15,17 +20,27 @@ Outputs = Mapping[str, Any]
 
 _OF_A_GARMENT = ("align", "subtract", "openings")
 """Stages of a scanned garment whose name has no role."""
+_NORMAL = {"median": 0.6745, "p95": 1.96}
+"""Quantiles of the distance from a normal distribution's middle, in standard deviations."""
 _SOURCES = {"odometry": "depth camera", "poisson": "the file's unit"}
 """Stage -> where the scale of its surface comes from, when it does not say."""
 
 
-def scan_report(role: str, surface_is_metric: bool, run_record: Mapping[str, Any]) -> dict[str, Any]:
+def scan_report(
+    role: str,
+    surface_is_metric: bool,
+    run_record: Mapping[str, Any],
+    error_of: Callable[[float, float], Mapping[str, float | None] | None] | None = None,
+    lever: float = 0.0,
+) -> dict[str, Any]:
     """Return what scan_report.json holds.
 
     Args:
         role: Of the scan.
         surface_is_metric: Whether the surface as scanned is in metres.
         run_record: What run.json holds; of its stages, those that ran for this role.
+        error_of: Predicts the error [mm] from the metres in a unit of the surface and the share that was filled.
+        lever: Typical distance of the surface from its middle, in its unit: what an error of the scale acts on.
     """
     said: dict[str, Any] = {}
     source = None if not surface_is_metric else "the file's unit"
@@ -36,15 +51,21 @@ def scan_report(role: str, surface_is_metric: bool, run_record: Mapping[str, Any
             said |= stage["metrics"]
             source = _SOURCES.get(name, source)
     source = said.get("scale_source", source)
+    unit = said.get("metres_per_unit", 1.0 if surface_is_metric else None)
+    error = said.get("predicted_error_mm")
+    if error_of is not None and unit is not None:
+        error = error_of(unit, said.get("unobserved_share") or 0.0)
+    if error is not None and unit is not None:
+        error = _with_scale(error, 10.0 * (said.get("scale_error_percent") or 0.0) * lever * unit)
     return {
         "role": role,
         "metric": source is not None,
         "scale": {
             "source": source,
-            "metres_per_unit_of_surface": said.get("metres_per_unit", 1.0 if surface_is_metric else None),
+            "metres_per_unit_of_surface": unit,
             "error_percent": said.get("scale_error_percent"),
         },
-        "predicted_error_mm": said.get("predicted_error_mm"),
+        "predicted_error_mm": error,
         "coverage": said.get("coverage"),
         "unobserved_share": said.get("unobserved_share"),
         "openings": said.get("openings"),
@@ -54,15 +75,34 @@ def scan_report(role: str, surface_is_metric: bool, run_record: Mapping[str, Any
     }
 
 
+def _with_scale(error: Mapping[str, float | None], sigma: float) -> dict[str, float | None]:
+    """Return quantiles of the error [mm] with what the scale adds, a normal distribution's of that deviation [mm]."""
+    whole: dict[str, float | None] = {}
+    for name, seen in error.items():
+        whole[name] = None if seen is None else round(float(np.hypot(seen, _NORMAL[name] * sigma)), 3)
+    return whole
+
+
 def _stage(role: str) -> Stage:
     def run(inputs: Inputs, settings: Config, job: Job) -> Outputs:
-        surface = inputs[f"{role}_surface"]
-        return {f"{role}_scan_report": scan_report(role, surface.metric, inputs["run_record"])}
+        surface, record = inputs[f"{role}_surface"], inputs["run_record"]
+        maps, labels = inputs.get(f"{role}_depth_maps"), inputs.get("labels")
+        if maps is None:
+            return {f"{role}_scan_report": scan_report(role, surface.metric, record)}
+        if role == "garment" and labels is not None and len(labels.garment) == len(surface.vertices):
+            surface, _ = submesh(surface, labels.garment[surface.faces].all(axis=1))
+        lever = float(np.median(np.linalg.norm(surface.vertices - surface.vertices.mean(axis=0), axis=1)))
+
+        def error_of(unit: float, filled: float) -> Mapping[str, float | None] | None:
+            return predicted_error(depth_only(maps), surface, unit, filled)
+
+        return {f"{role}_scan_report": scan_report(role, surface.metric, record, error_of, lever)}
 
     return Stage(
         name=f"{role}.scan_report",
         about="how good the scan is, as far as it can tell itself",
         needs=(f"{role}_surface",),
+        optional=(f"{role}_depth_maps", *(("labels",) if role == "garment" else ())),
         makes=(f"{role}_scan_report",),
         run=run,
         final=True,

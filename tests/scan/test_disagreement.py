@@ -1,0 +1,84 @@
+"""The error predicted from depth maps alone: of known noise, and of a surface that is off by a known distance."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from vto_pipeline.model.camera import Intrinsics
+from vto_pipeline.model.frames import DepthMaps
+from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.scan.depth_views import depth_only
+from vto_pipeline.scan.disagreement import predicted_error
+from vto_pipeline.stages.scan_report import scan_report
+
+CAMERA = Intrinsics(120, 90, 150.0, 150.0, 59.5, 44.5)
+SIGMA = 0.0004
+WAVE = 4
+"""Noise is one value for so many pixels: between pixels it is interpolated, and finer noise would be averaged out."""
+
+
+def wall(z=1.0, step=0.004) -> TriangleMesh:
+    """A sheet before the cameras, facing them."""
+    x, y = np.meshgrid(np.arange(-0.3, 0.3, step), np.arange(-0.2, 0.2, step))
+    rows, columns = x.shape
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    a, b, c, d = corner, corner + 1, corner + columns, corner + columns + 1
+    faces = np.concatenate([np.stack([a, c, b], 1), np.stack([b, c, d], 1)])
+    vertices = np.stack([x.ravel(), y.ravel(), np.full(x.size, z)], axis=1)
+    return TriangleMesh(vertices, faces[:, [0, 2, 1]] if _away(vertices, faces) else faces)
+
+
+def _away(vertices, faces) -> bool:
+    a, b, c = vertices[faces[0]]
+    return bool(np.cross(b - a, c - a)[2] > 0)
+
+
+def maps_of_wall(noise: float, count=6, seed=0) -> DepthMaps:
+    """Depth maps from a row of places, all of which look straight at the wall at 1 m."""
+    random = np.random.default_rng(seed)
+    poses = np.tile(np.eye(4), (count, 1, 1))
+    poses[:, 0, 3] = np.linspace(-0.05, 0.05, count)
+    coarse = random.normal(0.0, noise, (count, 90 // WAVE + 1, 120 // WAVE + 1))
+    rough = coarse.repeat(WAVE, axis=1).repeat(WAVE, axis=2)[:, :90, :120]
+    names = tuple(f"{k}.png" for k in range(count))
+    return DepthMaps(names, (CAMERA,) * count, poses, (1.0 + rough).astype(np.float32))
+
+
+def test_known_noise_is_predicted():
+    found = predicted_error(depth_only(maps_of_wall(SIGMA)), wall())
+    assert found is not None
+    assert_allclose(found["median"], 0.6745e3 * SIGMA, rtol=0.1, atol=0)  # quantiles of a normal distribution; a fifth
+    assert_allclose(found["p95"], 1.96e3 * SIGMA, rtol=0.1, atol=0)  # of the points lies between two steps of noise
+
+
+def test_a_surface_that_is_off_is_found_out():
+    found = predicted_error(depth_only(maps_of_wall(0.0)), wall(z=1.002))
+    assert found is not None
+    assert_allclose([found["median"], found["p95"]], 2.0, rtol=0, atol=0.01)  # the steps of the count
+
+
+def test_what_was_filled_is_worse_than_all_that_was_seen():
+    views = depth_only(maps_of_wall(SIGMA))
+    plain, filled = predicted_error(views, wall()), predicted_error(views, wall(), filled_share=0.1)
+    assert plain is not None
+    assert filled is not None
+    assert filled["median"] > plain["median"]
+    assert filled["p95"] is None
+    assert_allclose(predicted_error(views, wall(), 0.1)["median"], 0.1 * plain["median"], rtol=0, atol=0.001)
+
+
+def test_without_readings_nothing_is_predicted():
+    maps = maps_of_wall(0.0)
+    blank = DepthMaps(maps.names, maps.intrinsics, maps.world_from_cam, np.zeros_like(maps.depth))
+    assert predicted_error(depth_only(blank), wall()) is None
+
+
+@pytest.mark.parametrize(("percent", "expected"), [(0.0, 0.3), (1.0, np.hypot(0.3, 0.6745 * 2.0))])
+def test_the_scale_adds_to_the_error(percent, expected):
+    """One per cent of 0.2 m is 2 mm."""
+    stages = [{"name": "garment.scale", "status": "ran", "metrics": {"scale_error_percent": percent}}]
+    report = scan_report("garment", True, {"stages": stages}, lambda unit, filled: {"median": 0.3, "p95": None}, 0.2)
+    assert_allclose(report["predicted_error_mm"]["median"], expected, rtol=0, atol=0.001)  # rounded to that
+    assert report["predicted_error_mm"]["p95"] is None
