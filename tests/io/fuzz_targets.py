@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from fuzz_captures import CAPTURES, sound_capture
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from io_shapes import write_all_formats
@@ -57,8 +58,15 @@ TEXTS: dict[str, tuple[str, str, Callable[[Path], Any]]] = {
     ),
     "table": ("t.csv", "name,seed,stages.add.offset\na,1,2\nb,2,\n", lambda path: read_order(_order_beside(path))),
 }
-ABORTING = {"a.laz"}  # its library ends the process where memory is short; only a child can contain that
-TARGETS = [*MESHES, *(name for name in OTHERS if name not in ABORTING), *TEXTS, "arrays", "trajectory"]
+TARGETS = [
+    *MESHES,
+    *(name for name in OTHERS if name != "a.laz"),
+    *TEXTS,
+    "arrays",
+    "arrays_packed",
+    "trajectory",
+    *CAPTURES,
+]
 WORDS = (
     b"\x00",
     b"\xff",
@@ -105,8 +113,11 @@ def sound_file(target: str, folder: Path) -> tuple[Path, Callable[[Path], Any]]:
         name, text, read = TEXTS[target]
         (folder / name).write_text(text)
         return folder / name, read
-    if target == "arrays":
-        write_arrays(folder / "a.npz", {"vertices": np.eye(3), "faces": np.arange(3)})
+    if target in CAPTURES:
+        return sound_capture(target, folder)
+    if target in ("arrays", "arrays_packed"):
+        arrays = {"vertices": np.eye(3), "faces": np.arange(3)}
+        write_arrays(folder / "a.npz", arrays, compress=target == "arrays_packed")
         return folder / "a.npz", read_arrays
     if target == "trajectory":
         (folder / "a.json").write_text(json.dumps({"world_from_cam": [np.eye(4).tolist()] * 2}))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zipfile
+import zlib
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,13 @@ Arrays = dict[str, NDArray[Any]]
 
 _LIMIT_BYTES = 4_000_000_000
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the oldest date a zip can hold; a real one would change the bytes
+
+
+_BROKEN = (
+    *(zipfile.BadZipFile, zlib.error, ValueError, EOFError, KeyError, OSError),
+    RuntimeError,  # encrypted
+)
+"""What `zipfile` and NumPy raise on damaged bytes."""
 
 
 def write_arrays(path: Path, arrays: Mapping[str, Any], *, compress: bool = False) -> None:
@@ -51,12 +59,15 @@ def read_arrays(path: Path, required: Collection[str] = (), only: Collection[str
     path = check_file(Path(path), {".npz"}, _LIMIT_BYTES)
     try:
         with zipfile.ZipFile(path) as archive:
-            promised = sum(entry.file_size for entry in archive.infolist())
+            entries = archive.infolist()
+        promised = sum(entry.file_size for entry in entries)
         if promised > _LIMIT_BYTES:
             raise FormatError(f"unpacks to {promised} bytes; the limit is {_LIMIT_BYTES}", where=str(path))
+        if not {entry.compress_type for entry in entries} <= {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}:
+            raise FormatError("packed by another method than deflate", where=str(path))
         with np.load(path, allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files if only is None or name in only}
-    except (zipfile.BadZipFile, ValueError, EOFError, KeyError, OSError, NotImplementedError) as e:
+    except _BROKEN as e:
         raise FormatError(f"not an archive of plain arrays: {e}", where=str(path)) from None
     missing = sorted(set(required) - set(arrays))
     if missing:

@@ -53,7 +53,7 @@ def parse_rows(lines: Sequence[str], line_numbers: Sequence[int], path: Path) ->
     """Return the numbers of lines that must all have the same count.
 
     Returns:
-        Shape (len(lines), columns).
+        Shape (len(lines), columns); (0, 0) of no lines.
 
     Raises:
         FormatError: a token is not a number, or a line is shorter or longer than the first.
@@ -64,7 +64,7 @@ def parse_rows(lines: Sequence[str], line_numbers: Sequence[int], path: Path) ->
         if count != counts[0]:
             problem = f"{count} numbers in this line, {counts[0]} in the lines before"
             raise FormatError(problem, where=f"{path}, line {number}", hint="is the file truncated?")
-    return values.reshape(len(lines), -1)
+    return values.reshape(len(lines), counts[0] if counts else 0)
 
 
 def _is_number(token: str) -> bool:

@@ -7,6 +7,7 @@ A folder holds base.obj and, if wanted, targets.yaml (file of a target -> its sh
 from __future__ import annotations
 
 import gzip
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -102,7 +103,7 @@ def _target(path: Path, count: int) -> tuple[NDArray[np.int64], FloatArray]:
                 data = stream.read(_LIMIT_BYTES)
         else:
             data = path.read_bytes()
-    except (OSError, EOFError) as e:
+    except (OSError, EOFError, zlib.error) as e:
         raise FormatError(f"not a gzipped target: {e}", where=str(path)) from None
     lines = data.decode("utf-8", errors="replace").splitlines()
     kept = [(text, k) for k, text in enumerate(lines, start=1) if text.strip() and not text.lstrip().startswith("#")]

@@ -65,6 +65,6 @@ def encode_jpeg(name: str) -> Arrays:
                 raise FormatError(f"{problem}; the limit is {_PIXELS // 1_000_000} million", where=name)
             encoded = BytesIO()
             image.convert("RGB").save(encoded, "JPEG", quality=_JPEG_QUALITY, exif=image.getexif())
-    except (*BROKEN, Image.DecompressionBombError) as e:
+    except (*BROKEN, Image.DecompressionBombError, RuntimeError) as e:  # the last by libheif
         raise FormatError(f"not a readable HEIC picture: {e}", where=name) from None
     return {"jpeg": np.frombuffer(encoded.getvalue(), dtype=np.uint8)}

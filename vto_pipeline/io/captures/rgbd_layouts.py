@@ -139,6 +139,8 @@ def _stray(folder: Path) -> RgbdLayout:
         problem = f"columns {', '.join(names)[:80]}; expected frame, {', '.join(wanted)}"
         raise FormatError(problem, where=str(path))
     rows = parse_rows([line.replace(",", " ") for line in lines[1:]], range(2, len(lines) + 1), path)
+    if rows.shape[1] != len(names) or not np.isfinite(rows).all():
+        raise FormatError(f"expected rows of {len(names)} finite numbers, as in the first line", where=str(path))
     values = rows[:, [names.index(name) for name in wanted]]
     pose_of = dict(
         zip(rows[:, names.index("frame")].astype(int), _rigid(values[:, :3], values[:, 3:], path), strict=True)
