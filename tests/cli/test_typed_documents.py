@@ -61,7 +61,7 @@ def test_photos_that_nothing_scales_are_scanned_and_not_cut(typed):
     assert "no scale" in err
     ends = ("a.jpg:10,20.5+b.jpg:12,22", "a.jpg:300,20+b.jpg:310,25")
     _, caught, err = typed("scan", "photos", "--role", "garment", "--distance", *ends, "0.42")
-    assert caught["data"]["want"] == ["garment", "openings", "garment_scan_report", "page"]
+    assert caught["data"]["want"] == ["garment", "openings", "garment_texture", "garment_scan_report", "page"]
     first = {"one": {"a.jpg": [10.0, 20.5], "b.jpg": [12.0, 22.0]}, "metres": 0.42}
     assert first.items() <= caught["data"]["stages"]["scale"]["lengths"][0].items()
     assert "no scale" not in err

@@ -53,7 +53,7 @@ def test_a_run_of_which_a_stage_took_more_is_refused_before_it_begins(budgeted):
     peaks = {stage["name"]: stage["peak_mb"] for stage in record["stages"]}
     assert peaks["add"] > peaks["left.double"] + 0.9e-6 * BLOCK
     between = 1e6 * peaks["add"] - 0.5 * BLOCK
-    with pytest.raises(ConfigError, match="add takes about 0.* GB .*, by earlier runs; the budget is 0") as caught:
+    with pytest.raises(ConfigError, match=r"add takes about [\d.]+ GB .*, by earlier runs; the budget is") as caught:
         budgeted(between, offset=1)
     assert "vto plan" in caught.value.hint
     assert CALLS == []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from vto_pipeline.garment.bare_parts import BareParts
 from vto_pipeline.garment.loop_evidence import RIM_OUTSIDE, encloses, outside_share, passes_through
@@ -32,6 +33,9 @@ ROUNDS = 3
 """How often notches are looked for: one rim may have several."""
 BARE = 0.2
 """With a larger share over mannequin that was seen bare, it is no notch. Over a scan hole it is nothing."""
+OVER_CLOTH, NEARER = 0.5, 0.5
+"""The line across a notch runs over nothing, and the nearest cloth is the rim. Less than this share of it may be over
+cloth, which is where cloth is so many times nearer than the rim: behind a collar, from one scan hole to the next."""
 WAVELENGTH = 0.025
 """Notches are looked for on the rim without its zigzag [m]."""
 
@@ -44,6 +48,7 @@ def close_notches(
     The line across a notch runs outside the mannequin or grazes it, and the rim that is left goes round the mannequin.
     What would cover mannequin that was seen bare is no notch but the shape of the rim, as the V of an open collar.
     Where the mannequin passes through what the line cuts off, that is the opening, and the hole is on its other side.
+    A line along cloth is not across a notch: it would cut a part of the true rim off, with a second layer below it.
 
     Args:
         mesh: The garment.
@@ -93,17 +98,27 @@ def _tightest_notch(
     rim is looked at, then the places beside the best.
     """
     points = mesh.vertices[half_edges(mesh)[walk, 0]]
+    cloth, rim_there = cKDTree(mesh.vertices), cKDTree(points)
     for _ in range(2):
         points = smooth_curve(points, WAVELENGTH)
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1))])
     at = np.unique(np.searchsorted(along[:-1], np.arange(LOOKED_AT) / LOOKED_AT * along[-1]).clip(max=len(walk) - 1))
+
+    def directions_at(start: int, end: int) -> FloatArray:
+        before = points[start] - points[_index_along(along, start, -TANGENT)]
+        after = points[_index_along(along, end, TANGENT)] - points[end]
+        return np.stack([before, after]) / np.linalg.norm([before, after], axis=1, keepdims=True)
 
     def is_notch(start: int, end: int) -> bool:
         if bare is not None and np.mean(bare.under(_between(points, along, start, end))) > BARE:
             return False
         left = at[np.argsort(np.mod(at - end, len(walk)))]  # from the notch's end round to its start
         left = left[: np.count_nonzero(np.mod(at - end, len(walk)) <= np.mod(start - end, len(walk)))]
-        closing_line = points[start] + np.linspace(0.0, 1.0, 12)[1:-1, None] * (points[end] - points[start])
+        share = np.linspace(0.0, 1.0, 12)[1:-1, None]
+        closing_line = points[start] + share * (points[end] - points[start])
+        curve = _closing_curve(points[start], points[end], directions_at(start, end), share)
+        if runs_over_cloth(curve, cloth, rim_there):
+            return False
         path = _path(points, start, end)
         cut_off = np.vstack([path[:: 1 + len(path) // LOOKED_AT], closing_line[::-1]])
         rim = np.vstack([points[left], closing_line])
@@ -135,10 +150,19 @@ def _tightest_notch(
     if best is None:
         return None
     start, end = candidates[best]
-    before = points[start] - points[_index_along(along, start, -TANGENT)]
-    after = points[_index_along(along, end, TANGENT)] - points[end]
     notch = np.roll(walk, -start)[: (end - start) % len(walk)]
-    return notch, np.stack([before, after]) / np.linalg.norm([before, after], axis=1, keepdims=True)
+    return notch, directions_at(start, end)
+
+
+def runs_over_cloth(curve: FloatArray, cloth: cKDTree, rim: cKDTree) -> bool:
+    """Return whether a curve (N, 3) runs over cloth, and not over a gap in its rim.
+
+    Args:
+        curve: From one place of the rim to another.
+        cloth: All vertices.
+        rim: Those of the rim.
+    """
+    return bool(np.mean(cloth.query(curve)[0] < NEARER * rim.query(curve)[0]) >= OVER_CLOTH)
 
 
 def _path(points: FloatArray, start: int, end: int) -> FloatArray:
@@ -201,21 +225,29 @@ def _index_along(along: FloatArray, place: int, by: float) -> int:
 
 
 def _fill_smoothly(mesh: TriangleMesh, notch: IntArray, directions: FloatArray) -> TriangleMesh:
-    """Fill a notch up to the cubic that goes on as the rim does on both sides of it.
-
-    The tangents of the Hermite cubic are as long as those that make it a circle's arc, were the turn between them one.
-    """
+    """Fill a notch up to the curve that goes on as the rim does on both sides of it."""
     halves = half_edges(mesh)
     first, last = halves[notch[0], 0], halves[notch[-1], 1]
     start, end = mesh.vertices[first], mesh.vertices[last]
-    chord = float(np.linalg.norm(end - start))
-    turn = np.arccos(np.clip(directions[0] @ directions[1], -0.5, 1.0))
-    pull = directions * chord / np.cos(turn / 4.0) ** 2
     edge = np.linalg.norm(mesh.vertices[halves[notch, 1]] - mesh.vertices[halves[notch, 0]], axis=1).mean()
-    t = np.linspace(0.0, 1.0, int(np.ceil(1.1 * chord / edge)) + 1)[1:-1, None]
-    closing_line = (2 * t**3 - 3 * t**2 + 1) * start + (t**3 - 2 * t**2 + t) * pull[0]
-    closing_line += (3 * t**2 - 2 * t**3) * end + (t**3 - t**2) * pull[1]
-    return fill_notch(mesh, notch, closing_line)
+    t = np.linspace(0.0, 1.0, int(np.ceil(1.1 * np.linalg.norm(end - start) / edge)) + 1)[1:-1, None]
+    return fill_notch(mesh, notch, _closing_curve(start, end, directions, t))
+
+
+def _closing_curve(start: FloatArray, end: FloatArray, directions: FloatArray, t: FloatArray) -> FloatArray:
+    """Return points on the Hermite cubic from one end of a notch to the other, shape (N, 3).
+
+    Its tangents are as long as those that make it a circle's arc, were the turn between them one.
+
+    Args:
+        start, end: [m], shape (3,).
+        directions: In which it starts and ends, shape (2, 3).
+        t: From 0 to 1, shape (N, 1).
+    """
+    turn = np.arccos(np.clip(directions[0] @ directions[1], -0.5, 1.0))
+    pull = directions * float(np.linalg.norm(end - start)) / np.cos(turn / 4.0) ** 2
+    curve = (2 * t**3 - 3 * t**2 + 1) * start + (t**3 - 2 * t**2 + t) * pull[0]
+    return np.asarray(curve + (3 * t**2 - 2 * t**3) * end + (t**3 - t**2) * pull[1])
 
 
 def _outside(start: FloatArray, end: FloatArray, distance: SurfaceDistance) -> NDArray[np.bool_]:

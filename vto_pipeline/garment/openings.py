@@ -26,6 +26,9 @@ from vto_pipeline.model.settings import Config
 MOST_INSIDE = 0.025
 """A filling may lie so deep inside the mannequin [m], whence it is moved out; deeper, a body part goes through it."""
 
+FILLED_RIM = 1.0 / 3.0
+"""With a larger share of its rim filled, an opening's length is uncertain."""
+
 
 class OpeningsConfig(Config):
     """What counts as an opening, and how far its rim is cleaned."""
@@ -120,6 +123,7 @@ def close_scan_holes(
         unobserved_share=1.0 - seen,
     )
     _check_seen(seen, final, config, job)
+    warn_of_filled_rims(found, observed, job)
     return final, found, observed
 
 
@@ -127,6 +131,22 @@ def list_openings(garment: TriangleMesh) -> list[Opening]:
     """Return the boundary loops of a finished garment, highest first."""
     found = [Opening(s.loop, s.perimeter, s.center, s.normal) for s in measure_loops(garment)]
     return sorted(found, key=lambda opening: (-opening.center[1], opening.center[0]))
+
+
+def warn_of_filled_rims(openings: list[Opening], observed: NDArray[np.bool_], job: Job) -> None:
+    """Warn of openings whose rims were filled for the most part, with their places.
+
+    Args:
+        openings: Of the garment.
+        observed: Which of its vertices were seen, shape (V,).
+        job: Receives the warnings.
+    """
+    for opening in openings:
+        filled = float(np.mean(~observed[opening.loop]))
+        if filled >= FILLED_RIM:
+            x, y, z = opening.center
+            what = f"the opening of {opening.perimeter * 1e3:.0f} mm at ({x:.2f}, {y:.2f}, {z:.2f}) m is uncertain"
+            job.warn(f"{what}: {100.0 * filled:.0f} % of its rim was not seen, and filled; take more photos of it")
 
 
 def _thinned(shell: TriangleMesh, edge: float, job: Job) -> TriangleMesh:

@@ -45,6 +45,7 @@ _MODULES = {
     "rich": "rich",
     "scipy": "scipy",
     "trimesh": "trimesh",
+    "xatlas": "xatlas",
 }
 """Distribution -> module to import."""
 
