@@ -13,20 +13,25 @@ from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.mesh import TriangleMesh
 
 RADIUS, HEIGHT = 0.15, 0.4
+SKIN = np.array([225.0, 200.0, 30.0])
 BACKDROP, POST = np.array([250.0, 250.0, 0.0]), np.array([255.0, 0.0, 255.0])
 CAMERA = Intrinsics(320, 240, 400.0, 400.0, 159.5, 119.5, 0.02)
 POST_RADIUS, POST_PLACE = 0.02, np.array([0.05, 0.30])  # of an upright post, in x and z
 
 
-def paint(points: np.ndarray) -> np.ndarray:
-    """Colour of the tube, 0 to 255, shape (..., 3): waves of 20 mm and more, in each channel other ones."""
+def paint(points: np.ndarray, skin: float = 0.0) -> np.ndarray:
+    """Colour of the tube, 0 to 255, shape (..., 3): waves of 20 mm and more, in each channel other ones.
+
+    So much [m] of its upper end is bare form.
+    """
     angle, y = np.arctan2(points[..., 0], points[..., 2]), points[..., 1]
     waves = [
         np.sin(2 * np.pi * y / 0.030) * np.cos(9 * angle),
         np.sin(2 * np.pi * y / 0.055 + 3 * angle),
         np.cos(2 * np.pi * y / 0.020),
     ]
-    return 120 + np.stack([40 * wave for wave in waves], axis=-1)
+    cloth = 120 + np.stack([40 * wave for wave in waves], axis=-1)
+    return np.where((y > HEIGHT - skin)[..., None], SKIN, cloth) if skin else cloth
 
 
 def tube(around: int = 96, up: int = 24) -> TriangleMesh:
@@ -48,12 +53,14 @@ def cameras(count: int, arc_deg: float) -> CameraSet:
     return CameraSet(tuple(f"{k:02d}.png" for k in range(count)), (CAMERA,) * count, np.array(poses))
 
 
-def photograph(folder: Path, taken: CameraSet, *, gains: np.ndarray | None = None, with_post: bool = False) -> PhotoSet:
+def photograph(
+    folder: Path, taken: CameraSet, *, gains: np.ndarray | None = None, with_post: bool = False, skin: float = 0.0
+) -> PhotoSet:
     """Take the photos, four rays to a pixel; `gains` (C, 3) are the exposure and white balance of each."""
     paths = []
     for index, (name, camera, pose) in enumerate(zip(taken.names, taken.intrinsics, taken.world_from_cam, strict=True)):
         color = np.mean(
-            [_rays(camera, pose, dx, dy, with_post) for dx in (-0.25, 0.25) for dy in (-0.25, 0.25)], axis=0
+            [_rays(camera, pose, dx, dy, with_post, skin) for dx in (-0.25, 0.25) for dy in (-0.25, 0.25)], axis=0
         )
         color = color if gains is None else color * gains[index]
         paths.append(folder / name)
@@ -61,7 +68,7 @@ def photograph(folder: Path, taken: CameraSet, *, gains: np.ndarray | None = Non
     return PhotoSet(tuple(paths), taken.intrinsics)
 
 
-def _rays(camera: Intrinsics, pose: np.ndarray, dx: float, dy: float, with_post: bool) -> np.ndarray:
+def _rays(camera: Intrinsics, pose: np.ndarray, dx: float, dy: float, with_post: bool, skin: float) -> np.ndarray:
     u, v = np.meshgrid(np.arange(camera.width) + dx, np.arange(camera.height) + dy)
     bent = np.stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy], axis=-1)
     flat = bent.copy()
@@ -71,7 +78,7 @@ def _rays(camera: Intrinsics, pose: np.ndarray, dx: float, dy: float, with_post:
     eye = pose[:3, 3]
     near, _ = _hits(eye, ray, RADIUS, np.zeros(2))
     color = np.where(
-        np.isfinite(near)[..., None], paint(eye + np.nan_to_num(near, posinf=0.0)[..., None] * ray), BACKDROP
+        np.isfinite(near)[..., None], paint(eye + np.nan_to_num(near, posinf=0.0)[..., None] * ray, skin), BACKDROP
     )
     _, inner = _hits(eye, ray, RADIUS, np.zeros(2))
     lining = np.isinf(near) & np.isfinite(inner)

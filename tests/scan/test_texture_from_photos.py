@@ -131,3 +131,22 @@ def test_photos_are_laid_on_and_frames_are_not() -> None:
         assert ("texture" in steps) == made
         assert ("garment_texture" in steps["transfer"]) == made
     assert "photos" in plan.left_out["texture"]
+
+
+def test_a_strip_of_the_form_at_a_rim_is_not_on_it(tmp_path: Path) -> None:
+    """Ten millimetres of form were cut off with the cloth; only the colours beside the garment tell."""
+    taken = scene.cameras(5, 60.0)
+    photos = scene.photograph(tmp_path, taken, skin=0.010)
+    form = np.rint(scene.SKIN + np.random.default_rng(1).normal(0, 3, (500, 3))).astype(np.uint8)
+    strips, cloths = [], []
+    for known in (None, form):
+        found = texture_surface(scene.tube(), None, photos, taken, TextureConfig(), Job(), known)
+        points, color, seen = texels(found)
+        strip = seen & (points[:, 1] > scene.HEIGHT - 0.008)
+        strips.append((np.abs(color[strip] - scene.SKIN).max(axis=1) < 60).sum())
+        cloth = seen & (points[:, 1] < scene.HEIGHT - 0.014)
+        assert psnr(color[cloth], scene.paint(points[cloth])) > 33
+        cloths.append(cloth.sum())
+    assert strips[0] > 500
+    assert strips[1] == 0
+    assert cloths[1] == cloths[0]  # no cloth is taken for form

@@ -66,7 +66,10 @@ def _texture(inputs: Inputs, settings: TextureConfig, job: Job) -> Outputs:
         scene = None if scene is None else transform_mesh(scene, inputs["garment_placement"])
     things = [thing for thing in (scene, inputs.get("mannequin_surface")) if thing is not None]
     occluder = concatenate(things) if things else None
-    texture = texture_surface(inputs["garment"], occluder, inputs["garment_photos"], cameras, settings, job)
+    form = None
+    if scene is not None and scene.colors is not None and "labels" in inputs and "garment_placement" in inputs:
+        form = scene.colors[~inputs["labels"].garment]
+    texture = texture_surface(inputs["garment"], occluder, inputs["garment_photos"], cameras, settings, job, form)
     return {"garment_texture": texture}
 
 
@@ -129,7 +132,7 @@ STAGES: tuple[Stage, ...] = (
         name="texture",
         about="the garment laid flat in charts, each texel coloured from the photos that show it",
         needs=("garment", "garment_photos", "garment_cameras"),
-        optional=("garment_surface", "garment_placement", "mannequin_surface"),
+        optional=("garment_surface", "garment_placement", "labels", "mannequin_surface"),
         makes=("garment_texture",),
         run=_texture,
         settings=TextureConfig,

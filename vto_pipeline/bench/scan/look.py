@@ -28,6 +28,7 @@ from vto_pipeline.io.captures.photos import read_photos
 from vto_pipeline.io.captures.undistort import undistorted
 from vto_pipeline.io.documents import read_json
 from vto_pipeline.io.meshes import read_own_mesh
+from vto_pipeline.io.runs.garments import read_labels
 from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.camera import CameraSet, Intrinsics
 from vto_pipeline.model.frames import PhotoSet
@@ -53,12 +54,14 @@ class Capture(NamedTuple):
         occluder: All that was scanned, and the mannequin if one was given [m].
         photos: Their files.
         cameras: In the frame of the garment.
+        form: Colours of what was scanned beside the garment, shape (B, 3), or None.
     """
 
     garment: TriangleMesh
     occluder: TriangleMesh
     photos: PhotoSet
     cameras: CameraSet
+    form: ByteArray | None
 
 
 def read_capture(run: Path) -> Capture:
@@ -70,7 +73,10 @@ def read_capture(run: Path) -> Capture:
         cameras, surface = transform_cameras(cameras, placement), transform_mesh(surface, placement)
     given = read_json(run / "run.json")["given"]
     photos = read_photos(Path(given["garment_photos"]["path"]))
-    return Capture(read_own_mesh(out / "garment.ply"), surface, photos, cameras)
+    form = None
+    if (out / "labels.npz").is_file() and surface.colors is not None:
+        form = surface.colors[~read_labels(out / "labels.npz").garment]
+    return Capture(read_own_mesh(out / "garment.ply"), surface, photos, cameras, form)
 
 
 def measure_look(capture: Capture, held: int, config: TextureConfig, folder: Path | None = None) -> dict[str, Any]:
@@ -88,7 +94,7 @@ def measure_look(capture: Capture, held: int, config: TextureConfig, folder: Pat
     job = Job()
     began = time.perf_counter(), time.process_time()
     ours = texture_surface(
-        capture.garment, capture.occluder, capture.photos, choose(capture.cameras, kept), config, job
+        capture.garment, capture.occluder, capture.photos, choose(capture.cameras, kept), config, job, capture.form
     )
     spent = time.perf_counter() - began[0], time.process_time() - began[1]
     found: dict[str, Any] = {"held_out": [capture.cameras.names[k] for k in out], **job.metrics}

@@ -12,7 +12,7 @@ from vto_pipeline.geometry.smooth import smooth_values
 from vto_pipeline.geometry.topology import vertex_normals
 from vto_pipeline.io.captures.images import read_image
 from vto_pipeline.io.captures.undistort import undistorted
-from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.camera import CameraSet
 from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
@@ -23,6 +23,7 @@ from vto_pipeline.scan.exposure import relative_levels
 from vto_pipeline.scan.texture.charts import Texels, nearest_pixel, texels_of, unwrap
 from vto_pipeline.scan.texture.colors import blend, coarse_band, coarse_logs, read_colors
 from vto_pipeline.scan.texture.fill import fill_between, fill_vertices
+from vto_pipeline.scan.texture.rim import form_at_rims
 from vto_pipeline.scan.texture.views import Samples, lens_of, look, no_photo, pixel_size, rank_view
 
 NORMAL_ROUNDS = 5
@@ -54,6 +55,7 @@ def texture_surface(
     cameras: CameraSet,
     config: TextureConfig,
     job: Job,
+    form: ByteArray | None = None,
 ) -> TexturedMesh:
     """Lay the surface out flat and colour each texel from the photos that show it.
 
@@ -64,6 +66,7 @@ def texture_surface(
         cameras: That took them, in the frame of the surface.
         config: Settings.
         job: Receives progress and figures.
+        form: Colours of what the surface was cut off, shape (B, 3), or None; at rims they do not count as seen.
 
     Raises:
         InputError: a camera names a photo that is not there; ScanError: no photo shows the surface.
@@ -107,6 +110,8 @@ def texture_surface(
         )  # fmt: skip
     gain = _gains(best, low, len(texels.face), len(cameras.names))
     color, seen = blend(best, score, low, high, gain, config.tolerance, config.detail_power)
+    if form is not None:
+        seen[form_at_rims(mesh, samples, color, seen > 0, form)] = 0
     return _assemble(mesh, corners, size, texels, color, seen, job)
 
 
