@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import cv2
 import numpy as np
 import pycolmap
+import pytest
 from scan_scene import make_scene, orbit, render
 
 from vto_pipeline.model.camera import Intrinsics
@@ -161,3 +164,12 @@ def test_photos_that_fail_before_their_background_are_placed_beside_it(scene, tm
     scale, motion = fit_similarity(cameras.world_from_cam[:, :3, 3], poses[:, :3, 3])
     off = scale * cameras.world_from_cam[:, :3, 3] @ motion[:3, :3].T + motion[:3, 3] - poses[:, :3, 3]
     assert np.median(np.linalg.norm(off, axis=1)) < 1e-2  # at 1 m and 1.9 mm per pixel
+
+
+@pytest.mark.parametrize(
+    ("again", "before", "believed"),
+    [(12, None, False), (17, None, False), (18, None, True), (24, 20, True), (20, 20, False), (None, None, False)],
+)
+def test_a_second_model_is_believed_where_it_places_most_photos_and_more_than_the_first(again, before, believed):
+    again, before = (n and SimpleNamespace(num_reg_images=lambda n=n: n) for n in (again, before))
+    assert sfm._is_better(again, before, PHOTOS) is believed

@@ -51,7 +51,7 @@ class Capture(NamedTuple):
 
     Args:
         garment: The surface [m].
-        occluder: All that was scanned, and the mannequin if one was given [m].
+        occluder: All that was scanned [m].
         photos: Their files.
         cameras: In the frame of the garment.
         form: Colours of what was scanned beside the garment, shape (B, 3), or None.
