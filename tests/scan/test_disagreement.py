@@ -59,6 +59,20 @@ def test_a_surface_that_is_off_is_found_out():
     assert_allclose([found["median"], found["p95"]], 2.0, rtol=0, atol=0.01)  # the steps of the count
 
 
+def test_a_distance_is_along_the_normal_however_the_maps_look_at_it():
+    turn = np.radians(50.0)
+    pose = np.eye(4)
+    pose[:3, :3] = [[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0, np.cos(turn)]]
+    pose[:3, 3] = [0, 0, 1.0] - 0.6 * pose[:3, 2]
+    column, row = np.meshgrid(np.arange(CAMERA.width), np.arange(CAMERA.height))
+    ray = np.stack([(column - CAMERA.cx) / CAMERA.fx, (row - CAMERA.cy) / CAMERA.fy, np.ones(row.shape)], axis=-1)
+    depth = (1.0 - pose[2, 3]) / (ray @ pose[2, :3])  # of the plane z = 1
+    maps = DepthMaps(("a.png",), (CAMERA,), pose[None], np.where(depth > 0, depth, 0)[None].astype(np.float32))
+    found = predicted_error(depth_only(maps), wall(z=1.002))
+    assert found is not None
+    assert_allclose([found["median"], found["p95"]], 2.0, rtol=0, atol=0.02)
+
+
 def test_what_was_filled_is_worse_than_all_that_was_seen():
     views = depth_only(maps_of_wall(SIGMA))
     plain, filled = predicted_error(views, wall()), predicted_error(views, wall(), filled_share=0.1)
