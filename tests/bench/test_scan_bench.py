@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 
 from vto_pipeline.bench.own_process import run_vto
 from vto_pipeline.bench.scan.captures import scan_row
-from vto_pipeline.bench.scan.truth import beside_truth, scale_of
+from vto_pipeline.bench.scan.truth import beside_truth, rims_off, scale_of
 from vto_pipeline.io.meshes import write_ply
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -40,6 +40,18 @@ def test_a_garment_half_of_which_is_missing_is_incomplete_and_not_inaccurate(vas
     assert 0.4 < found["complete_2mm"] < 0.6
     assert (found["openings"], found["true_openings"]) == (2, 2)
     assert_allclose(found["scale_off_percent"], 0.0, rtol=0, atol=0.05)  # of one percent
+
+
+@pytest.mark.parametrize("depth", [0.0, 0.05, 0.1])
+def test_a_notch_in_a_rim_is_seen_in_its_length(vase, depth):
+    """A slot so deep, one face of 3 degrees wide, makes the rim longer by twice its depth."""
+    middle = vase.vertices[vase.faces].mean(axis=1)
+    turn = np.degrees(np.arctan2(middle[:, 2], middle[:, 0]))
+    slot = (turn > 0) & (turn < 4) & (middle[:, 1] > 0.6 - depth)
+    upper = vase.vertices[59::60]
+    whole = np.linalg.norm(upper - np.roll(upper, -1, axis=0), axis=1).sum()
+    off = rims_off(TriangleMesh(vase.vertices, vase.faces[~slot]), vase)
+    assert_allclose(off, 200.0 * depth / whole, rtol=0, atol=2.5)  # one row of faces is 10 mm, 1 % twice; the wall slants
 
 
 def test_a_scan_that_takes_too_long_is_ended(tmp_path):

@@ -14,7 +14,8 @@ from vto_pipeline.bench.scan.captures import KINDS, scan_row
 
 _COLUMNS = (
     *("capture", "kind", "exit", "seconds", "peak_mb", "median_mm", "p95_mm", "p99_mm", "back_p95_mm", "complete_2mm"),
-    *("openings", "true_openings", "scale_off_percent", "said_scale_percent", "predicted_p95_mm", "reason"),
+    *("openings", "true_openings", "rim_off_percent", "scale_off_percent", "said_scale_percent", "predicted_median_mm"),
+    *("predicted_p95_mm", "reason"),
 )
 
 

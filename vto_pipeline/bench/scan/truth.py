@@ -6,6 +6,7 @@ import numpy as np
 
 from vto_pipeline.bench.bench import Value
 from vto_pipeline.bench.demo import SAMPLES, distances, summarise
+from vto_pipeline.garment.loop_evidence import measure_loops
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import boundary_loops
@@ -18,7 +19,8 @@ _KEPT = 0.9
 
 
 def beside_truth(garment: TriangleMesh, truth: TriangleMesh) -> dict[str, Value]:
-    """Return distances both ways [mm], the share of the truth within 2 mm, openings of both, and the scale's error.
+    """Return distances both ways [mm], the share of the truth within 2 mm, openings of both, by how much the length of
+    one is off at worst, and the scale's error.
 
     Args:
         garment: As scanned, in the frame of the truth.
@@ -31,8 +33,23 @@ def beside_truth(garment: TriangleMesh, truth: TriangleMesh) -> dict[str, Value]
         "complete_2mm": back["within_2mm"],
         "openings": len(boundary_loops(garment)),
         "true_openings": len(boundary_loops(truth)),
+        "rim_off_percent": rims_off(garment, truth),
         "scale_off_percent": 100.0 * (scale_of(garment, truth) - 1.0),
     }
+
+
+def rims_off(garment: TriangleMesh, truth: TriangleMesh) -> float | None:
+    """Return how much longer or shorter an opening is than the true one nearest to it, at worst [%].
+
+    None where one of the two is closed.
+    """
+    found, true = measure_loops(garment), measure_loops(truth)
+    if not found or not true:
+        return None
+    places = np.array([one.center for one in true])
+    nearest = [true[int(np.argmin(np.linalg.norm(places - one.center, axis=1)))] for one in found]
+    off = [100.0 * (one.perimeter / its.perimeter - 1.0) for one, its in zip(found, nearest, strict=True)]
+    return max(off, key=abs)
 
 
 def scale_of(garment: TriangleMesh, truth: TriangleMesh) -> float:
