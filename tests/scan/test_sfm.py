@@ -8,9 +8,10 @@ import cv2
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scan_scene import distances
+from scan_scene import distances, make_scene, orbit, photos
 
 from vto_pipeline.errors import ScanError
+from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.scan.photos import scale as scale_module
@@ -109,6 +110,47 @@ def test_corners_on_one_line_fix_no_floor(sparse, shot, true_cameras, monkeypatc
     cameras, _ = apply_board(shot[0], true_cameras, sparse[1], ScaleConfig(), job)
     assert cameras is true_cameras
     assert "one line" in job.warnings[0]
+
+
+def test_a_faint_print_is_placed_by_fainter_features_where_the_usual_ones_place_few(tmp_path):
+    """A moving camera, a plain floor, and a quarter of the usual contrast: some 70 features a photo, and no pair.
+
+    So few points fit a lens that bends by 13 % at the corners, with a focal length 14 % too long.
+    """
+    poses, job = orbit(24, elevations_deg=(15.0,)), Job()
+    faint = make_scene(contrast=0.25)
+    faint.floor[:] = 150
+    found = photos(faint, tmp_path / "faint", poses, Intrinsics(480, 360, 528.0, 528.0, 239.5, 179.5), board=False)
+    cameras, _ = estimate_cameras(found, SfmConfig(enough_features=50), job)
+    assert any("fainter" in note for note in job.notes)
+    assert len(cameras.names) == len(poses)
+    centers, truth = cameras.world_from_cam[:, :3, 3], poses[:, :3, 3]
+    scale, transform = fit_similarity(centers, truth)
+    error = np.linalg.norm(scale * centers @ transform[:3, :3].T + transform[:3, 3] - truth, axis=1)
+    assert np.median(error) < 1e-2  # at 1 m and 1.9 mm per pixel
+    assert any("straight" in note for note in job.notes)
+    assert cameras.intrinsics[0].k1 == 0.0
+    assert_allclose(cameras.intrinsics[0].fx, 528.0, rtol=0.02, atol=0)  # known from 1,400 points
+
+
+def test_a_lens_that_bends_is_found_where_photos_need_it(shot, tmp_path):
+    """The photos resampled as a lens with k1 = -0.3 shows them: it moves the corners by 10 %."""
+    truth = shot[0].intrinsics[0]
+    v, u = np.mgrid[: truth.height, : truth.width]
+    bent = np.stack([(u - truth.cx) / truth.fx, (v - truth.cy) / truth.fy], axis=-1)
+    flat = bent.copy()
+    for _ in range(30):  # x (1 + k1 r²) = bent
+        flat = bent / (1.0 - 0.3 * (flat**2).sum(axis=-1, keepdims=True))
+    place = (flat * truth.fx + [truth.cx, truth.cy]).astype(np.float32)
+    paths = []
+    for path in shot[0].paths:
+        picture = cv2.remap(cv2.imread(str(path)), place[..., 0], place[..., 1], cv2.INTER_CUBIC)
+        paths.append(tmp_path / path.name)
+        cv2.imwrite(str(paths[-1]), picture, [cv2.IMWRITE_JPEG_QUALITY, 95])
+    cameras, _ = estimate_cameras(PhotoSet(tuple(paths), shot[0].intrinsics), SfmConfig(), Job())
+    assert len(cameras.names) == len(paths)
+    assert -0.6 < cameras.intrinsics[0].k1 < -0.15  # the object fills the middle, which fixes it no better
+    assert_allclose(cameras.intrinsics[0].fx, truth.fx, rtol=0.02, atol=0)
 
 
 def grey_photos(folder, count, values):

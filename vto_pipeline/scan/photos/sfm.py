@@ -32,6 +32,8 @@ ADVICE = (
 
 MOST = 0.75
 """Faint features that place fewer of the photos may place them wrongly: 12 of 24 were 0.8 m off."""
+FEW = 0.8
+"""Where a smaller share of the photos could be placed, fainter features are looked for."""
 
 
 class SfmConfig(Config):
@@ -71,10 +73,14 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
         pairs, fixed_camera = match(photos, database, config.features, job)
         job.progress(0.7, f"placing cameras, {pairs} matched pairs")
         model = map_photos(database, photos.paths[0].parent, len(photos.paths), job)
-        if fixed_camera and (model is None or model.num_reg_images() < len(photos.paths)):
-            again, found, matched = _beside_background(photos, Path(scratch), config, job)
-            if _is_better(again, model, len(photos.paths)):
-                model, counts, pairs = again, found, matched
+        placed, again = 0 if model is None else model.num_reg_images(), None
+        if fixed_camera and placed < len(photos.paths):
+            again = _beside_background(photos, Path(scratch), config, job)
+        elif placed < FEW * len(photos.paths) and database.stem == "sure":
+            job.note(f"only {placed} of {len(photos.paths)} photos could be placed: looking for fainter features")
+            again = _faint(photos, photos, Path(scratch) / "faint", config, job)
+        if again is not None and _is_better(again[0], model, len(photos.paths)):
+            model, counts, pairs = again
     names = [path.name for path in photos.paths]
     if model is None or model.num_reg_images() < MIN_PHOTOS:
         each = ", ".join(f"{name} {count}" for name, count in zip(names, counts, strict=True))
@@ -101,24 +107,32 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
 
 def _beside_background(
     photos: PhotoSet, scratch: Path, config: SfmConfig, job: Job
-) -> tuple[Any | None, list[int], int]:
+) -> tuple[Any | None, list[int], int] | None:
     """Try again with the background painted over: its many features hide that the object has few, and faint ones.
 
     Returns:
-        The model or None, features per photo, and matched pairs.
+        The model or None, features per photo, and matched pairs; None where the background is not known.
     """
     masks = still_pixels(photos)
     if masks is None:
-        return None, [], 0
+        return None
     job.progress(0.8, "features beside the background")
     share = float(np.mean([mask.mean() for mask in masks]))
     job.measure(background_share=round(share, 3))
     job.note(f"looking for fainter features beside the background, which is {100 * share:.0f} % of the photos")
     beside = scratch / "beside"
     (beside / "photos").mkdir(parents=True)
-    painted, database = paint_over(photos, masks, beside / "photos"), beside / "faint.db"
-    counts = detect(painted, database, FAINT, config.features)
-    pairs, _ = match(painted, database, config.features, Job(seed=job.seed))
+    return _faint(paint_over(photos, masks, beside / "photos"), photos, beside, config, job)
+
+
+def _faint(
+    shown: PhotoSet, photos: PhotoSet, folder: Path, config: SfmConfig, job: Job
+) -> tuple[Any | None, list[int], int]:
+    """Place the photos by faint features of what is shown of them; returns what `_beside_background` does."""
+    folder.mkdir(exist_ok=True)
+    database = folder / "faint.db"
+    counts = detect(shown, database, FAINT, config.features)
+    pairs, _ = match(shown, database, config.features, Job(seed=job.seed))
     return map_photos(database, photos.paths[0].parent, len(photos.paths), job), counts, pairs
 
 

@@ -12,10 +12,17 @@ from vto_pipeline.scan.library_message import COLMAP_ERRORS, library_message
 
 MIN_PHOTOS = 3
 """Smaller models are chance."""
+STRAIGHT = 0.04
+"""A lens that moves what the picture's corner shows by no more than this share is taken as it was found."""
+CLEARLY, FEWER = 1.05, 0.98
+"""One that bends more must be needed: without it the error is so many times as large, or so much of the sightings is
+left. Where points are few, a bent lens and a wrong focal length explain them as well as the true ones."""
 
 
 def map_photos(database: Path, folder: Path, count: int, job: Job) -> Any | None:
     """Reconstruct with the global mapper; if it leaves photos out, try the incremental one and keep the better model.
+
+    A lens that bends much is refined only where photos need it; else it keeps what is known of it, or is straight.
 
     Pan et al. 2024 (GLOMAP); Schönberger and Frahm 2016 (COLMAP). Solved by one thread: with more, the sums of the
     bundle adjustment, and so the last bits of every camera, change from run to run.
@@ -29,11 +36,42 @@ def map_photos(database: Path, folder: Path, count: int, job: Job) -> Any | None
     Returns:
         The pycolmap Reconstruction with the most photos, the least error among equals; None when there is none.
     """
+    found = _best(database, folder, count, job, bent=True)
+    if found is None or bend(found) <= STRAIGHT:
+        return found
+    straight = _best(database, folder, count, job, bent=False)
+    if straight is None or not _explains_as_much(straight, found):
+        return found
+    job.note(f"took the lens as straight: one that moves the corners by {100 * bend(found):.0f} % is no better")
+    return straight
+
+
+def bend(model: Any) -> float:
+    """Return by what share of its distance from the middle the lens moves what a corner of the picture shows."""
+    found = 0.0
+    for camera in model.cameras.values():
+        focal, cx, cy, k1 = camera.params
+        reach_sq = max(cx, camera.width - cx) ** 2 + max(cy, camera.height - cy) ** 2
+        found = max(found, abs(k1) * reach_sq / focal**2)
+    return found
+
+
+def _explains_as_much(model: Any, other: Any) -> bool:
+    """Return whether a model places as many photos as another, with about as many sightings and no larger error."""
+    if model.num_reg_images() < other.num_reg_images():
+        return False
+    if model.compute_num_observations() < FEWER * other.compute_num_observations():
+        return False
+    return bool(model.compute_mean_reprojection_error() <= CLEARLY * other.compute_mean_reprojection_error())
+
+
+def _best(database: Path, folder: Path, count: int, job: Job, bent: bool) -> Any | None:
+    """Return the model with the most photos, the least error among equals."""
     models: list[Any] = []
     for name, mapper in (("global", _global), ("incremental", _incremental)):
         if max((model.num_reg_images() for model in models), default=0) < count:
             try:
-                models += mapper(_copy(database, name), folder, job.seed)
+                models += mapper(_copy(database, name if bent else f"{name}_straight"), folder, job.seed, bent)
             except COLMAP_ERRORS as error:
                 job.note(f"the {name} mapper failed: {library_message(error)}")
     return max(models, key=_merit, default=None)
@@ -55,7 +93,7 @@ def _copy(database: Path, name: str) -> Path:
     return copied
 
 
-def _global(database: Path, folder: Path, seed: int) -> list[Any]:
+def _global(database: Path, folder: Path, seed: int, bent: bool) -> list[Any]:
     import pycolmap
 
     if not pycolmap.calibrate_view_graph(database, pycolmap.ViewGraphCalibrationOptions(random_seed=seed)):
@@ -66,15 +104,17 @@ def _global(database: Path, folder: Path, seed: int) -> list[Any]:
     for part in (options.mapper.rotation_averaging, options.mapper.global_positioning, options.mapper.retriangulation):
         part.random_seed = seed
     options.mapper.bundle_adjustment.ceres.solver_options.num_threads = 1
+    options.mapper.bundle_adjustment.refine_extra_params = bent
     models = pycolmap.global_mapping(database, folder, database.parent, options)
     return [models[key] for key in sorted(models)]
 
 
-def _incremental(database: Path, folder: Path, seed: int) -> list[Any]:
+def _incremental(database: Path, folder: Path, seed: int, bent: bool) -> list[Any]:
     import pycolmap
 
     options = pycolmap.IncrementalPipelineOptions(num_threads=1, random_seed=seed, min_model_size=MIN_PHOTOS)
     options.mapper.num_threads = 1
     options.mapper.random_seed = options.triangulation.random_seed = seed
+    options.ba_refine_extra_params = bent
     models = pycolmap.incremental_mapping(database, folder, database.parent, options)
     return [models[key] for key in sorted(models)]
