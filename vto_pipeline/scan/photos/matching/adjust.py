@@ -1,0 +1,190 @@
+"""Cameras adjusted to what neighbouring photos show of thousands of points, not only of features.
+
+Features of a faint print are few, and placed to half a pixel: cameras are then off by more than the depths that stereo
+compares. `tracks` adds sightings that are many and sharp, and one more bundle adjustment takes both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vto_pipeline.io.captures.images import read_image
+from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.camera import Intrinsics
+from vto_pipeline.model.frames import PhotoSet
+from vto_pipeline.model.job import Job
+from vto_pipeline.scan.photos.matching.tracks import TrackedPhoto, follow, without_light
+
+LONGER_SIDE = 1600
+"""Larger photos are scaled down to this [px]."""
+NEIGHBOURS, LEAST_SHARED = 6, 10
+"""Photos that each photo is compared with, and the sparse points that they share with it at least."""
+NARROWEST_DEG, WIDEST_DEG = 2.0, 40.0
+"""Photos that see their common points from nearer directions tell nothing, from farther ones they look different."""
+LEAST_VIEWS = 3
+"""Photos that show a point: with two, what flowed wrongly along the ray is not noticed."""
+FAR_OFF_PX = 6.0
+"""A sighting so far from where its point would be shown is wrong, however the cameras are adjusted [px]."""
+SOFT_PX = 0.4
+"""Errors beyond this lose their weight [px]."""
+
+
+Track = tuple[FloatArray, list[tuple[int, int]]]
+"""A point (3,), and its sightings: photo, and number of its place there."""
+
+
+def adjust(model: Any, photos: PhotoSet, bent: bool, job: Job) -> int:
+    """Adjust a pycolmap Reconstruction in place; its points are those it had.
+
+    Args:
+        model: Placed photos and sparse points.
+        photos: Their files.
+        bent: Whether the lens's distortion is adjusted too.
+        job: Receives progress.
+
+    Returns:
+        How many points were added for the adjustment.
+    """
+    import pycolmap
+
+    ids = sorted(number for number, image in model.images.items() if image.has_pose)
+    shared = _shared(model, ids)
+    views, scales = _views(model, photos, ids)
+    extra: dict[int, list[FloatArray]] = {number: [] for number in ids}
+    tracks: list[Track] = []
+    for index, number in enumerate(ids):
+        near = _neighbours(index, shared, views)
+        corners, seen = follow(views[index], [views[k] for k in near])
+        sighted = np.concatenate([corners[None], seen])
+        points, good = _triangulate([views[index], *(views[k] for k in near)], sighted)
+        for n in np.flatnonzero(good.sum(axis=0) >= LEAST_VIEWS):
+            track = []
+            for m in np.flatnonzero(good[:, n]):
+                photo = index if m == 0 else near[m - 1]
+                extra[ids[photo]].append((sighted[m, n] + 0.5) / scales[photo])
+                track.append((ids[photo], model.images[ids[photo]].num_points2D() + len(extra[ids[photo]]) - 1))
+            tracks.append((points[n], track))
+        job.progress(0.85 + 0.1 * (index + 1) / len(ids), f"adjusting cameras, photo {number} of {len(ids)}")
+    fresh = _enter(model, extra, tracks)
+    options = pycolmap.BundleAdjustmentOptions(refine_extra_params=bent, print_summary=False)
+    options.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
+    options.ceres.loss_function_scale = SOFT_PX
+    options.ceres.solver_options.num_threads = 1  # with more, the last bits change from run to run
+    options.ceres.solver_options.max_num_iterations = 50
+    options.ceres.solver_options.function_tolerance = 1e-6
+    pycolmap.bundle_adjustment(model, options)
+    for number in fresh:
+        model.delete_point3D(number)
+    model.update_point_3d_errors()
+    return len(fresh)
+
+
+def _enter(model: Any, extra: Mapping[int, list[FloatArray]], tracks: list[Track]) -> list[int]:
+    """Add sightings and points to a model, and return the points' numbers. Its own points keep their order.
+
+    COLMAP takes the sightings of a photo all at once only.
+    """
+    import pycolmap
+
+    places = {number: [point.xy for point in image.points2D] for number, image in model.images.items()}
+    own = []
+    for number in sorted(model.points3D):
+        point = model.points3D[number]
+        sightings = [(element.image_id, element.point2D_idx) for element in point.track.elements]
+        own.append((np.array(point.xyz), sightings, np.array(point.color)))
+    model.delete_all_points2D_and_points3D()
+    for number, before in places.items():
+        both = [*before, *extra.get(number, [])]
+        model.images[number].points2D = pycolmap.Point2DList([pycolmap.Point2D(xy) for xy in both])
+
+    def add(xyz: FloatArray, sightings: list[tuple[int, int]], color: NDArray[np.uint8]) -> int:
+        track = pycolmap.Track([pycolmap.TrackElement(photo, place) for photo, place in sightings])
+        return int(model.add_point3D(xyz, track, color))
+
+    for xyz, sightings, color in own:
+        add(xyz, sightings, color)
+    return [add(xyz, sightings, np.zeros(3, np.uint8)) for xyz, sightings in tracks]
+
+
+def _views(model: Any, photos: PhotoSet, ids: list[int]) -> tuple[list[TrackedPhoto], list[float]]:
+    """Return the placed photos, and how much smaller than the files they are."""
+    import cv2
+
+    paths = {path.name: path for path in photos.paths}
+    views, scales = [], []
+    for number in ids:
+        image = model.images[number]
+        camera = model.cameras[image.camera_id]
+        focal, cx, cy, k1 = camera.params
+        lens = Intrinsics(camera.width, camera.height, focal, focal, cx - 0.5, cy - 0.5, k1)
+        gray: Any = cv2.cvtColor(read_image(paths[image.name]), cv2.COLOR_RGB2GRAY)
+        scale = min(1.0, LONGER_SIDE / max(gray.shape))
+        if scale < 1.0:
+            size = (round(gray.shape[1] * scale), round(gray.shape[0] * scale))
+            gray, lens = cv2.resize(gray, size, interpolation=cv2.INTER_AREA), lens.resized(*size)
+        scale = lens.width / camera.width
+        pose = np.eye(4)
+        pose[:3] = image.cam_from_world().matrix()
+        at = [point for point in image.points2D if point.has_point3D()]
+        pixels = np.array([point.xy for point in at]).reshape(-1, 2) * scale - 0.5
+        points = np.array([model.points3D[point.point3D_id].xyz for point in at]).reshape(-1, 3)
+        views.append(TrackedPhoto(without_light(gray), lens, pose, pixels, points))
+        scales.append(scale)
+    return views, scales
+
+
+def _shared(model: Any, ids: list[int]) -> NDArray[np.int64]:
+    """Return how many sparse points each two photos share, shape (C, C)."""
+    place = {number: index for index, number in enumerate(ids)}
+    shared = np.zeros((len(ids), len(ids)), np.int64)
+    for point in model.points3D.values():
+        viewers = sorted({place[element.image_id] for element in point.track.elements})
+        shared[np.ix_(viewers, viewers)] += 1
+    np.fill_diagonal(shared, 0)
+    return shared
+
+
+def _neighbours(index: int, shared: NDArray[np.int64], views: list[TrackedPhoto]) -> list[int]:
+    """Return the photos to compare one with: those that share most of its points, from other directions."""
+    near: list[int] = []
+    middle = np.median(views[index].points, axis=0) if len(views[index].points) else np.zeros(3)
+    own = views[index].center - middle
+    for other in np.argsort(-shared[index], kind="stable"):
+        if shared[index, other] < LEAST_SHARED or len(near) == NEIGHBOURS:
+            break
+        its = views[other].center - middle
+        angle = np.degrees(np.arccos(np.clip(own @ its / np.linalg.norm(own) / np.linalg.norm(its), -1, 1)))
+        if NARROWEST_DEG <= angle <= WIDEST_DEG:
+            near.append(int(other))
+    return near
+
+
+def _triangulate(views: list[TrackedPhoto], sighted: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return the points nearest to the rays of their sightings, and which sightings agree with them.
+
+    Args:
+        views: M photos.
+        sighted: Where they show N points [px], NaN where they do not, shape (M, N, 2).
+
+    Returns:
+        Points (N, 3), and which sightings (M, N) are good; none of a point whose rays are all but parallel.
+    """
+    count = sighted.shape[1]
+    good = np.isfinite(sighted).all(axis=2)
+    system, target = np.zeros((count, 3, 3)), np.zeros((count, 3))
+    for view, pixels, has in zip(views, sighted, good, strict=True):
+        rays = view.rays(pixels[has])
+        across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
+        system[has] += across
+        target[has] += across @ view.center
+    sharp = np.linalg.eigvalsh(system)[:, 0] > np.sin(np.radians(NARROWEST_DEG)) ** 2
+    points = np.zeros((count, 3))
+    points[sharp] = np.linalg.solve(system[sharp], target[sharp][..., None])[..., 0]
+    for view, pixels, has in zip(views, sighted, good, strict=True):
+        with np.errstate(invalid="ignore"):
+            has &= sharp & (np.linalg.norm(view.project(points) - pixels, axis=1) < FAR_OFF_PX)
+    return points, good
