@@ -18,6 +18,7 @@ from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
 from vto_pipeline.model.settings import Config
+from vto_pipeline.scan.photos.matching.adjust import adjust
 from vto_pipeline.scan.photos.matching.features import FAINT, SURE, FeatureConfig, detect, match
 from vto_pipeline.scan.photos.matching.mapping import MIN_PHOTOS, map_photos
 from vto_pipeline.scan.photos.matching.still_background import paint_over, still_pixels
@@ -87,6 +88,7 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
         few = f"fewer than {MIN_PHOTOS} of {len(names)} photos could be placed"
         problem = f"{few} ({pairs} pairs match); features per photo: {each}"
         raise ScanError(problem, where=str(photos.paths[0].parent), hint=ADVICE)
+    model = adjust(model, photos, job)
     cameras, cloud = _upright(*_values(model, names, config))
     cloud = _without_surroundings(cameras, cloud, job)
     if cameras.unregistered:

@@ -6,6 +6,7 @@ compares. `tracks` adds sightings that are many and sharp, and one more bundle a
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from typing import Any
 
@@ -17,13 +18,14 @@ from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
+from vto_pipeline.scan.library_message import COLMAP_ERRORS, library_message
 from vto_pipeline.scan.photos.matching.tracks import TrackedPhoto, follow, without_light
 
 LONGER_SIDE = 1600
 """Larger photos are scaled down to this [px]."""
-NEIGHBOURS, LEAST_SHARED = 6, 10
+NEIGHBOURS, LEAST_SHARED = 8, 5
 """Photos that each photo is compared with, and the sparse points that they share with it at least."""
-NARROWEST_DEG, WIDEST_DEG = 2.0, 40.0
+NARROWEST_DEG, WIDEST_DEG = 2.0, 45.0
 """Photos that see their common points from nearer directions tell nothing, from farther ones they look different."""
 LEAST_VIEWS = 3
 """Photos that show a point: with two, what flowed wrongly along the ray is not noticed."""
@@ -31,24 +33,42 @@ FAR_OFF_PX = 6.0
 """A sighting so far from where its point would be shown is wrong, however the cameras are adjusted [px]."""
 SOFT_PX = 0.4
 """Errors beyond this lose their weight [px]."""
+LENS = 50
+"""So many points a photo, spread as they are, tell how the lens bends; with fewer it stays as it was found."""
+SPOILT = 1.2
+"""An adjustment after which the features' own points are off by so many times as much has failed."""
 
 
 Track = tuple[FloatArray, list[tuple[int, int]]]
 """A point (3,), and its sightings: photo, and number of its place there."""
 
 
-def adjust(model: Any, photos: PhotoSet, bent: bool, job: Job) -> int:
-    """Adjust a pycolmap Reconstruction in place; its points are those it had.
+def adjust(model: Any, photos: PhotoSet, job: Job) -> Any:
+    """Return a pycolmap Reconstruction with its cameras adjusted; its points are those it had.
 
     Args:
         model: Placed photos and sparse points.
         photos: Their files.
-        bent: Whether the lens's distortion is adjusted too.
-        job: Receives progress.
-
-    Returns:
-        How many points were added for the adjustment.
+        job: Receives how many points were added for the adjustment; notified where it failed.
     """
+    import cv2
+
+    adjusted, before = copy.deepcopy(model), model.compute_mean_reprojection_error()
+    try:
+        added = _adjust(adjusted, photos, job)
+    except (*COLMAP_ERRORS, cv2.error) as error:
+        job.note(f"cameras stay as their features placed them: {library_message(error)}")
+        return model
+    after = adjusted.compute_mean_reprojection_error()
+    if not after <= SPOILT * before:
+        job.note(f"cameras stay as their features placed them: an adjustment takes {before:.2f} px to {after:.2f}")
+        return model
+    job.measure(tracked_points=added)
+    return adjusted
+
+
+def _adjust(model: Any, photos: PhotoSet, job: Job) -> int:
+    """Adjust a model in place, and return how many points were added for it."""
     import pycolmap
 
     ids = sorted(number for number, image in model.images.items() if image.has_pose)
@@ -66,11 +86,11 @@ def adjust(model: Any, photos: PhotoSet, bent: bool, job: Job) -> int:
             for m in np.flatnonzero(good[:, n]):
                 photo = index if m == 0 else near[m - 1]
                 extra[ids[photo]].append((sighted[m, n] + 0.5) / scales[photo])
-                track.append((ids[photo], model.images[ids[photo]].num_points2D() + len(extra[ids[photo]]) - 1))
+                track.append((ids[photo], len(extra[ids[photo]]) - 1))
             tracks.append((points[n], track))
-        job.progress(0.85 + 0.1 * (index + 1) / len(ids), f"adjusting cameras, photo {number} of {len(ids)}")
+        job.progress(0.85 + 0.1 * (index + 1) / len(ids), f"adjusting cameras, photo {index + 1} of {len(ids)}")
     fresh = _enter(model, extra, tracks)
-    options = pycolmap.BundleAdjustmentOptions(refine_extra_params=bent, print_summary=False)
+    options = pycolmap.BundleAdjustmentOptions(refine_extra_params=len(fresh) >= LENS * len(ids), print_summary=False)
     options.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
     options.ceres.loss_function_scale = SOFT_PX
     options.ceres.solver_options.num_threads = 1  # with more, the last bits change from run to run
@@ -86,20 +106,21 @@ def adjust(model: Any, photos: PhotoSet, bent: bool, job: Job) -> int:
 def _enter(model: Any, extra: Mapping[int, list[FloatArray]], tracks: list[Track]) -> list[int]:
     """Add sightings and points to a model, and return the points' numbers. Its own points keep their order.
 
-    COLMAP takes the sightings of a photo all at once only.
+    COLMAP takes the sightings of a photo all at once only. Features of no point are dropped.
     """
     import pycolmap
 
-    places = {number: [point.xy for point in image.points2D] for number, image in model.images.items()}
+    places: dict[int, list[FloatArray]] = {number: list(extra.get(number, [])) for number in model.images}
     own = []
     for number in sorted(model.points3D):
-        point = model.points3D[number]
-        sightings = [(element.image_id, element.point2D_idx) for element in point.track.elements]
+        point, sightings = model.points3D[number], []
+        for element in point.track.elements:
+            places[element.image_id].append(model.images[element.image_id].point2D(element.point2D_idx).xy)
+            sightings.append((element.image_id, len(places[element.image_id]) - 1))
         own.append((np.array(point.xyz), sightings, np.array(point.color)))
     model.delete_all_points2D_and_points3D()
-    for number, before in places.items():
-        both = [*before, *extra.get(number, [])]
-        model.images[number].points2D = pycolmap.Point2DList([pycolmap.Point2D(xy) for xy in both])
+    for number, pixels in places.items():
+        model.images[number].points2D = pycolmap.Point2DList([pycolmap.Point2D(xy) for xy in pixels])
 
     def add(xyz: FloatArray, sightings: list[tuple[int, int]], color: NDArray[np.uint8]) -> int:
         track = pycolmap.Track([pycolmap.TrackElement(photo, place) for photo, place in sightings])
@@ -129,7 +150,7 @@ def _views(model: Any, photos: PhotoSet, ids: list[int]) -> tuple[list[TrackedPh
         scale = lens.width / camera.width
         pose = np.eye(4)
         pose[:3] = image.cam_from_world().matrix()
-        at = [point for point in image.points2D if point.has_point3D()]
+        at = image.get_observation_points2D()
         pixels = np.array([point.xy for point in at]).reshape(-1, 2) * scale - 0.5
         points = np.array([model.points3D[point.point3D_id].xyz for point in at]).reshape(-1, 3)
         views.append(TrackedPhoto(without_light(gray), lens, pose, pixels, points))

@@ -18,7 +18,7 @@ from vto_pipeline.model.camera import Intrinsics
 
 CORNERS, APART_PX, STRENGTH = 600, 6, 0.01
 """Corners that are followed in each photo at most, how far apart, and their least strength [share of the best]."""
-NEAR_PX = 30
+NEAR_PX = 60
 """So near to a sparse point, depth is known well enough to warp by [px of 1000]."""
 CELL = 4
 """Depth is interpolated for blocks of so many pixels."""
@@ -26,7 +26,7 @@ BLUR, CONTRAST = 8.0, 40.0
 """Light is taken out: grey levels less their mean over so many pixels, by their spread, which becomes so many levels."""
 FAINTEST = 2.0
 """A smaller spread is noise [grey levels]."""
-WINDOW, LEVELS = 21, 2
+WINDOW, LEVELS = 15, 2
 """Of the flow [px], and pyramid levels above the picture."""
 ROUND_TRIP_PX, UNLIKE = 0.3, 30.0
 """Largest distance between where a corner was and where it flows back to, and mean difference of the windows."""
@@ -138,23 +138,32 @@ def _flow(
 
 
 def _depth(photo: TrackedPhoto) -> FloatArray:
-    """Return the depth between a photo's sparse points for blocks of pixels; NaN far from any of them."""
+    """Return the depth between a photo's sparse points for blocks of pixels; NaN far from any of them.
+
+    Inverse depth is linear over each triangle of Delaunay's triangulation, as it is on a plane.
+    """
     import cv2
-    from scipy.interpolate import LinearNDInterpolator
-    from scipy.spatial import QhullError
+    from scipy.spatial import Delaunay, QhullError
 
     height, width = photo.gray.shape
-    blocks = np.full((height // CELL, width // CELL), np.nan)
-    depth = photo.points @ photo.cam_from_world[2, :3] + photo.cam_from_world[2, 3]
+    shape = height // CELL, width // CELL
+    place = (photo.pixels + 0.5) / CELL - 0.5
+    inverse = 1.0 / (photo.points @ photo.cam_from_world[2, :3] + photo.cam_from_world[2, 3])
     try:
-        between = LinearNDInterpolator(photo.pixels, 1.0 / depth)
-    except QhullError:  # fewer than three, or all on one line
-        return blocks
-    dots = np.zeros(blocks.shape, np.uint8)
-    column, row = (photo.pixels / CELL).astype(int).T
-    dots[row.clip(0, len(dots) - 1), column.clip(0, dots.shape[1] - 1)] = 1
+        triangles = Delaunay(place).simplices
+    except (QhullError, ValueError):  # fewer than three points, or all on one line
+        return np.full(shape, np.nan)
+    which, dots = np.zeros(shape, np.int32), np.zeros(shape, np.uint8)
+    for number, corners in enumerate(np.rint(place).astype(np.int32)[triangles]):
+        cv2.fillConvexPoly(which, corners, number + 1)
+    column, row = np.rint(place).astype(int).T
+    dots[row.clip(0, shape[0] - 1), column.clip(0, shape[1] - 1)] = 1
     reach = max(1, round(NEAR_PX * max(height, width) / 1000 / CELL))
     near = cv2.dilate(dots, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1,) * 2)) > 0
-    v, u = np.nonzero(near)
-    blocks[near] = 1.0 / between(CELL * (np.column_stack([u, v]) + 0.5) - 0.5)
-    return blocks
+    spot = np.concatenate([place[triangles], np.ones((*triangles.shape, 1))], axis=2)
+    planes = np.linalg.pinv(spot) @ inverse[triangles][..., None]
+    v, u = np.mgrid[: shape[0], : shape[1]]
+    plane = planes[np.maximum(which - 1, 0), :, 0]
+    found = plane[..., 0] * u + plane[..., 1] * v + plane[..., 2]
+    inside = near & (which > 0) & (found > 0.5 * inverse.min()) & (found < 2.0 * inverse.max())
+    return np.where(inside, 1.0 / np.where(inside, found, 1.0), np.nan)
