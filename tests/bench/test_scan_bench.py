@@ -51,7 +51,7 @@ def test_a_notch_in_a_rim_is_seen_in_its_length(vase, depth):
     upper = vase.vertices[59::60]
     whole = np.linalg.norm(upper - np.roll(upper, -1, axis=0), axis=1).sum()
     off = rims_off(TriangleMesh(vase.vertices, vase.faces[~slot]), vase)
-    assert_allclose(off, 200.0 * depth / whole, rtol=0, atol=2.5)  # one row of faces is 10 mm, 1 % twice; the wall slants
+    assert_allclose(off, 200.0 * depth / whole, rtol=0, atol=2.5)  # a row of faces is 10 mm, 1 % twice; walls slant
 
 
 def test_a_scan_that_takes_too_long_is_ended(tmp_path):

@@ -13,14 +13,14 @@ from pydantic import Field
 
 from vto_pipeline.errors import ScanError
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.model.camera import CameraSet, Intrinsics
+from vto_pipeline.model.camera import CameraSet
 from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
 from vto_pipeline.model.settings import Config
 from vto_pipeline.scan.photos.matching.adjust import adjust
 from vto_pipeline.scan.photos.matching.features import FAINT, SURE, FeatureConfig, detect, match
-from vto_pipeline.scan.photos.matching.mapping import MIN_PHOTOS, map_photos
+from vto_pipeline.scan.photos.matching.mapping import MIN_PHOTOS, lens_of, map_photos
 from vto_pipeline.scan.photos.matching.still_background import paint_over, still_pixels
 from vto_pipeline.scan.photos.region import object_region
 from vto_pipeline.scan.upright import upright_from_scan
@@ -163,7 +163,7 @@ def _values(model: Any, names: list[str], config: SfmConfig) -> tuple[CameraSet,
     poses = np.tile(np.eye(4), (len(registered), 1, 1))
     for pose, name in zip(poses, registered, strict=True):
         pose[:3] = placed[name].cam_from_world().inverse().matrix()
-    intrinsics = tuple(_intrinsics(model.cameras[placed[name].camera_id]) for name in registered)
+    intrinsics = tuple(lens_of(model.cameras[placed[name].camera_id]) for name in registered)
     unregistered = tuple(name for name in names if name not in placed)
     centers = {placed[name].image_id: pose[:3, 3] for name, pose in zip(registered, poses, strict=True)}
     points, normals, colors = [], [], []
@@ -181,12 +181,6 @@ def _values(model: Any, names: list[str], config: SfmConfig) -> tuple[CameraSet,
         raise ScanError(f"no sparse point was seen by {config.min_views} photos", hint=ADVICE)
     cameras = CameraSet(registered, intrinsics, poses, metric=False, unregistered=unregistered)
     return cameras, PointCloud(np.array(points), np.array(normals), np.array(colors))
-
-
-def _intrinsics(camera: Any) -> Intrinsics:
-    """COLMAP counts pixels from the corner of the first one, we from its centre."""
-    focal, cx, cy, k1 = camera.params
-    return Intrinsics(camera.width, camera.height, focal, focal, cx - 0.5, cy - 0.5, k1)
 
 
 def _without_surroundings(cameras: CameraSet, cloud: PointCloud, job: Job) -> PointCloud:

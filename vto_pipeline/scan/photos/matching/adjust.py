@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from vto_pipeline.io.captures.images import read_image
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.scan.library_message import COLMAP_ERRORS, library_message
+from vto_pipeline.scan.photos.matching.mapping import lens_of
 from vto_pipeline.scan.photos.matching.tracks import TrackedPhoto, follow, without_light
 
 LONGER_SIDE = 1600
@@ -76,7 +76,7 @@ def _adjust(model: Any, photos: PhotoSet, job: Job) -> int:
     views, scales = _views(model, photos, ids)
     extra: dict[int, list[FloatArray]] = {number: [] for number in ids}
     tracks: list[Track] = []
-    for index, number in enumerate(ids):
+    for index in range(len(ids)):
         near = _neighbours(index, shared, views)
         corners, seen = follow(views[index], [views[k] for k in near])
         sighted = np.concatenate([corners[None], seen])
@@ -140,8 +140,7 @@ def _views(model: Any, photos: PhotoSet, ids: list[int]) -> tuple[list[TrackedPh
     for number in ids:
         image = model.images[number]
         camera = model.cameras[image.camera_id]
-        focal, cx, cy, k1 = camera.params
-        lens = Intrinsics(camera.width, camera.height, focal, focal, cx - 0.5, cy - 0.5, k1)
+        lens = lens_of(camera)
         gray: Any = cv2.cvtColor(read_image(paths[image.name]), cv2.COLOR_RGB2GRAY)
         scale = min(1.0, LONGER_SIDE / max(gray.shape))
         if scale < 1.0:
@@ -195,7 +194,7 @@ def _triangulate(views: list[TrackedPhoto], sighted: FloatArray) -> tuple[FloatA
         Points (N, 3), and which sightings (M, N) are good; none of a point whose rays are all but parallel.
     """
     count = sighted.shape[1]
-    good = np.isfinite(sighted).all(axis=2)
+    good: NDArray[np.bool_] = np.asarray(np.isfinite(sighted).all(axis=2))
     system, target = np.zeros((count, 3, 3)), np.zeros((count, 3))
     for view, pixels, has in zip(views, sighted, good, strict=True):
         rays = view.rays(pixels[has])

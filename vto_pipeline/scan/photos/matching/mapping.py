@@ -7,6 +7,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.job import Job
 from vto_pipeline.scan.library_message import COLMAP_ERRORS, library_message
 
@@ -44,6 +45,12 @@ def map_photos(database: Path, folder: Path, count: int, job: Job) -> Any | None
         return found
     job.note(f"took the lens as straight: one that moves the corners by {100 * bend(found):.0f} % is no better")
     return straight
+
+
+def lens_of(camera: Any) -> Intrinsics:
+    """Return a pycolmap Camera as ours: COLMAP counts pixels from the corner of the first one, we from its centre."""
+    focal, cx, cy, k1 = camera.params
+    return Intrinsics(camera.width, camera.height, focal, focal, cx - 0.5, cy - 0.5, k1)
 
 
 def bend(model: Any) -> float:

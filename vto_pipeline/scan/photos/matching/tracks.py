@@ -23,7 +23,7 @@ NEAR_PX = 60
 CELL = 4
 """Depth is interpolated for blocks of so many pixels."""
 BLUR, CONTRAST = 8.0, 40.0
-"""Light is taken out: grey levels less their mean over so many pixels, by their spread, which becomes so many levels."""
+"""Light is taken out: grey levels less their mean over so many pixels, and their spread made so many levels."""
 FAINTEST = 2.0
 """A smaller spread is noise [grey levels]."""
 WINDOW, LEVELS = 15, 2
@@ -109,13 +109,14 @@ def follow(photo: TrackedPhoto, others: list[TrackedPhoto]) -> tuple[FloatArray,
         return np.empty((0, 2)), np.empty((len(others), 0, 2))
     corners = np.asarray(found, np.float32).reshape(-1, 1, 2)
     v, u = np.nonzero(known)
-    shown = photo.unproject(CELL * (np.column_stack([u, v]) + 0.5) - 0.5, depth[known])
+    middle = CELL * (np.column_stack([u, v]).astype(np.float64) + 0.5) - 0.5
+    shown = photo.unproject(middle, depth[known])
     seen = np.full((len(others), len(corners), 2), np.nan)
     for index, other in enumerate(others):
         place = np.full((*depth.shape, 2), -1.0, np.float32)
         place[known] = np.nan_to_num(other.project(shown), nan=-1.0)
         place = cv2.resize(place, (width, height), interpolation=cv2.INTER_LINEAR)
-        warped = cv2.remap(other.gray, place[..., 0], place[..., 1], cv2.INTER_CUBIC)
+        warped: Any = cv2.remap(other.gray, place[..., 0], place[..., 1], cv2.INTER_CUBIC)
         there, back, good = _flow(photo.gray, warped, corners)
         there, good = there.reshape(-1, 2), good & (np.linalg.norm(back - corners, axis=2).ravel() < ROUND_TRIP_PX)
         good &= (there > 0).all(axis=1) & (there < [width - 1, height - 1]).all(axis=1)
@@ -132,6 +133,8 @@ def _flow(
     import cv2
 
     settings: dict[str, Any] = {"winSize": (WINDOW, WINDOW), "maxLevel": LEVELS}
+    there: Any
+    back: Any
     there, one, unlike = cv2.calcOpticalFlowPyrLK(first, second, corners, np.empty(0, np.float32), **settings)
     back, other, _ = cv2.calcOpticalFlowPyrLK(second, first, there, np.empty(0, np.float32), **settings)
     return there, back, (one.ravel() > 0) & (other.ravel() > 0) & (unlike.ravel() < UNLIKE)
