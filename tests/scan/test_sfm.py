@@ -129,7 +129,7 @@ def test_a_faint_print_is_placed_by_fainter_features_where_the_usual_ones_place_
     error = np.linalg.norm(scale * centers @ transform[:3, :3].T + transform[:3, 3] - truth, axis=1)
     assert np.median(error) < 1e-2  # at 1 m and 1.9 mm per pixel
     assert any("straight" in note for note in job.notes)
-    assert cameras.intrinsics[0].k1 == 0.0
+    assert abs(cameras.intrinsics[0].k1) < 0.05  # it moves the corners by 1 %
     assert_allclose(cameras.intrinsics[0].fx, 528.0, rtol=0.02, atol=0)  # known from 1,400 points
 
 
