@@ -96,7 +96,13 @@ def _adjust(model: Any, photos: PhotoSet, job: Job) -> int:
     options.ceres.solver_options.num_threads = 1  # with more, the last bits change from run to run
     options.ceres.solver_options.max_num_iterations = 50
     options.ceres.solver_options.function_tolerance = 1e-6
-    pycolmap.bundle_adjustment(model, options)
+    gauge = pycolmap.BundleAdjustmentConfig()
+    for number in ids:
+        gauge.add_image(number)
+    gauge.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
+    solved = pycolmap.create_default_bundle_adjuster(options, gauge, model).solve()
+    if not solved.is_solution_usable():
+        raise ValueError(solved.brief_report())
     for number in fresh:
         model.delete_point3D(number)
     model.update_point_3d_errors()
