@@ -11,6 +11,7 @@ from scan_scene import make_scene, orbit, photos, render
 from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.job import Job
 from vto_pipeline.scan.photos import sfm
+from vto_pipeline.scan.photos.matching import adjust as adjust_module
 from vto_pipeline.scan.photos.matching.adjust import _triangulate
 from vto_pipeline.scan.photos.matching.tracks import TrackedPhoto, follow, without_light
 from vto_pipeline.scan.photos.sfm import SfmConfig, estimate_cameras
@@ -103,3 +104,29 @@ def test_cameras_of_a_faint_print_come_closer(tmp_path, monkeypatch):
     assert job.metrics["tracked_points"] > 1000
     assert off[1] < 0.6 * off[0]
     assert off[1] < 2e-3  # at 1 m and 1.9 mm per pixel
+
+
+class Placed:
+    """A model that knows its error only."""
+
+    def __init__(self, error):
+        self.error = error
+
+    def compute_mean_reprojection_error(self):
+        return self.error
+
+
+@pytest.mark.parametrize("after", [0.5, float("nan"), None])
+def test_cameras_stay_where_an_adjustment_fails(monkeypatch, after):
+    def spoil(model, *rest):
+        if after is None:
+            raise ValueError("no convergence")
+        model.error = after
+        return 100
+
+    monkeypatch.setattr(adjust_module, "_adjust", spoil)
+    model, job = Placed(0.4), Job()
+    assert adjust_module.adjust(model, None, job) is model
+    assert model.error == 0.4
+    assert "as their features placed them" in job.notes[0]
+    assert "tracked_points" not in job.metrics
