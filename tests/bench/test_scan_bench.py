@@ -7,8 +7,9 @@ from numpy.testing import assert_allclose
 
 from vto_pipeline.bench.own_process import run_vto
 from vto_pipeline.bench.scan.captures import scan_row
-from vto_pipeline.bench.scan.truth import beside_truth, rims_off, scale_of
+from vto_pipeline.bench.scan.truth import beside_truth, cameras_off, rims_off, scale_of
 from vto_pipeline.io.meshes import write_ply
+from vto_pipeline.model.camera import CameraSet, Intrinsics
 from vto_pipeline.model.mesh import TriangleMesh
 
 
@@ -52,6 +53,20 @@ def test_a_notch_in_a_rim_is_seen_in_its_length(vase, depth):
     whole = np.linalg.norm(upper - np.roll(upper, -1, axis=0), axis=1).sum()
     off = rims_off(TriangleMesh(vase.vertices, vase.faces[~slot]), vase)
     assert_allclose(off, 200.0 * depth / whole, rtol=0, atol=2.5)  # a row of faces is 10 mm, 1 % twice; walls slant
+
+
+def test_cameras_are_compared_in_whatever_frame_and_unit_they_are():
+    random = np.random.default_rng(3)
+    poses = np.tile(np.eye(4), (7, 1, 1))
+    poses[:, :3, 3] = random.normal(size=(7, 3))
+    names = tuple(f"{k}.jpg" for k in range(7))
+    cameras = CameraSet(names, (Intrinsics(80, 60, 90.0, 90.0, 39.5, 29.5),) * 7, poses, metric=False)
+    turn = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    places = {name: 0.4 * turn @ pose[:3, 3] + [1.0, 2.0, 3.0] for name, pose in zip(names, poses, strict=True)}
+    assert_allclose(cameras_off(cameras, places), 0.0, rtol=0, atol=1e-9)  # rounding
+    moved = {name: place + 0.01 * random.choice([-1, 1], 3) / np.sqrt(3) for name, place in places.items()}
+    assert 2.0 < cameras_off(cameras, moved) < 10.5  # 10 mm each, of which the fit takes its part
+    assert cameras_off(cameras, {"other.jpg": np.zeros(3)}) is None
 
 
 def test_a_scan_that_takes_too_long_is_ended(tmp_path):

@@ -6,14 +6,20 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from vto_pipeline.bench.bench import Value
 from vto_pipeline.bench.own_process import run_vto
-from vto_pipeline.bench.scan.truth import beside_truth
+from vto_pipeline.bench.scan.truth import beside_truth, cameras_off
+from vto_pipeline.io.captures.cameras import read_cameras
 from vto_pipeline.io.documents import read_json
 from vto_pipeline.io.meshes import read_mesh, read_own_mesh
 
 FORM, TRUTH = "body.ply", "truth/garment.ply"
 """What a capture folder holds besides the kinds: the bare form, and the garment that was photographed on it."""
+
+CAMERAS = "truth/cameras.json"
+"""And it may hold this: {"cameras": [{"name", "R", "t"}]}, camera from world, in metres."""
 
 KINDS = ("photos", "depth", "cloud.ply")
 """What a capture folder may hold to scan from."""
@@ -43,6 +49,7 @@ def scan_row(capture: Path, kind: str, folder: Path, settings: Sequence[str], li
         "exit": ended.code,
         "seconds": ended.seconds,
         "peak_mb": ended.peak_mb,
+        "cameras_mm": _cameras_mm(capture / CAMERAS, folder / "out" / "cameras.json"),
         **found,
         **_own_figures(folder),
         "reason": _reason(folder),
@@ -61,6 +68,15 @@ def _own_figures(folder: Path) -> dict[str, Value]:
         "predicted_median_mm": error.get("median"),
         "predicted_p95_mm": error.get("p95"),
     }
+
+
+def _cameras_mm(truth: Path, found: Path) -> float | None:
+    """Return how far the photos' cameras are off [mm], where both are known."""
+    if not truth.is_file() or not found.is_file():
+        return None
+    records = read_json(truth)["cameras"]
+    places = {one["name"]: -np.array(one["R"]).T @ np.array(one["t"]) for one in records}
+    return cameras_off(read_cameras(found), places)
 
 
 def _reason(folder: Path) -> str | None:

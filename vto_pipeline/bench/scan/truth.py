@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from vto_pipeline.bench.bench import Value
@@ -10,6 +12,8 @@ from vto_pipeline.garment.loop_evidence import measure_loops
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import boundary_loops
+from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.camera import CameraSet
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.scan.similarity import fit_similarity
 
@@ -50,6 +54,26 @@ def rims_off(garment: TriangleMesh, truth: TriangleMesh) -> float | None:
     nearest = [true[int(np.argmin(np.linalg.norm(places - one.center, axis=1)))] for one in found]
     off = [100.0 * (one.perimeter / its.perimeter - 1.0) for one, its in zip(found, nearest, strict=True)]
     return max(off, key=abs)
+
+
+def cameras_off(cameras: CameraSet, true_places: Mapping[str, FloatArray]) -> float | None:
+    """Return the median distance of photos from where they were taken [mm], once all were brought there as one.
+
+    Args:
+        cameras: As scanned, in any frame and unit.
+        true_places: Name of a photo -> its camera's centre [m], shape (3,).
+
+    Returns:
+        None with fewer than three photos whose place is known.
+    """
+    known = [index for index, name in enumerate(cameras.names) if name in true_places]
+    if len(known) < 3:
+        return None
+    places = cameras.world_from_cam[known, :3, 3]
+    truth = np.array([true_places[cameras.names[index]] for index in known])
+    scale, motion = fit_similarity(places, truth)
+    off = scale * places @ motion[:3, :3].T + motion[:3, 3] - truth
+    return 1e3 * float(np.median(np.linalg.norm(off, axis=1)))
 
 
 def scale_of(garment: TriangleMesh, truth: TriangleMesh) -> float:
