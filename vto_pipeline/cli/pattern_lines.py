@@ -54,12 +54,12 @@ def pattern_lines(pattern: Pattern) -> list[str]:
     seams = _seams(pattern)
     if not seams:
         return [*lines, "", "no stitches in the file"]
-    rows = []
+    sewn = []
     for size, seam in seams:
         first, second = (f"{1e3 * length:.1f}" for length in seam.lengths)
         mismatch = f"{1e3 * seam.mismatch:+.1f} mm, {seam.share:.1%}"
-        rows.append((seam.first, seam.second, size, first, second, mismatch))
-    return [*lines, "", *table_lines(("sewn", "to", "size", "mm", "mm", "mismatch"), rows)]
+        sewn.append((seam.first, seam.second, size, first, second, mismatch))
+    return [*lines, "", *table_lines(("sewn", "to", "size", "mm", "mm", "mismatch"), sewn)]
 
 
 def _seams(pattern: Pattern) -> list[tuple[str, SeamFigures]]:

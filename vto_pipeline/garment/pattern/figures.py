@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -103,6 +104,6 @@ def _dense(points: np.ndarray) -> np.ndarray:
     """Return a polyline with a point at every millimetre or so."""
     parts = [
         a + np.linspace(0.0, 1.0, max(1, int(np.linalg.norm(b - a) / 1e-3)), endpoint=False)[:, None] * (b - a)
-        for a, b in zip(points[:-1], points[1:], strict=True)
+        for a, b in pairwise(points)
     ]
     return np.concatenate(parts)

@@ -71,7 +71,7 @@ def join(chains: Sequence[Chain]) -> Joined:
     loops = [_closed(chain) for chain in kept if chain.is_closed]
     loose = [chain for chain in kept if not chain.is_closed]
     groups, branching = _groups(loose)
-    opened = []
+    opened: list[Chain] = []
     for group in groups:
         line = _line_up(group)
         (loops if line.is_closed else opened).append(_closed(line) if line.is_closed else line)
@@ -143,7 +143,7 @@ def _groups(chains: Sequence[Chain]) -> tuple[list[list[Chain]], list[Chain]]:
     groups: list[list[Chain]] = []
     branching: list[Chain] = []
     for number in range(count):
-        members = np.flatnonzero(group == number)
+        members = np.flatnonzero(group == number).tolist()
         found = [chains[k] for k in members]
         if (meeting.reshape(-1, 2)[members] > 1).any():
             branching += found

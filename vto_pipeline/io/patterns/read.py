@@ -59,7 +59,7 @@ def read_pattern(path: Path, *, unit: str | None = None, job: Job | None = None)
         The pattern, in metres.
 
     Raises:
-        InputError: no such file, or its unit is unknown; FormatError: the file breaks its format, or an outline is open.
+        InputError: no such file, or its unit is unknown; FormatError: it breaks its format, or an outline is open.
     """
     path = check_file(Path(path), PARSERS, _LIMIT_BYTES)
     found = run_limited(PARSERS[path.suffix.lower()], str(path.resolve()), unit or "", where=str(path))

@@ -159,8 +159,9 @@ def _panel_record(panel: Panel) -> dict[str, Any]:
         ],
         "lines": [{"kind": line.kind, "curves": _edge_records(line.curves)} for line in panel.lines],
         "drills": _list(panel.drills) or [],
-        "placement": placement
-        and {"rotation": placement.rotation.tolist(), "translation": placement.translation.tolist()},
+        "placement": None
+        if placement is None
+        else {"rotation": placement.rotation.tolist(), "translation": placement.translation.tolist()},
         "notes": list(panel.notes),
     }
 
@@ -188,6 +189,6 @@ def _panel(record: _PanelRecord) -> Panel:
         tuple(InnerLine(line.kind, _edges(line.curves)) for line in record.lines),
         np.asarray(record.drills) if record.drills else None,
         _edges(record.cut),
-        placed and Placement(np.asarray(placed.rotation), np.asarray(placed.translation)),
+        None if placed is None else Placement(np.asarray(placed.rotation), np.asarray(placed.translation)),
         tuple(record.notes),
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,8 @@ def split_at_borders(loop: Sequence[Edge], turn_points: FloatArray) -> tuple[Edg
 
     Args:
         loop: End to end.
-        turn_points: Where edges end [m], shape (N, 2); none on the outline: at its corners, and where the file's lines end.
+        turn_points: Where edges end [m], shape (N, 2). None on the outline: at its corners, and where lines of the file
+            end.
 
     Returns:
         The outline, from a border on. Arcs and Bezier curves stay as they are.
@@ -57,16 +59,14 @@ def _at_corners(edge: Edge) -> list[Edge]:
     if edge.kind != "polyline":
         return [edge]
     way = np.diff(edge.points, axis=0)
-    turn = np.arctan2(
-        way[:-1, 0] * way[1:, 1] - way[:-1, 1] * way[1:, 0], (way[:-1] * way[1:]).sum(axis=1)
-    )
+    turn = np.arctan2(way[:-1, 0] * way[1:, 1] - way[:-1, 1] * way[1:, 0], (way[:-1] * way[1:]).sum(axis=1))
     return _split(edge, np.abs(turn) > _CORNER)
 
 
 def _split(edge: Edge, inner: NDArray[np.bool_]) -> list[Edge]:
     """Return a polyline split at those of its inner vertices."""
     ends = [0, *(np.flatnonzero(inner) + 1).tolist(), len(edge.points) - 1]
-    return [replace(edge, points=edge.points[low : high + 1]) for low, high in zip(ends[:-1], ends[1:], strict=True)]
+    return [replace(edge, points=edge.points[low : high + 1]) for low, high in pairwise(ends)]
 
 
 def _near(point: FloatArray, places: FloatArray) -> bool:

@@ -51,7 +51,7 @@ def piece_of(block: Any) -> Piece:
             piece.texts.append((layer, entity.plain_text() if kind == "MTEXT" else entity.dxf.text))
         elif kind == "POINT":
             angle = entity.dxf.angle if entity.dxf.hasattr("angle") else None
-            where = np.array(entity.dxf.location)[:2]
+            (where,) = _places(entity.dxf.location)
             piece.points.setdefault(layer, []).append((where, angle, abs(entity.dxf.get("thickness", 0.0))))
         else:
             chains = [Chain(name, tuple(edges)) for edges in _edges(entity) if edges]
@@ -82,7 +82,7 @@ def _edges(entity: Any) -> list[list[Edge]]:
     kind = entity.dxftype()
     flipped = entity.dxf.hasattr("extrusion") and entity.dxf.extrusion.z < 0.0
     if kind == "LINE":
-        return [_polyline(np.array([entity.dxf.start[:2], entity.dxf.end[:2]]), np.zeros(2))]
+        return [_polyline(_places(entity.dxf.start, entity.dxf.end), np.zeros(2))]
     if kind == "POLYLINE" and entity.is_2d_polyline and not flipped:
         rows = [(v.dxf.location.x, v.dxf.location.y, v.dxf.bulge) for v in entity.vertices if not v.dxf.flags & _FRAME]
         return [_polyline_of_rows(rows, entity.is_closed)]
@@ -91,7 +91,7 @@ def _edges(entity: Any) -> list[list[Edge]]:
     if kind == "ARC" and not flipped:
         turn = (entity.dxf.end_angle - entity.dxf.start_angle) % 360.0 or 360.0
         if turn < 359.0:
-            ends = np.array([entity.start_point[:2], entity.end_point[:2]])
+            ends = _places(entity.start_point, entity.end_point)
             return [_polyline(ends, np.array([np.tan(np.deg2rad(turn) / 4.0), 0.0]))]
     return _by_path(entity)
 
@@ -132,13 +132,14 @@ def _by_path(entity: Any) -> list[list[Edge]]:
     for part in path.sub_paths():
         edges: list[Edge] = []
         run = [part.start]
+        step: Any
         for step in part.commands():
             if step.type == Command.LINE_TO:
                 run.append(step.end)
                 continue
             edges += _run(run)
             controls = [step.ctrl] if step.type == Command.CURVE3_TO else [step.ctrl1, step.ctrl2]
-            corners = np.array([[p.x, p.y] for p in (run[-1], *controls, step.end)])
+            corners = _places(run[-1], *controls, step.end)
             if np.ptp(corners, axis=0).max() > _SAME:
                 edges.append(Edge("bezier", corners))
             run = [step.end]
@@ -147,4 +148,8 @@ def _by_path(entity: Any) -> list[list[Edge]]:
 
 
 def _run(run: list[Any]) -> list[Edge]:
-    return _polyline(np.array([[p.x, p.y] for p in run]), np.zeros(len(run))) if len(run) > 1 else []
+    return _polyline(_places(*run), np.zeros(len(run))) if len(run) > 1 else []
+
+
+def _places(*points: Any) -> FloatArray:
+    return np.array([[point.x, point.y] for point in points], dtype=np.float64)

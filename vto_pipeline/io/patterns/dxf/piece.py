@@ -19,6 +19,7 @@ from vto_pipeline.model.pattern import Edge, InnerLine, Notch, Panel
 
 _READ = {layers.BOUNDARY, layers.TURN_POINTS, layers.CURVE_POINTS, layers.MIRROR, layers.GRAIN, layers.DRILLS,
          layers.SEW, layers.ANNOTATION, *layers.NOTCH_KINDS, *layers.LINE_KINDS}  # fmt: skip
+_NAMES = ("PIECE NAME", "SIZE")
 _DROPPED = {layers.GRADE_REFERENCE: "grade reference", **dict.fromkeys(layers.VALIDATION, "curves to validate with")}
 
 
@@ -34,8 +35,8 @@ def panel_of(piece: Piece, block: str, scale: float, notes: list[str]) -> Panel:
     Raises:
         FormatError: the outline is open, branches, or there are several; the block and the entity are named.
     """
-    words = [key_and_value(text) for _, text in piece.texts]
-    values = dict(reversed([pair for pair in words if pair[0]]))  # the first of each
+    words = reversed([key_and_value(text) for _, text in piece.texts])
+    values = {key: value for key, value in words if key in _NAMES}  # the first of each
     chains = {layer: [_scaled(chain, scale) for chain in found] for layer, found in piece.chains.items()}
     turns = _places(piece, layers.TURN_POINTS, scale)
     outline, holes = _outline(join(chains.get(layers.BOUNDARY, [])), block, notes)
@@ -73,8 +74,14 @@ def panel_of(piece: Piece, block: str, scale: float, notes: list[str]) -> Panel:
         tuple(lines),
         drills if len(drills) else None,
         cut,
-        notes=tuple(f"{key}: {value}" for key, value in values.items() if key not in ("PIECE NAME", "SIZE", "UNITS")),
+        notes=_remarks(piece),
     )
+
+
+def _remarks(piece: Piece) -> tuple[str, ...]:
+    """Return what else the file says of a piece."""
+    texts = [text for layer, text in piece.texts if layer in (layers.BOUNDARY, layers.ANNOTATION)]
+    return tuple(dict.fromkeys(text for text in texts if key_and_value(text)[0] not in (*_NAMES, "UNITS")))
 
 
 def _outline(joined: Joined, block: str, notes: list[str]) -> tuple[tuple[Edge, ...], list[Chain]]:
@@ -93,7 +100,8 @@ def _outline(joined: Joined, block: str, notes: list[str]) -> tuple[tuple[Edge, 
         gap = 1e3 * float(np.linalg.norm(longest.start - longest.end))
         x, y = 1e3 * longest.end
         raise FormatError(
-            f"the outline is open: from {longest.name} on it ends at ({x:.1f}, {y:.1f}) mm, {gap:.2f} mm from its start",
+            f"the outline is open: begun with {longest.name}, it ends at ({x:.1f}, {y:.1f}) mm, "
+            f"{gap:.2f} mm from its start",
             where=where,
             hint=f"ends within {1e3 * JOIN_M:g} mm are joined",
         )

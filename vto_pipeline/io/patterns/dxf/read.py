@@ -41,7 +41,8 @@ def parse_dxf(path: str, unit: str) -> Arrays:
 def _pattern(path: Path, unit: str, notes: list[str]) -> Pattern:
     document = _document(path, notes)
     names = [block.name for block in document.blocks if not block.name.startswith(("*", "$"))]
-    within = {insert.dxf.name for name in names for insert in document.blocks.get(name).query("INSERT")}
+    inserts = [(name, insert.dxf.name) for name in names for insert in document.blocks.get(name).query("INSERT")]
+    within = {inner for name, inner in inserts if inner != name}
     pieces: dict[str, Piece] = {}
     texts = [text for _, text in piece_of_modelspace(document).texts]
     for name in names:
@@ -96,7 +97,9 @@ def _with_unique_names(panels: list[Panel], blocks: list[str], notes: list[str])
     unique = []
     for panel, key, block in zip(panels, keys, blocks, strict=True):
         if keys.count(key) > 1:
-            notes.append(f"block {block}: another has its piece name {key[0]!r} and size {key[1]!r}; named after the block")
+            notes.append(
+                f"block {block}: another has its piece name {key[0]!r} and size {key[1]!r}; named after the block"
+            )
             panel = replace(panel, name=block)
         unique.append(panel)
     return unique

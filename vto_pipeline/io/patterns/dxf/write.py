@@ -1,4 +1,4 @@
-"""Patterns as DXF files of release 12 after AAMA-292 and ASTM D6673, in millimetres: a block for each piece and size."""
+"""Patterns as DXF files of release 12 after AAMA-292 and ASTM D6673: a block for each piece and size; in mm."""
 
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ def write_dxf(path: Path, pattern: Pattern, job: Job) -> None:
         space.add_blockref(block.name, (0.0, 0.0), dxfattribs={"layer": str(layers.BOUNDARY)})
     if any(panel.placement is not None for panel in pattern.panels):
         job.note(f"{path.name}: DXF has no place for where panels stand in space; JSON has")
-    with replacing(path) as beside:
-        gerber_D6673.export_file(document, beside)
+    with replacing(path) as beside, beside.open("w", encoding="ascii", errors="dxfreplace") as stream:
+        gerber_D6673.export_stream(document, stream)
 
 
 def _block_name(number: int, panel: Panel) -> str:
@@ -114,4 +114,11 @@ def _points(block: Any, points: FloatArray, layer: int) -> None:
 
 
 def _text(block: Any, text: str, layer: int, place: tuple[float, float]) -> None:
-    block.add_text(text, height=_TEXT_MM, dxfattribs={"layer": str(layer), "style": "STANDARD"}).set_placement(place)
+    block.add_text(_ascii(text), height=_TEXT_MM, dxfattribs={"layer": str(layer), "style": "STANDARD"}).set_placement(
+        place
+    )
+
+
+def _ascii(text: str) -> str:
+    """Return a text in seven bits, other letters as DXF escapes them."""
+    return "".join(c if c.isascii() else f"\\U+{ord(c):04X}" if c <= "\uffff" else "?" for c in text)

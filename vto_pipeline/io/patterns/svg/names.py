@@ -5,8 +5,8 @@ from __future__ import annotations
 SCHEMA = "data-vto-pattern"
 """Attribute of the root: version of this marking."""
 
-STITCHES = "data-vto-stitches"
-"""Attribute of the root: the stitches as JSON."""
+HEAD = "data-vto-head"
+"""Attribute of the root, JSON: name, unit, stitches, and the panel coordinates [m] of the corner of the page."""
 
 PANEL = "data-vto-panel"
 """Attribute of each shape: number of the panel it belongs to, from 0."""
@@ -18,4 +18,4 @@ ROLE = "data-vto-role"
 """Attribute of each shape: outline, cut, grain, notch, drill, or the kind of an inner line."""
 
 DETAIL = "data-vto-detail"
-"""Attribute of a curve: the number of segments of each edge and the edges' labels; of a notch: kind, angle, depth."""
+"""Attribute of a curve: number of segments, label and bulge of each edge; of a notch: kind, angle, depth."""

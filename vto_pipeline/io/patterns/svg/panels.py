@@ -47,7 +47,9 @@ def drawn_pattern(drawing: Drawing, name: str, notes: list[str]) -> Pattern:
             inner.setdefault(holder, []).append(InnerLine("internal", loop.edges))
     if not outer:
         least = f"{1e4 * _LEAST_M2:g} cm²"
-        problem = f"no line is a panel: {len(joined.loops)} are closed, none of {least} or more, and {len(joined.open)} open"
+        problem = (
+            f"no line is a panel: {len(joined.loops)} are closed, none of {least} or more, and {len(joined.open)} open"
+        )
         raise FormatError(problem, hint="close the outlines, and check the scale of the drawing")
     stray = []
     for line in (*joined.open, *joined.branching):
@@ -121,7 +123,7 @@ def _share_inside(outline: FloatArray, points: FloatArray) -> float:
 
 def _words(drawing: Drawing, outer: Sequence[tuple[Chain, FloatArray]]) -> dict[int, tuple[str, ...]]:
     """Return the texts that stand in each panel."""
-    words: dict[int, tuple[str, ...]] = {k: () for k in range(len(outer))}
+    words: dict[int, tuple[str, ...]] = dict.fromkeys(range(len(outer)), ())
     for place, text in drawing.texts:
         for k, (_, outline) in enumerate(outer):
             if text and _share_inside(outline, np.array([place])) == 1.0:

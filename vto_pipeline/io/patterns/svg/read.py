@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from vto_pipeline.errors import FormatError, InputError
 from vto_pipeline.io.arrays import Arrays
@@ -41,16 +44,20 @@ def _own(drawing: Drawing) -> dict[str, Any]:
     """Return the record of a pattern that `write_svg` wrote."""
     panels: dict[int, dict[str, Any]] = {}
     try:
+        head = json.loads(drawing.root[names.HEAD])
+        x, y = head.pop("origin")
         for line in drawing.lines:
             if names.ROLE in line.attributes:
                 number = int(line.attributes[names.PANEL])
-                _add(panels.setdefault(number, {"notches": [], "drills": [], "lines": []}), line)
-        head = json.loads(drawing.root[names.STITCHES])
-    except (KeyError, ValueError, IndexError, TypeError) as e:
+                _add(panels.setdefault(number, {"notches": [], "drills": [], "lines": []}), _moved(line, x, y))
+    except (KeyError, ValueError, IndexError, TypeError, AttributeError) as e:
         raise FormatError(f"the marks of a pattern of ours are damaged: {type(e).__name__}: {e}"[:120]) from None
-    if not isinstance(head, dict):
-        raise FormatError(f"{names.STITCHES} is not a mapping")
     return {"schema": 1, "unit": "m", "panels": [panels[k] for k in sorted(panels)], **head}
+
+
+def _moved(line: Drawn, x: float, y: float) -> Drawn:
+    """Return a line with the corner of the page at a place [m]."""
+    return replace(line, edges=tuple(replace(edge, points=edge.points + np.array([x, y])) for edge in line.edges))
 
 
 def _add(panel: dict[str, Any], line: Drawn) -> None:
@@ -73,13 +80,13 @@ def _add(panel: dict[str, Any], line: Drawn) -> None:
         panel["lines"].append({"kind": role, "curves": _edges(line.edges, detail)})
 
 
-def _edges(segments: Sequence[Edge], detail: Sequence[tuple[int, str]]) -> list[dict[str, Any]]:
-    """Return segments as edges, of which each has a count of segments and a label."""
+def _edges(segments: Sequence[Edge], detail: Sequence[tuple[int, str, float]]) -> list[dict[str, Any]]:
+    """Return segments as edges, of which each has a count of segments, a label and a bulge."""
     edges = []
     at = 0
-    for count, label in detail:
+    for count, label, bulge in detail:
         part = segments[at : at + count]
         points = part[0].points.tolist() + [p for one in part[1:] for p in one.points[1:].tolist()]
-        edges.append({"kind": part[0].kind, "points": points, "bulge": part[0].bulge, "label": label})
+        edges.append({"kind": part[0].kind, "points": points, "bulge": bulge, "label": label})
         at += count
     return edges

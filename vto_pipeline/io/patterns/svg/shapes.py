@@ -20,7 +20,7 @@ _CSS_M = {"": _PX_M, "px": _PX_M, "pt": 0.0254 / 72.0, "pc": 0.0254 / 6.0, "mm":
 _LENGTH = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(px|pt|pc|mm|cm|in|)\s*")
 _LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 _ROUND = 1e-9  # of the radii: less apart, and an ellipse is a circle
-_CURVES = 8  # cubic curves a whole ellipse is made of
+_CURVES = 24  # cubic curves a whole ellipse is made of
 
 
 @dataclass(frozen=True)
@@ -76,6 +76,8 @@ def read_drawing(path: Path, unit: str) -> Drawing:
         svg = svgelements.SVG.parse(str(path), ppi=96.0)
     except (ET.ParseError, ValueError, TypeError, IndexError, KeyError, AttributeError, RecursionError) as e:
         raise FormatError(f"not an SVG file that can be read: {type(e).__name__}: {e}"[:200]) from None
+    if not isinstance(svg, svgelements.SVG):
+        raise FormatError("the root does not belong to SVG", hint='expected xmlns="http://www.w3.org/2000/svg"')
     scale, how = _scale(svg, root, unit)
     lines: list[Drawn] = []
     texts = []
@@ -110,16 +112,21 @@ def _scale(svg: Any, root: dict[str, str], unit: str) -> tuple[float, str]:
 
     svgelements turns lengths into pixels with rounded constants; the exact width of the file corrects that.
     """
-    box = root.get("viewBox", "").replace(",", " ").split()
     if unit:
-        per_user = float(svg.width) / float(box[2]) if len(box) == 4 else 1.0
-        return LENGTH_M[unit] / per_user, f"{unit}, as requested"
+        box = root.get("viewBox", "").replace(",", " ").split()
+        try:
+            per_user = float(svg.width) / float(box[2]) if len(box) == 4 else 1.0
+            return LENGTH_M[unit] / per_user, f"{unit}, as requested"
+        except (ValueError, ZeroDivisionError):
+            raise FormatError(f"viewBox is {root['viewBox']!r}; expected four numbers, the last two positive") from None
     found = _LENGTH.fullmatch(root.get("width", ""))
     if found is None or float(found[1]) <= 0.0 or not svg.width:
         problem = f"the drawing has no true size: its width is {root.get('width', 'absent')!r}"
         raise InputError(problem, hint="give the unit of its coordinates: --unit mm")
     metres = float(found[1]) * _CSS_M[found[2]]
-    how = f"width {root['width']}" if found[2] not in ("", "px") else f"width {root['width']}, 96 pixels an inch assumed"
+    how = (
+        f"width {root['width']}" if found[2] not in ("", "px") else f"width {root['width']}, 96 pixels an inch assumed"
+    )
     return metres / float(svg.width), how
 
 

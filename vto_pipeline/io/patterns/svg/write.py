@@ -45,10 +45,11 @@ def write_svg(path: Path, pattern: Pattern) -> None:
     width, height = (_MM * (high - low)).tolist()
     x, y = float(_MM * low[0]), float(-_MM * high[1])
     head = {"name": pattern.name, "source_unit": pattern.unit, "stitches": record["stitches"]}
+    head["origin"] = [low[0], high[1]]
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width!r}mm" height="{height!r}mm" '
-        f'viewBox="{x!r} {y!r} {width!r} {height!r}" {names.SCHEMA}="1" {names.STITCHES}={_json(head)}>',
+        f'viewBox="{x!r} {y!r} {width!r} {height!r}" {names.SCHEMA}="1" {names.HEAD}={_json(head)}>',
         f"<title>{escape(pattern.name)}</title>",
     ]
     for number, panel in enumerate(pattern.panels):
@@ -61,7 +62,7 @@ def _panel(number: int, panel: Panel, record: dict[str, Any]) -> list[str]:
     """Return the elements of a panel."""
     said = {key: record[key] for key in ("name", "size", "placement", "notes")}
     mark = f'{names.PANEL}="{number}"'
-    lines = [f"<g id={quoteattr(f'panel-{number}')} {mark} style=\"fill:none\">"]
+    lines = [f'<g id={quoteattr(f"panel-{number}")} {mark} style="fill:none">']
     outline = f"{names.RECORD}={_json(said)} {names.DETAIL}={_json(_detail(panel.edges))}"
     lines.append(_element("outline", _path(panel.edges), outline))
     if panel.cut:
@@ -74,12 +75,12 @@ def _panel(number: int, panel: Panel, record: dict[str, Any]) -> list[str]:
         angle = notch.angle or 0.0
         tip = notch.position + (notch.depth or _NOTCH_M) * np.array([np.cos(angle), np.sin(angle)])
         detail = {"angle": notch.angle, "depth": notch.depth, "kind": notch.kind}
-        lines.append(
-            _element("notch", f"M{_xy(notch.position)} L{_xy(tip)}", f"{names.DETAIL}={_json(detail)}")
-        )
+        lines.append(_element("notch", f"M{_xy(notch.position)} L{_xy(tip)}", f"{names.DETAIL}={_json(detail)}"))
     for place in () if panel.drills is None else panel.drills:
         arms = np.array([[1, 0], [-1, 0], [0, 1], [0, -1]]) * _DRILL_M
-        lines.append(_element("drill", " ".join([f"M{_xy(place)}", *(f"L{_xy(place + a)} L{_xy(place)}" for a in arms)])))
+        lines.append(
+            _element("drill", " ".join([f"M{_xy(place)}", *(f"L{_xy(place + a)} L{_xy(place)}" for a in arms)]))
+        )
     middle = edges_points(panel.edges, _FLAT_M).mean(axis=0)
     title = f"{panel.name} {panel.size}".strip()
     lines.append(
@@ -96,9 +97,9 @@ def _json(value: Any) -> str:
     return quoteattr(json.dumps(value, ensure_ascii=False))
 
 
-def _detail(edges: Sequence[Edge]) -> list[tuple[int, str]]:
-    """Return for each edge its number of segments and its label."""
-    return [(len(one.points) - 1 if one.kind == "polyline" else 1, one.label) for one in edges]
+def _detail(edges: Sequence[Edge]) -> list[tuple[int, str, float]]:
+    """Return for each edge its number of segments, label and bulge."""
+    return [(len(one.points) - 1 if one.kind == "polyline" else 1, one.label, one.bulge) for one in edges]
 
 
 def _path(edges: Sequence[Edge]) -> str:
