@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from vto_pipeline.errors import FormatError
+from vto_pipeline.errors import FormatError, InputError
 from vto_pipeline.io.patterns.dxf.layers import layer_of
 from vto_pipeline.io.patterns.loops import Chain
 from vto_pipeline.model.arrays import FloatArray
@@ -46,19 +46,28 @@ def piece_of(block: Any) -> Piece:
     piece = Piece()
     for entity, layer in _entities(block, block.name, (block.name,)):
         name = f"{entity.dxftype()} #{entity.dxf.handle or '?'}"
-        kind = entity.dxftype()
-        if kind in ("TEXT", "ATTRIB", "MTEXT"):
-            piece.texts.append((layer, entity.plain_text() if kind == "MTEXT" else entity.dxf.text))
-        elif kind == "POINT":
-            angle = entity.dxf.angle if entity.dxf.hasattr("angle") else None
-            (where,) = _places(entity.dxf.location)
-            piece.points.setdefault(layer, []).append((where, angle, abs(entity.dxf.get("thickness", 0.0))))
-        else:
-            chains = [Chain(name, tuple(edges)) for edges in _edges(entity) if edges]
-            if not chains:
-                piece.skipped.append(f"{name} on layer {entity.dxf.layer}")
-            piece.chains.setdefault(layer, []).extend(chains)
+        try:
+            _add(piece, entity, layer, name)
+        except (InputError, AttributeError, TypeError, ValueError, ZeroDivisionError) as e:  # ezdxf's, on missing values
+            problem = e.problem if isinstance(e, InputError) else f"{type(e).__name__}: {e}"[:100]
+            raise FormatError(f"{name} is damaged: {problem}", where=f"block {block.name}") from None
     return piece
+
+
+def _add(piece: Piece, entity: Any, layer: int, name: str) -> None:
+    """Add an entity to what a block holds."""
+    kind = entity.dxftype()
+    if kind in ("TEXT", "ATTRIB", "MTEXT"):
+        piece.texts.append((layer, entity.plain_text() if kind == "MTEXT" else entity.dxf.text))
+    elif kind == "POINT":
+        angle = entity.dxf.angle if entity.dxf.hasattr("angle") else None
+        (where,) = _places(entity.dxf.location)
+        piece.points.setdefault(layer, []).append((where, angle, abs(entity.dxf.get("thickness", 0.0))))
+    else:
+        chains = [Chain(name, tuple(edges)) for edges in _edges(entity) if edges]
+        if not chains:
+            piece.skipped.append(f"{name} on layer {entity.dxf.layer}")
+        piece.chains.setdefault(layer, []).extend(chains)
 
 
 def _entities(entities: Iterable[Any], block: str, inside: tuple[str, ...]) -> Iterator[tuple[Any, int]]:
