@@ -40,12 +40,14 @@ class Sewn:
             texture coordinates are the panels [m], v along the warp.
         panels: Names.
         panel: Which each face belongs to, shape (F,).
+        frames: Where the axes of each face's panel point as it is placed, orthonormal columns, shape (F, 3, 2).
         angle: The smallest of all triangles [rad].
     """
 
     mesh: TriangleMesh
     panels: tuple[str, ...]
     panel: IntArray
+    frames: FloatArray
     angle: float
 
 
@@ -96,8 +98,8 @@ def _welded(panels: Sequence[Panel], flat: Sequence[FlatPanel], samples: Samples
     graph = coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(start[-1], start[-1]))
     count, welded = connected_components(graph, directed=False)
     placed = np.concatenate([_in_space(panel, one) for panel, one in zip(panels, flat, strict=True)])
-    vertices = np.stack([np.bincount(welded, placed[:, k], count) for k in range(3)], axis=1)
-    vertices /= np.bincount(welded, minlength=count)[:, None]
+    sums = np.stack([np.bincount(welded, placed[:, k], count) for k in range(3)], axis=1)
+    vertices = np.asarray(sums / np.bincount(welded, minlength=count)[:, None], dtype=np.float64)
     faces = welded[np.concatenate([one.faces + k for one, k in zip(flat, start, strict=False)])].astype(np.int32)
     owner = np.repeat(np.arange(len(flat), dtype=np.int32), [len(one.faces) for one in flat])
     laid = np.concatenate([one.points[one.faces] for one in flat])
@@ -106,7 +108,8 @@ def _welded(panels: Sequence[Panel], flat: Sequence[FlatPanel], samples: Samples
     mesh = TriangleMesh(vertices, faces, texture=laid)
     if (edge_face_counts(mesh)[1] > 2).any():
         raise GarmentError("the seams join more than two panels along one line", hint="sew layers one by one")
-    return Sewn(mesh, names, owner, float(min(one.angles.min() for one in flat)))
+    frames = np.stack([panel.placement.rotation[:, :2] for panel in panels if panel.placement is not None])
+    return Sewn(mesh, names, owner, frames[owner], float(min(one.angles.min() for one in flat)))
 
 
 def _check_surface(faces: IntArray, owner: IntArray, names: tuple[str, ...]) -> None:

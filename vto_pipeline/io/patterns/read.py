@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
-from vto_pipeline.errors import FormatError
+from vto_pipeline.errors import FormatError, InputError
 from vto_pipeline.io.arrays import Arrays
 from vto_pipeline.io.documents import read_json
 from vto_pipeline.io.files import check_file
@@ -45,6 +45,15 @@ def parse_json(path: str, unit: str) -> Arrays:
 
 PARSERS: dict[str, Callable[[str, str], Arrays]] = {".json": parse_json, ".dxf": parse_dxf, ".svg": parse_svg}
 """Suffix -> parser; each takes the file and the unit that overrides the file's, or none."""
+
+
+def is_pattern(path: Path) -> bool:
+    """Return whether a JSON file claims to hold a pattern."""
+    try:
+        data = read_json(path)
+    except InputError:
+        return False
+    return is_garment_code(data) or is_own(data)
 
 
 def read_pattern(path: Path, *, unit: str | None = None, job: Job | None = None) -> Pattern:

@@ -48,7 +48,13 @@ def piece_of(block: Any) -> Piece:
         name = f"{entity.dxftype()} #{entity.dxf.handle or '?'}"
         try:
             _add(piece, entity, layer, name)
-        except (InputError, AttributeError, TypeError, ValueError, ZeroDivisionError) as e:  # ezdxf's, on missing values
+        except (
+            InputError,
+            AttributeError,
+            TypeError,
+            ValueError,
+            ZeroDivisionError,
+        ) as e:
             problem = e.problem if isinstance(e, InputError) else f"{type(e).__name__}: {e}"[:100]
             raise FormatError(f"{name} is damaged: {problem}", where=f"block {block.name}") from None
     return piece
