@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from vto_pipeline.cloth.rest_shape.from_panels import find_panels
 from vto_pipeline.errors import GarmentError, InputError
 from vto_pipeline.garment.pattern.embed import in_shape
 from vto_pipeline.garment.pattern.figures import panel_figures
@@ -69,6 +71,23 @@ def test_a_tube_has_two_openings_as_long_as_its_panels_and_their_area():
     assert (job.metrics["pieces"], job.metrics["seams"]) == (1, 4)
 
 
+def test_panels_lie_side_by_side_with_their_grain_upright():
+    pattern = tube(3)
+    slanted = replace(pattern.panels[1], grain=np.array([[0.1, 0.1], [0.2, 0.1]]))
+    sewn = sew(replace(pattern, panels=(pattern.panels[0], slanted, pattern.panels[2])), EDGE, Job())
+    mesh = in_shape(sewn, Job())
+    places = [mesh.texture[sewn.panel == k].reshape(-1, 2) for k in range(3)]
+    boxes = [(place.min(axis=0), place.max(axis=0)) for place in places]
+    assert [high - low for low, high in boxes] == [
+        pytest.approx(size) for size in ([0.2, 0.3], [0.3, 0.2], [0.2, 0.3])
+    ]  # the grain of the middle one runs across
+    assert all(one[1][0] < other[0][0] for one, other in pairwise(boxes))
+    normal = np.linalg.det(mesh.texture[:, 1:] - mesh.texture[:, :1])
+    assert (normal > 0.0).all()
+    found = find_panels(mesh)
+    assert (found.doubt, found.unit, found.pieces) == ("", "m", 3)
+
+
 def test_a_dart_makes_a_cone():
     """A sector sewn to itself: around its tip there is as much cloth as in the plane."""
     radius, angle = 0.3, np.deg2rad(325.0)
@@ -84,7 +103,7 @@ def test_a_dart_makes_a_cone():
     mesh = in_shape(sewn, Job())
     (rim,) = boundary_loops(mesh)
     assert perimeter(mesh, rim) == pytest.approx(radius * angle, rel=1e-2)
-    (tip,) = np.unique(mesh.faces[(mesh.texture == 0.0).all(axis=2)])
+    (tip,) = np.unique(mesh.faces[np.isclose(mesh.texture, [radius, 0.0], rtol=0, atol=1e-3).all(axis=2)])
     # the rim of a cone is a circle of radius r a / 2 pi, at the depth that the slanted side leaves
     across = np.linalg.norm(mesh.vertices[rim] - mesh.vertices[rim].mean(axis=0), axis=1)
     assert across.mean() == pytest.approx(radius * angle / (2 * np.pi), rel=0.02)

@@ -4,7 +4,6 @@ main: the command `vto`, and the one place where errors become messages
 commands/: one file a command
 results: running a document, and what it found, in words
 describe: what a file or folder holds
-pattern_lines: a sewing pattern in tables
 options, session, progress, tables: options, streams, bars, tables
 setup_system: what the system must hold before the package can be installed
 """

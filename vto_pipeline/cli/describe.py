@@ -93,7 +93,7 @@ def _video(path: Path, job: Job) -> dict[str, Any]:
 
 
 def _pattern(path: Path, job: Job) -> dict[str, Any]:
-    from vto_pipeline.cli.pattern_lines import pattern_facts
+    from vto_pipeline.cli.commands.pattern.lines import pattern_facts
     from vto_pipeline.io.patterns.read import read_pattern
 
     facts = pattern_facts(read_pattern(path, job=job))

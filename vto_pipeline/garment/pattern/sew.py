@@ -21,6 +21,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.pattern import Panel, Pattern
 from vto_pipeline.model.settings import Config
 
+_APART_M = 0.05  # between panels laid side by side
 _MISMATCH = 0.02  # of a seam: easing in more is worth a warning
 
 
@@ -37,7 +38,7 @@ class Sewn:
 
     Args:
         mesh: In space where its panels are placed; seams are welded, so that edges there are as long as it comes. Its
-            texture coordinates are the panels [m], v along the warp.
+            texture coordinates are the panels [m], v along the warp, side by side.
         panels: Names.
         panel: Which each face belongs to, shape (F,).
         frames: Where the axes of each face's panel point as it is placed, orthonormal columns, shape (F, 3, 2).
@@ -102,7 +103,7 @@ def _welded(panels: Sequence[Panel], flat: Sequence[FlatPanel], samples: Samples
     vertices = np.asarray(sums / np.bincount(welded, minlength=count)[:, None], dtype=np.float64)
     faces = welded[np.concatenate([one.faces + k for one, k in zip(flat, start, strict=False)])].astype(np.int32)
     owner = np.repeat(np.arange(len(flat), dtype=np.int32), [len(one.faces) for one in flat])
-    laid = np.concatenate([one.points[one.faces] for one in flat])
+    laid = np.concatenate([place[one.faces] for place, one in zip(_side_by_side(panels, flat), flat, strict=True)])
     names = tuple(one.name for one in flat)
     _check_surface(faces, owner, names)
     mesh = TriangleMesh(vertices, faces, texture=laid)
@@ -110,6 +111,20 @@ def _welded(panels: Sequence[Panel], flat: Sequence[FlatPanel], samples: Samples
         raise GarmentError("the seams join more than two panels along one line", hint="sew layers one by one")
     frames = np.stack([panel.placement.rotation[:, :2] for panel in panels if panel.placement is not None])
     return Sewn(mesh, names, owner, frames[owner], float(min(one.angles.min() for one in flat)))
+
+
+def _side_by_side(panels: Sequence[Panel], flat: Sequence[FlatPanel]) -> list[FloatArray]:
+    """Return the points of each panel with its grain upright, beside the one before: no two panels share a place."""
+    laid = []
+    x = 0.0
+    for panel, one in zip(panels, flat, strict=True):
+        along = np.array([0.0, 1.0]) if panel.grain is None else panel.grain[1] - panel.grain[0]
+        along = along / np.linalg.norm(along)
+        upright = one.points @ np.array([[along[1], along[0]], [-along[0], along[1]]])
+        place = upright + np.array([x - upright[:, 0].min(), 0.0])
+        laid.append(place)
+        x = float(place[:, 0].max()) + _APART_M
+    return laid
 
 
 def _check_surface(faces: IntArray, owner: IntArray, names: tuple[str, ...]) -> None:

@@ -64,7 +64,7 @@ def _files(paths: Sequence[Path]) -> list[Path]:
 
 
 def _describe(session: Session, path: Path, output: Path | None, size: str | None, unit: str | None) -> None:
-    from vto_pipeline.cli.pattern_lines import pattern_facts, pattern_lines
+    from vto_pipeline.cli.commands.pattern.lines import pattern_facts, pattern_lines
     from vto_pipeline.io.patterns.read import read_pattern
     from vto_pipeline.io.patterns.write import write_pattern
     from vto_pipeline.model.job import Job
