@@ -28,7 +28,7 @@ def test_a_mesh_is_described_in_metres(vto):
 
 def test_every_kind_that_may_be_given_has_a_description(vto):
     assert DESCRIPTIONS.keys() == {
-        "photos", "video", "depth", "cloud", "surface", "silhouettes", "measurements", "avatar"
+        "photos", "video", "depth", "cloud", "surface", "silhouettes", "measurements", "avatar", "pattern"
     }  # fmt: skip
     Path("tape.yaml").write_text("unit: cm\nsex: female\nmeasurements: {chest_girth: 96, stature: 170}\n")
     said = vto("info", "tape.yaml", "--json")

@@ -18,6 +18,7 @@ from fuzz_captures import CAPTURES, sound_capture
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from io_shapes import write_all_formats
+from pattern_targets import PATTERNS
 from test_fabric_sheets import FAST, KES_CSV
 from test_fabric_u3m import raw_data
 from test_fuzz_readers import MESHES, OTHERS, read_one, write_others
@@ -56,6 +57,7 @@ TEXTS: dict[str, tuple[str, str, Callable[[Path], Any]]] = {
         "rows: [{name: a, seed: 1}]\nevery: {seed: [1, 2]}\n",
         read_order,
     ),
+    **PATTERNS,
     "table": ("t.csv", "name,seed,stages.add.offset\na,1,2\nb,2,\n", lambda path: read_order(_order_beside(path))),
 }
 TARGETS = [

@@ -92,6 +92,20 @@ def _video(path: Path, job: Job) -> dict[str, Any]:
     return {"pixels": [video.width, video.height], "board": video.board is not None}
 
 
+def _pattern(path: Path, job: Job) -> dict[str, Any]:
+    from vto_pipeline.cli.commands.pattern.lines import pattern_facts
+    from vto_pipeline.io.patterns.read import read_pattern
+
+    facts = pattern_facts(read_pattern(path, job=job))
+    return {
+        "panels": len(facts["panels"]),
+        "seams": len(facts["seams"]),
+        "sizes": ", ".join(facts["sizes"]),
+        "unit": facts["unit"],
+        "cloth_m2": 1e-4 * sum(panel["area_cm2"] for panel in facts["panels"]),
+    }
+
+
 DESCRIPTIONS: dict[str, Callable[[Path, Job], dict[str, Any]]] = {
     "surface": _surface,
     "cloud": _cloud,
@@ -101,5 +115,6 @@ DESCRIPTIONS: dict[str, Callable[[Path, Job], dict[str, Any]]] = {
     "measurements": _measurements,
     "silhouettes": _silhouettes,
     "video": _video,
+    "pattern": _pattern,
 }
 """Kind of what may be given, as `find_kind` has it -> a function that reads it and returns what it holds."""

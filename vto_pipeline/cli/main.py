@@ -27,6 +27,7 @@ COMMANDS = {
     "batch": "Run a document many times, with the changes of a table.",
     "status": "Show what has become of every row of a batch.",
     "cancel": "End a run or a batch that is at work; it can be resumed.",
+    "pattern": "Measure a sewing pattern, and write it in another format.",
     "info": "Describe a run, or a file or folder that may be given.",
     "prune": "Remove stored results that a run or a batch no longer needs.",
     "plan": "Show what a document would run, without running it.",

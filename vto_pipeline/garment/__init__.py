@@ -6,4 +6,5 @@ color_model, graph_cut, subtract: the mannequin taken away
 loop_evidence, bare_parts, notches, rims, openings: real openings kept, scan holes filled
 simulation_mesh: the mesh that is simulated
 wearable: whether a surface can be a garment at all
+pattern/: sewing patterns as garments
 """

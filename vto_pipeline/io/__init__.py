@@ -2,6 +2,7 @@
 
 meshes, clouds, fabrics: read any format
 formats/, gltf/, fabric_formats/: one file a format; fabric_presets/: one YAML file a fabric
+patterns/: sewing patterns in and out
 captures/, bodies/: what cameras deliver; what is known of a body
 runs/: the artifacts of a run
 sniff: what a path holds

@@ -13,10 +13,11 @@ from vto_pipeline.io.captures.rgbd_layouts import find_layout
 from vto_pipeline.io.documents import load_yaml
 from vto_pipeline.io.files import listed
 from vto_pipeline.io.formats.ply_header import read_header
+from vto_pipeline.io.patterns.read import is_pattern
 
 _WANTED = (
     "a folder of photos, of depth frames, of front and side pictures, or of MakeHuman; a video, a point cloud, a mesh, "
-    "a body model, a measurements file, or an avatar"
+    "a body model, a measurements file, a sewing pattern, or an avatar"
 )
 
 
@@ -27,7 +28,8 @@ def find_kind(path: Path) -> tuple[str, str]:
         path: File or folder.
 
     Returns:
-        "photos", "video", "depth", "cloud", "surface", "silhouettes", "measurements" or "avatar", and the reason.
+        "photos", "video", "depth", "cloud", "surface", "silhouettes", "measurements", "avatar" or "pattern", and the
+        reason.
 
     Raises:
         InputError: nothing there, or nothing known.
@@ -67,6 +69,10 @@ def _file(path: Path) -> tuple[str, str] | None:
         if "v_template.npy" in _members(path):
             return "surface", "it is an .npz archive of a body model"
         return "avatar", "it is an .npz archive"
+    if suffix in (".dxf", ".svg"):
+        return "pattern", f"{suffix} files hold sewing patterns"
+    if suffix == ".json" and is_pattern(path):
+        return "pattern", "it holds panels"
     if suffix in (".yaml", ".yml", ".json"):
         data = load_yaml(path, error=InputError).data
         return (

@@ -1,6 +1,7 @@
 """Numerical kernels that follow the papers: arrays in, arrays out.
 
 vector, planar, distance: three-vectors, plane points, nearest points
+plane_curves: polylines, Bezier curves and arcs
 ccd, separation: continuous collision detection
 line_search: how much of a descent step to take
 rasterise, resample: the visible triangle of each pixel; values of a picture between its pixels

@@ -18,6 +18,7 @@ _SCANNED = ("photos", "video", "depth", "cloud", "surface")
 GIVEN = {
     **{f"{role}.{kind}": f"{role}_{kind}" for role in ROLES for kind in _SCANNED},
     "garment.mesh": "garment_mesh",
+    "garment.pattern": "garment_pattern",
     "mannequin.measurements": "mannequin_measurements",
     "mannequin.avatar": "source_avatar",
     "body.measurements": "body_measurements",

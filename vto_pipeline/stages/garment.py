@@ -12,6 +12,8 @@ from vto_pipeline.cloth.rest_shape.from_hanging import RestShapeConfig, rest_sha
 from vto_pipeline.garment.align import AlignConfig, PosedPhotos, align_to_mannequin
 from vto_pipeline.garment.bare_parts import BareParts
 from vto_pipeline.garment.openings import OpeningsConfig, close_scan_holes, list_openings
+from vto_pipeline.garment.pattern.embed import in_shape
+from vto_pipeline.garment.pattern.sew import SewConfig, sew
 from vto_pipeline.garment.simulation_mesh import SimulationMeshConfig, remesh_for_simulation
 from vto_pipeline.garment.subtract import SubtractConfig, extract_garment, label_garment
 from vto_pipeline.garment.wearable import check_wearable
@@ -71,6 +73,12 @@ def _texture(inputs: Inputs, settings: TextureConfig, job: Job) -> Outputs:
         form = scene.colors[~inputs["labels"].garment]
     texture = texture_surface(inputs["garment"], occluder, inputs["garment_photos"], cameras, settings, job, form)
     return {"garment_texture": texture}
+
+
+def _sew(inputs: Inputs, settings: SewConfig, job: Job) -> Outputs:
+    pattern = inputs["garment_pattern"]
+    sewn = sew(pattern, settings, job)
+    return {"garment_mesh": in_shape(sewn, job), "panels": pattern}
 
 
 def _take_mesh(inputs: Inputs, settings: RepairConfig, job: Job) -> Outputs:
@@ -137,6 +145,15 @@ STAGES: tuple[Stage, ...] = (
         run=_texture,
         settings=TextureConfig,
         uses=("xatlas", "opencv-python-headless", "pyfqmr"),
+    ),
+    Stage(
+        name="sew",
+        about="a pattern's panels in triangles, their seams welded, bent in space without stretch",
+        needs=("garment_pattern",),
+        makes=("garment_mesh", "panels"),
+        run=_sew,
+        settings=SewConfig,
+        uses=("manifold3d", "numba", "scipy"),
     ),
     Stage(
         name="take_mesh",

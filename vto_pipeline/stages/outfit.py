@@ -30,9 +30,11 @@ from vto_pipeline.stages.outfit_page import OWN_PARTS, outfit_page
 Inputs = Mapping[str, Any]
 Outputs = Mapping[str, Any]
 
-_OWN_ROWS = ("take_mesh", "simulation_mesh", "rest_shape", "grade", "transfer", "assess")
+_OWN_ROWS = ("sew", "take_mesh", "simulation_mesh", "rest_shape", "grade", "transfer", "assess")
 _OWN = (
     "garment_mesh",
+    "garment_pattern",
+    "panels",
     "garment",
     "openings",
     "observed",
@@ -46,7 +48,7 @@ _OWN = (
 """Artifacts of which each garment has its own."""
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
-_KEYS = ("mesh", "fabric")
+_KEYS = ("mesh", "pattern", "fabric")
 """Keys under a garment's name in a document; with the garment's name in front, artifacts."""
 
 

@@ -1,6 +1,7 @@
 """One file a command.
 
 scan, fit, drape, run, batch: what makes something
+pattern/: a sewing pattern measured, and written in another format
 status, info, plan, stages, schema, doctor: what only looks
 report, prune, cancel, bench: the page again, room on the disk, an end, measurements
 """

@@ -22,6 +22,7 @@ from vto_pipeline.errors import MissingDependencyError
 
 _MODULES = {
     "dracopy": "DracoPy",
+    "ezdxf": "ezdxf",
     "gpytoolbox": "gpytoolbox",
     "jinja2": "jinja2",
     "laspy": "laspy",
@@ -44,6 +45,7 @@ _MODULES = {
     "pyyaml": "yaml",
     "rich": "rich",
     "scipy": "scipy",
+    "svgelements": "svgelements",
     "trimesh": "trimesh",
     "xatlas": "xatlas",
 }

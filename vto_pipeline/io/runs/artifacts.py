@@ -22,10 +22,13 @@ from vto_pipeline.io.documents import read_json, write_json
 from vto_pipeline.io.fabrics import read_fabric
 from vto_pipeline.io.files import check_file, listed, replacing
 from vto_pipeline.io.gltf.write import read_glb, write_glb
+from vto_pipeline.io.patterns.read import read_pattern
+from vto_pipeline.io.patterns.write import write_pattern
 from vto_pipeline.io.runs import garments, textures, traces
 from vto_pipeline.model.artifact import ArtifactKind
 from vto_pipeline.model.body import Avatar
 from vto_pipeline.model.job import Job
+from vto_pipeline.model.pattern import Pattern
 
 _PAGE_BYTES = 200_000_000
 
@@ -69,6 +72,10 @@ def _read_page(path: Path) -> str:
 
 def _write_avatar_mesh(path: Path, avatar: Avatar) -> None:
     meshes.write_ply(path, avatar.mesh)
+
+
+def _write_pattern(path: Path, pattern: Pattern) -> None:
+    write_pattern(path, pattern, Job())
 
 
 def _leaf(name: str, about: str, read: Callable[..., Any], **more: Any) -> ArtifactKind:
@@ -123,7 +130,7 @@ def _role_kinds(role: str, prefix: str) -> tuple[ArtifactKind, ...]:
             receive=_job_by_position(clouds.read_cloud),
             inline=_with_unit(clouds.read_cloud),
         ),
-        mesh_kind("mesh", "finished mesh"),
+        *([] if role == "garment" else [mesh_kind("mesh", "finished mesh")]),
         _leaf(
             f"{role}_measurements",
             f"{role}: tape measurements",
@@ -171,6 +178,31 @@ ARTIFACTS: tuple[ArtifactKind, ...] = (
         in_folder=_holds_pictures,
     ),
     _leaf("fabric", "preset name, fabric file, or its keys inline", read_fabric, inline=read_fabric),
+    _leaf(
+        "garment_pattern",
+        "garment: sewing pattern",
+        read_pattern,
+        receive=_job_by_position(read_pattern),
+        inline=_with_unit(read_pattern),
+    ),
+    ArtifactKind(
+        "panels",
+        "panels.json",
+        "the flat pattern: panels, grain, seams, notches",
+        read_pattern,
+        _write_pattern,
+        previews=(("panels.svg", _write_pattern), ("panels.dxf", _write_pattern)),
+    ),
+    ArtifactKind(
+        "garment_mesh",
+        "sewn.npz",
+        "garment: finished mesh, given or sewn",
+        garments.read_sewn,
+        garments.write_sewn,
+        receive=_job_by_position(meshes.read_mesh),
+        inline=_with_unit(meshes.read_mesh),
+        in_folder=lambda folder: (folder / BASE).is_file(),
+    ),
     ArtifactKind(
         "garment_placement",
         "garment_placement.json",

@@ -14,6 +14,23 @@ from vto_pipeline.io.documents import read_json, write_json
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.garment import Opening, RestShape, SurfaceLabels
+from vto_pipeline.model.mesh import TriangleMesh
+
+
+def write_sewn(path: Path, mesh: TriangleMesh) -> None:
+    """Write sewn.npz: vertices, faces, and the panels as texture coordinates."""
+    assert mesh.texture is not None
+    write_arrays(path, {"vertices": mesh.vertices, "faces": mesh.faces, "panels": mesh.texture})
+
+
+def read_sewn(path: Path) -> TriangleMesh:
+    """Read sewn.npz.
+
+    Raises:
+        FormatError: an array is missing.
+    """
+    arrays = read_arrays(path, required=("vertices", "faces", "panels"))
+    return TriangleMesh(arrays["vertices"], arrays["faces"], texture=arrays["panels"])
 
 
 def write_labels(path: Path, labels: SurfaceLabels) -> None:

@@ -95,7 +95,7 @@ def drape(
     """Drape one garment, or several in layers, on a body.
 
     Args:
-        garment: Mesh file, or several, innermost first.
+        garment: Mesh or sewing pattern, or several, innermost first.
         body: Avatar, skinned body of another model, or mesh.
         measurements: To build the body from, instead of `body`.
         source_body: Avatar or mesh that the garment was scanned on; None: it is placed automatically.

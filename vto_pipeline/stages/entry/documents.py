@@ -12,6 +12,7 @@ from vto_pipeline.errors import ConfigError, InputError
 from vto_pipeline.io.captures.photos import BOARD_FILE
 from vto_pipeline.io.documents import Document
 from vto_pipeline.io.files import resolved
+from vto_pipeline.io.patterns.read import PARSERS as PATTERNS
 from vto_pipeline.io.sniff import find_kind
 from vto_pipeline.stages.entry import planning
 
@@ -125,7 +126,7 @@ def drape_order(
     """Return the order of a drape.
 
     Args:
-        garments: Mesh files, innermost first.
+        garments: Meshes or sewing patterns, innermost first.
         fabrics: Presets or files: one for all garments, or one for each.
         body: Avatar, skinned body of another model, or mesh.
         measurements: To build the body from, instead of `body`.
@@ -159,14 +160,19 @@ def _garments(garments: Sequence[Path], fabrics: Sequence[str]) -> dict[str, Any
     if len(fabrics) not in (1, len(garments)):
         raise ConfigError(f"{len(fabrics)} fabrics for {len(garments)} garments: give one for all, or one per garment")
     if len(garments) == 1:
-        return {"garment.mesh": garments[0], "fabric": fabrics[0]}
+        return {f"garment.{_garment_kind(garments[0])}": garments[0], "fabric": fabrics[0]}
     found: dict[str, Any] = {}
     for garment, fabric in zip(garments, [*fabrics] * (len(garments) // len(fabrics)), strict=True):
         name = re.sub(r"[^a-z0-9]+", "_", garment.stem.lower()).strip("_")
         if name in found:
             raise ConfigError(f"two garments are named {name}: rename a file, or name them in a document")
-        found[name] = {"mesh": str(garment), "fabric": fabric}
+        found[name] = {_garment_kind(garment): str(garment), "fabric": fabric}
     return {"garments": found}
+
+
+def _garment_kind(path: Path) -> str:
+    """Return the key of a garment file: a pattern or a mesh."""
+    return "pattern" if path.suffix.lower() in PATTERNS else "mesh"
 
 
 def _is_avatar(path: Path | None) -> bool:

@@ -1,0 +1,75 @@
+"""vto pattern."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import ezdxf
+import numpy as np
+import pytest
+
+RADIUS_CM = 10.0
+
+
+def write_discs(path: Path, chord_cm: float = 2 * RADIUS_CM) -> None:
+    """Two half discs of GarmentCode, sewn along arc and chord, the second with another chord."""
+    panels = {}
+    for name, chord in (("left", 2 * RADIUS_CM), ("right", chord_cm)):
+        edges = [
+            {"endpoints": [0, 1]},
+            {"endpoints": [1, 0], "curvature": {"type": "circle", "params": [RADIUS_CM, 0, 1]}},
+        ]
+        panels[name] = {"vertices": [[0, 0], [chord, 0]], "edges": edges}
+    stitches = [[{"panel": "left", "edge": k}, {"panel": "right", "edge": k}] for k in (0, 1)]
+    path.write_text(json.dumps({"pattern": {"panels": panels, "stitches": stitches}, "properties": {}}))
+
+
+def test_panels_and_seams_are_measured(vto):
+    write_discs(Path("discs.json"), 12.0)
+    said = vto("pattern", "discs.json", "--json")
+    assert said.code == 0
+    left, _ = said.data["panels"]
+    assert left["area_cm2"] == pytest.approx(0.5 * np.pi * RADIUS_CM**2, rel=1e-6)
+    assert left["outline_mm"] == pytest.approx(10 * RADIUS_CM * (2 + np.pi), rel=1e-6)
+    assert left["edges"] == {"straight": 1, "arc": 1}
+    chord, arc = said.data["seams"]
+    assert (chord["mismatch_mm"], chord["mismatch_share"]) == (pytest.approx(-80.0), pytest.approx(0.4))
+    assert arc["lengths_mm"] == pytest.approx([100 * np.pi, 200 * np.arcsin(0.6)], rel=1e-6)
+    lines = vto("pattern", "discs.json").out
+    assert "-80.0 mm, 40.0%" in lines
+    assert "100 units a metre, assumed" in lines
+
+
+def test_one_size_is_written_and_nothing_overwritten(vto):
+    document = ezdxf.new("R12")
+    document.modelspace().add_text("UNITS: METRIC")
+    for size, side in (("S", 300), ("M", 320)):
+        block = document.blocks.new(f"FRONT_{size}")
+        block.add_text(f"SIZE: {size}", dxfattribs={"layer": "1"})
+        block.add_polyline2d([(0, 0), (side, 0), (0, side)], close=True, dxfattribs={"layer": "1"})
+    document.saveas("f.dxf")
+    assert vto("pattern", "f.dxf", "--size", "M", "-o", "m.svg").code == 0
+    assert [p["area_cm2"] for p in vto("pattern", "m.svg", "--json").data["panels"]] == pytest.approx([512.0])
+    assert vto("pattern", "f.dxf", "--size", "XL").code == 3
+    before = Path("f.dxf").read_bytes()
+    assert vto("pattern", "f.dxf", "-o", "./f.dxf").code == 2
+    assert Path("f.dxf").read_bytes() == before
+    assert vto("pattern", "f.dxf", "-o", "f.pdf").code == 2
+    assert vto("pattern", "f.dxf", "--unit", "in", "--json").data["unit"] == "in, as requested"
+
+
+def test_a_folder_gives_a_row_for_each_file(vto):
+    Path("all/deep").mkdir(parents=True)
+    write_discs(Path("all/deep/discs.json"), 12.0)
+    Path("all/bad.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg" width="9mm" viewBox="0 0 9 9"/>')
+    said = vto("pattern", "all", "--json")
+    assert said.code == 0
+    bad, good = said.data["files"]
+    assert "no line is a panel" in bad["refused"]
+    assert (good["panels"], good["stitches"]) == (2, 2)
+    assert good["worst_mismatch_mm"] == pytest.approx(200 * (np.pi / 2 - np.arcsin(0.6)), rel=1e-6)
+    assert "refused" in vto("pattern", "all").out
+    Path("none").mkdir()
+    assert vto("pattern", "none").code == 3
+    assert vto("pattern", "all", "-o", "x.svg").code == 2

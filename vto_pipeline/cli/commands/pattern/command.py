@@ -1,0 +1,115 @@
+"""vto pattern"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from vto_pipeline.cli.options import PATH, message_options
+from vto_pipeline.cli.session import Session, pass_session
+from vto_pipeline.errors import ConfigError, InputError
+from vto_pipeline.units import LENGTH_M
+
+if TYPE_CHECKING:
+    from vto_pipeline.model.pattern import Pattern
+
+
+@click.command("pattern")
+@click.argument("paths", metavar="PATH...", type=PATH, nargs=-1, required=True)
+@click.option("-o", "--output", type=PATH, metavar="FILE", help="Write the pattern: .dxf, .svg or .json.")
+@click.option("--size", metavar="NAME", help="Take the panels of one size. [default: all]")
+@click.option("--unit", type=click.Choice(sorted(LENGTH_M)), help="Unit of length, in place of the file's.")
+@message_options
+@pass_session
+def pattern_command(
+    session: Session, paths: tuple[Path, ...], output: Path | None, size: str | None, unit: str | None
+) -> None:
+    """Measure a sewing pattern, and write it in another format.
+
+    Reads DXF after AAMA and ASTM D6673, SVG, and JSON of GarmentCode. Several files, or a folder, give a table with a
+    row for each.
+
+    \b
+    vto pattern tee.json
+    vto pattern shirt.dxf --size M -o shirt_M.svg
+    vto pattern patterns/
+    """
+    files = _files(paths)
+    if len(paths) == 1 and not paths[0].is_dir():
+        _describe(session, files[0], output, size, unit)
+        return
+    if output is not None:
+        raise ConfigError(f"--output takes one pattern, and {len(files)} are given")
+    rows = [_row(path, size, unit) for path in files]
+    from vto_pipeline.cli.tables import table_lines
+
+    heads = ("file", "panels", "stitches", "worst mismatch", "verdict")
+    session.answer({"files": rows}, table_lines(heads, [tuple(_cells(row)) for row in rows]))
+
+
+def _files(paths: Sequence[Path]) -> list[Path]:
+    """Return files, and in place of folders the patterns below them."""
+    from vto_pipeline.io.patterns.read import PARSERS
+
+    found: list[Path] = []
+    for path in paths:
+        inside = sorted(p for p in path.rglob("*") if p.suffix.lower() in PARSERS) if path.is_dir() else [path]
+        if not inside:
+            raise InputError(f"the folder holds no {', '.join(PARSERS)}", where=str(path))
+        found += inside
+    return found
+
+
+def _describe(session: Session, path: Path, output: Path | None, size: str | None, unit: str | None) -> None:
+    from vto_pipeline.cli.commands.pattern.lines import pattern_facts, pattern_lines
+    from vto_pipeline.io.patterns.read import read_pattern
+    from vto_pipeline.io.patterns.write import write_pattern
+    from vto_pipeline.model.job import Job
+
+    job = Job()
+    pattern = _sized(read_pattern(path, unit=unit, job=job), size)
+    if output is not None:
+        if output.resolve() == path.resolve():
+            raise ConfigError("the output would overwrite the input", where=str(output))
+        write_pattern(output, pattern, job)
+    facts = {"path": str(path), **pattern_facts(pattern), "notes": job.notes}
+    if output is not None:
+        facts["written"] = str(output)
+    lines = [f"{path}: {pattern.name}, unit: {pattern.unit}", *pattern_lines(pattern), "", *job.notes]
+    session.answer(facts, [*lines, *([f"written: {output}"] if output else [])])
+
+
+def _sized(pattern: Pattern, size: str | None) -> Pattern:
+    return pattern if size is None else pattern.of_size(size)
+
+
+def _row(path: Path, size: str | None, unit: str | None) -> dict[str, Any]:
+    from vto_pipeline.garment.pattern.figures import seam_figures
+    from vto_pipeline.io.patterns.read import read_pattern
+
+    try:
+        pattern = _sized(read_pattern(path, unit=unit), size)
+    except InputError as error:
+        where = f" ({error.where})" if error.where and Path(error.where).name != path.name else ""
+        return {"file": str(path), "refused": error.problem + where}
+    seams = seam_figures(pattern.of_size(pattern.sizes[0])) if pattern.stitches else []
+    worst = max(seams, key=lambda seam: abs(seam.mismatch), default=None)
+    return {
+        "file": str(path),
+        "panels": len(pattern.panels),
+        "sizes": list(pattern.sizes),
+        "stitches": len(pattern.stitches),
+        "worst_mismatch_mm": worst and abs(1e3 * worst.mismatch),
+        "worst_mismatch_share": worst and worst.share,
+    }
+
+
+def _cells(row: dict[str, Any]) -> list[str]:
+    if "refused" in row:
+        return [row["file"], "", "", "", f"refused: {row['refused']}"]
+    worst = row["worst_mismatch_mm"]
+    said = "" if worst is None else f"{worst:.1f} mm, {row['worst_mismatch_share']:.1%}"
+    return [row["file"], str(row["panels"]), str(row["stitches"]), said, "read"]

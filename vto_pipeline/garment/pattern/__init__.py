@@ -1,0 +1,6 @@
+"""Sewing patterns as garments.
+
+figures: areas and lengths of panels, and how well the two sides of each seam match
+sampling, triangulate, sew: edges in samples, panels in triangles, seams welded
+embed: the sewn mesh bent in space without stretch
+"""

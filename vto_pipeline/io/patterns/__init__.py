@@ -1,0 +1,8 @@
+"""Sewing patterns.
+
+read, write: any format in; DXF, SVG and JSON out
+record: our own JSON, panels.json
+garment_code: JSON of GarmentCode and Garment-Pattern-Generator
+dxf/, svg/: one folder a format
+loops: pieces of outlines joined into closed ones
+"""

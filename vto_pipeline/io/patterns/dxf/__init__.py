@@ -1,0 +1,11 @@
+"""DXF files of pattern makers: AAMA-292 and ASTM D6673, through ezdxf.
+
+read: a file as a pattern
+entities, texts: what a block holds, in curves and in words
+piece: a block as a panel
+fold: half a panel opened at its mirror line
+borders: where one edge of an outline ends and the next begins
+stitch_texts: stitches in words
+write: a pattern as a file of release 12
+layers: what lies on which layer
+"""
