@@ -161,3 +161,21 @@ def test_the_only_opening_is_never_filled():
     made = remesh_for_simulation(pouch, SimulationMeshConfig(edge_mm=20.0), job)
     assert len(boundary_loops(made)) == 1
     assert not [note for note in job.notes if note.startswith("filled")]
+
+
+def test_an_opening_that_no_edges_can_follow_is_named():
+    def toothed(deep):
+        """A tube with a rim of 60 teeth, some of the vertices of which are raised."""
+        mesh = tube(around=120, along=60)
+        vertices = mesh.vertices.copy()
+        rim = np.flatnonzero(vertices[:, 1] == vertices[:, 1].max())
+        vertices[rim[::2], 1] += deep
+        return TriangleMesh(vertices, mesh.faces)
+
+    for deep, named in ((0.0, False), (6e-3, True)):
+        job = Job()
+        mesh = toothed(deep)
+        made = remesh_for_simulation(mesh, CONFIG, job)
+        before, after = (max(perimeter(m, loop) for loop in boundary_loops(m)) for m in (mesh, made))
+        assert (abs(after / before - 1.0) > 0.02) == named
+        assert any("an opening is" in text for text in job.warnings) == named

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from rich import box
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 
 from vto_pipeline.pipeline.execution.forecast import Expected
 from vto_pipeline.pipeline.plan import Plan
@@ -17,7 +17,8 @@ from vto_pipeline.pipeline.request import Request
 
 def table_lines(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
     """Return a table as lines of plain text."""
-    table = Table(*headings, box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    columns = [Column(heading, overflow="fold") for heading in headings]  # a path that is cut names no file
+    table = Table(*columns, box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
     for row in rows:
         table.add_row(*row)
     width = shutil.get_terminal_size((100, 24)).columns

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.geometry.remeshing.holes import fill_holes
-from vto_pipeline.geometry.remeshing.remesh import RemeshConfig, edge_lengths, remesh
+from vto_pipeline.geometry.remeshing.remesh import SAME_RIM, RemeshConfig, edge_lengths, remesh
 from vto_pipeline.geometry.remeshing.repair import RepairConfig, is_manifold, is_oriented, repair
 from vto_pipeline.geometry.remeshing.rims import perimeter
 from vto_pipeline.geometry.topology import (
@@ -66,6 +66,9 @@ def remesh_for_simulation(garment: TriangleMesh, config: SimulationMeshConfig, j
         return sound
     whole = concatenate(made)
     length = 1e3 * edge_lengths(whole)
+    change = _figure(job, "opening_change")
+    if change > SAME_RIM:
+        job.warn(f"an opening is {change:.0%} longer or shorter than the garment's: smaller edges (edge_mm) follow it")
     job.measure(
         pieces=len(made),
         vertices=len(whole.vertices),

@@ -31,7 +31,7 @@ from vto_pipeline.model.settings import Config
 DECIMATE_TO = 5.0
 """A mesh much finer than wanted is first thinned to this many times the wanted number of faces."""
 
-_SAME = 0.02
+SAME_RIM = 0.02
 """Of the length of an opening: a smaller change is what chords of a curved rim make."""
 
 ON_RIM = 1e-7
@@ -63,7 +63,7 @@ def remesh(mesh: TriangleMesh, config: RemeshConfig, job: Job) -> TriangleMesh:
     edge = config.edge_mm * 1e-3
     job.progress(0.0, "decimating")
     coarse = decimate(mesh, int(DECIMATE_TO * faces_at(mesh, edge)), aggressiveness=3.0)
-    if _broken(mesh, coarse) or rim_change(mesh, coarse) > _SAME:
+    if _broken(mesh, coarse) or rim_change(mesh, coarse) > SAME_RIM:
         coarse = mesh  # slower, but whole
     job.progress(0.3, "remeshing")
     best: TriangleMesh | None = None
@@ -74,7 +74,7 @@ def remesh(mesh: TriangleMesh, config: RemeshConfig, job: Job) -> TriangleMesh:
         problem = problem or broken
         if not broken and (changed := rim_change(mesh, tried)) < change:
             best, change = tried, changed
-        if change <= _SAME:
+        if change <= SAME_RIM:
             break
     if best is None:
         raise GarmentError(problem, hint="try an edge length well below the narrowest part of the garment")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -47,7 +48,8 @@ def pattern_command(
     from vto_pipeline.cli.tables import table_lines
 
     heads = ("file", "panels", "stitches", "worst mismatch", "verdict")
-    session.answer({"files": rows}, table_lines(heads, [tuple(_cells(row)) for row in rows]))
+    common = os.path.commonpath([path.parent for path in files])
+    session.answer({"files": rows}, table_lines(heads, [tuple(_cells(row, common)) for row in rows]))
 
 
 def _files(paths: Sequence[Path]) -> list[Path]:
@@ -107,9 +109,10 @@ def _row(path: Path, size: str | None, unit: str | None) -> dict[str, Any]:
     }
 
 
-def _cells(row: dict[str, Any]) -> list[str]:
+def _cells(row: dict[str, Any], folder: str) -> list[str]:
+    name = os.path.relpath(row["file"], folder)  # long paths would be cut where they differ
     if "refused" in row:
-        return [row["file"], "", "", "", f"refused: {row['refused']}"]
+        return [name, "", "", "", f"refused: {row['refused']}"]
     worst = row["worst_mismatch_mm"]
     said = "" if worst is None else f"{worst:.1f} mm, {row['worst_mismatch_share']:.1%}"
-    return [row["file"], str(row["panels"]), str(row["stitches"]), said, "read"]
+    return [name, str(row["panels"]), str(row["stitches"]), said, "read"]
