@@ -59,15 +59,17 @@ def test_a_tube_has_two_openings_as_long_as_its_panels_and_their_area():
     sewn = sew(tube(), EDGE, job)
     mesh = in_shape(sewn, job)
     loops = boundary_loops(mesh)
-    assert [perimeter(mesh, loop) for loop in loops] == pytest.approx([0.8, 0.8], rel=2e-3)
+    assert [perimeter(mesh, loop) for loop in loops] == pytest.approx([0.8, 0.8], rel=1e-2)
     area = np.linalg.norm(face_area_vectors(mesh), axis=1)
-    assert area.sum() == pytest.approx(4 * 0.2 * 0.3, rel=2e-3)
+    assert area.sum() == pytest.approx(4 * 0.2 * 0.3, rel=1e-2)
     flat = 0.5 * np.linalg.det(mesh.texture[:, 1:] - mesh.texture[:, :1])
     assert flat.sum() == pytest.approx(0.24, rel=1e-9)
     assert np.bincount(sewn.panel, flat) == pytest.approx([0.06] * 4)
-    assert max(abs(job.metrics[f"stretch_p{p}_share"]) for p in ("01", "99")) < 5e-3
+    assert max(abs(job.metrics[f"stretch_p{p}_share"]) for p in ("01", "99")) < 2e-2
     out = (face_area_vectors(mesh)[:, [0, 2]] * mesh.vertices[mesh.faces].mean(axis=1)[:, [0, 2]]).sum(axis=1)
     assert (out > 0.0).all()  # the right side is outside
+    around = np.hypot(*mesh.vertices[np.abs(mesh.vertices[:, 1] - 0.15) < 0.05][:, [0, 2]].T)
+    assert around == pytest.approx(0.8 / (2 * np.pi), rel=0.05)  # blown up, a prism is round
     assert (job.metrics["pieces"], job.metrics["seams"]) == (1, 4)
 
 
@@ -102,18 +104,18 @@ def test_a_dart_makes_a_cone():
     sewn = sew(cone, EDGE, Job())
     mesh = in_shape(sewn, Job())
     (rim,) = boundary_loops(mesh)
-    assert perimeter(mesh, rim) == pytest.approx(radius * angle, rel=1e-2)
+    assert perimeter(mesh, rim) == pytest.approx(radius * angle, rel=3e-2)
     (tip,) = np.unique(mesh.faces[np.isclose(mesh.texture, [radius, 0.0], rtol=0, atol=1e-3).all(axis=2)])
     # the rim of a cone is a circle of radius r a / 2 pi, at the depth that the slanted side leaves
     across = np.linalg.norm(mesh.vertices[rim] - mesh.vertices[rim].mean(axis=0), axis=1)
-    assert across.mean() == pytest.approx(radius * angle / (2 * np.pi), rel=0.02)
-    assert np.linalg.norm(mesh.vertices[rim] - mesh.vertices[tip], axis=1) == pytest.approx(radius, rel=0.02)
+    assert across.mean() == pytest.approx(radius * angle / (2 * np.pi), rel=0.03)
+    assert np.linalg.norm(mesh.vertices[rim] - mesh.vertices[tip], axis=1) == pytest.approx(radius, rel=0.03)
 
 
 def test_chains_of_many_edges_are_sampled_alike_on_both_sides():
     """Three edges against two of another length, one of them run through backwards."""
     low = polygon("low", [(0, 0), (0.5, 0), (0.5, 0.2), (0.35, 0.2), (0.1, 0.2), (0, 0.2)])
-    high = polygon("high", [(0, 0.3), (0.21, 0.3), (0.6, 0.3), (0.6, 0.5), (0, 0.5)])
+    high = polygon("high", [(0, 0.3), (0.417, 0.3), (0.6, 0.3), (0.6, 0.5), (0, 0.5)])
     chain = (Side("low", 2), Side("low", 3), Side("low", 4))
     pattern = Pattern("x", (low, high), (Stitch(chain, (Side("high", 1, False), Side("high", 0, False))),))
     samples = sample_edges(pattern, 0.02)
@@ -130,7 +132,7 @@ def test_chains_of_many_edges_are_sampled_alike_on_both_sides():
     assert (np.diff(left) < 0.0).all()
     assert (np.diff(right) < 0.0).all()
     assert left / 0.5 == pytest.approx(right / 0.6, abs=0.02)  # in proportion, but for ends of edges nearly opposite
-    for own, ends in ((left, (0.35, 0.1)), (right, (0.21,))):
+    for own, ends in ((left, (0.35, 0.1)), (right, (0.417,))):
         for end in ends:
             assert np.abs(own - end).min() < 1e-9
     steps = np.abs(np.concatenate([np.diff(left), np.diff(right)]))

@@ -19,7 +19,7 @@ from vto_pipeline.cli.session import Session, pass_session
     required=True,
     multiple=True,
     metavar="FILE",
-    help="Garment mesh; repeat for layers, innermost first.",
+    help="Garment mesh or sewing pattern; repeat for layers, innermost first.",
 )
 @click.option("--body", type=PATH, metavar="FILE", help="Avatar, skinned body of another model, or plain mesh.")
 @click.option("--measurements", type=PATH, metavar="FILE", help="Build the body from these instead of --body.")

@@ -17,11 +17,13 @@ from scipy.sparse.linalg import splu
 
 from vto_pipeline.garment.pattern.sew import Sewn
 from vto_pipeline.geometry.topology import laid_edge_lengths
-from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
-_ROUNDS = 100
+_ROUNDS = 150
+_INFLATED = 100  # of these: at first it is blown up, so that it is a tube that a body finds its place in, not a pillow
+_PRESSURE = 0.5  # times the reach, against the stiffness of the frames: stretches a tube by a few percent
 _BULGE = 0.2  # of its reach
 _HOLD = 1e-6  # weight of staying in place against the frames: they leave the whole free to move
 _LEAST_COT = 0.05  # weights stay positive where a corner is blunt
@@ -61,17 +63,26 @@ def embed(mesh: TriangleMesh, frames: FloatArray) -> FloatArray:
     hold = _HOLD * float(weight.mean())
     solver = splu(csc_array(_diagonal(links.sum(axis=1) + hold) - links))
     x = mesh.vertices
+    reach = float(np.linalg.norm(x - x.mean(axis=0), axis=1).max())
     for number in range(_ROUNDS):
         wanted = weight[:, :, None] * (flat @ np.swapaxes(frames, 1, 2))  # along each side, in space
         right = hold * mesh.vertices
         for k in range(3):
             right[:, k] += np.bincount(columns, wanted[:, :, k].ravel(), count)
             right[:, k] -= np.bincount(rows, wanted[:, :, k].ravel(), count)
+        if 0 < number < _INFLATED:
+            right += _PRESSURE / reach * _area_vectors(mesh.faces, x)
         x = np.asarray(solver.solve(right))
         if number == 0:
             x = x + _bulge(mesh, frames)
         frames = _frames(np.roll(x[mesh.faces], -1, axis=1) - x[mesh.faces], flat, weight)
     return x
+
+
+def _area_vectors(faces: IntArray, x: FloatArray) -> FloatArray:
+    """Return a third of the area vectors of the faces around each vertex [m²], shape (V, 3)."""
+    third = np.cross(x[faces[:, 1]] - x[faces[:, 0]], x[faces[:, 2]] - x[faces[:, 0]]) / 6.0
+    return np.stack([np.bincount(faces.ravel(), np.repeat(third[:, k], 3), len(x)) for k in range(3)], axis=1)
 
 
 def _bulge(mesh: TriangleMesh, frames: FloatArray) -> FloatArray:

@@ -44,7 +44,10 @@ def pattern_command(
         return
     if output is not None:
         raise ConfigError(f"--output takes one pattern, and {len(files)} are given")
-    rows = [_row(path, size, unit) for path in files]
+    rows = []
+    for number, path in enumerate(files, start=1):
+        session.say(f"[{number}/{len(files)}] {path}")
+        rows.append(_row(path, size, unit))
     from vto_pipeline.cli.tables import table_lines
 
     heads = ("file", "panels", "stitches", "worst mismatch", "verdict")

@@ -46,10 +46,9 @@ def drawn_pattern(drawing: Drawing, name: str, notes: list[str]) -> Pattern:
         else:
             inner.setdefault(holder, []).append(InnerLine("internal", loop.edges))
     if not outer:
-        least = f"{1e4 * _LEAST_M2:g} cm²"
-        problem = (
-            f"no line is a panel: {len(joined.loops)} are closed, none of {least} or more, and {len(joined.open)} open"
-        )
+        least = f"{1e4 * _LEAST_M2:g} cm² or more and {1e3 * _LEAST_WIDTH_M:g} mm wide on average"
+        counts = f"{len(joined.loops)} are closed, none of {least}, and {len(joined.open)} open"
+        problem = f"no line is a panel: {counts}"
         raise FormatError(problem, hint="close the outlines, and check the scale of the drawing")
     stray = []
     for line in (*joined.open, *joined.branching):
