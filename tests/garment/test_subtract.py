@@ -103,8 +103,8 @@ def test_a_long_skirt_on_a_short_form_is_cloth_down_to_its_hem(floor):
 
 
 def test_tight_cloth_on_a_form_that_was_scanned_roughly_is_cloth(scene, placed):
-    """Little of the form is bare, and it was scanned in waves of 2.8 mm. Cloth lies 5 mm off it in the upper half, where
-    there is more light: within two deviations of the form lies mostly cloth."""
+    """Little of the form is bare, and it was scanned in waves of 2.8 mm. Cloth lies 5 mm off it in the upper half,
+    where there is more light: within two deviations of the form lies mostly cloth."""
     on = SurfaceDistance(scene.form).nearest(placed.vertices)
     x, y, z = placed.vertices.T
     tight = y > 0.4

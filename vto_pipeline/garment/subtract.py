@@ -53,8 +53,8 @@ def label_garment(surface: TriangleMesh, mannequin: TriangleMesh, config: Subtra
 
     Evidence per vertex: the signed distance against the noise measured on the bare parts, the colour, and whether the
     normal agrees with the mannequin's. The form's colours are those of what lies just inside of it, where no cloth can
-    be: as far outside, tight cloth may be most of what there is. A boundary is cheap where the colour changes. The level surface that the scan
-    stands on is floor or board; cloth that hangs below the mannequin is cloth.
+    be: as far outside, tight cloth may be most of what there is. A boundary is cheap where the colour changes. The
+    level surface that the scan stands on is floor or board; cloth that hangs below the mannequin is cloth.
 
     Args:
         surface: The scan in the mannequin's frame.
