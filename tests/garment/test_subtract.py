@@ -13,7 +13,7 @@ from vto_pipeline.garment.subtract import SubtractConfig, extract_garment, label
 from vto_pipeline.geometry.remeshing.repair import is_manifold
 from vto_pipeline.geometry.rigid import transform_mesh
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import face_components
+from vto_pipeline.geometry.topology import face_components, face_normals, submesh
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -100,3 +100,24 @@ def test_a_long_skirt_on_a_short_form_is_cloth_down_to_its_hem(floor):
         [one.center[1] for one in openings], [SKIRT_TOP, SKIRT_HEM], rtol=0, atol=0.012
     )  # a cell and a half
     assert skirt.vertices[:, 1].min() < SKIRT_HEM + 0.016
+
+
+def test_tight_cloth_on_a_form_that_was_scanned_roughly_is_cloth(scene, placed):
+    """Little of the form is bare, and it was scanned in waves of 2.8 mm. Cloth lies 5 mm off it in the upper half,
+    where there is more light: within two deviations of the form lies mostly cloth."""
+    on = SurfaceDistance(scene.form).nearest(placed.vertices)
+    x, y, z = placed.vertices.T
+    tight = y > 0.4
+    waves = 2.8e-3 * np.sqrt(2.0) * np.sin(2 * np.pi * (x + 0.7 * y + 0.5 * z) / 0.12)
+    vertices = (
+        on.point
+        + np.where(scene.is_shirt, np.where(tight, 5e-3, 15e-3), waves)[:, None] * (face_normals(scene.form)[on.face])
+    )
+    light = np.where(scene.is_shirt & tight, 1.3, 1.0)
+    colors = np.clip(light[:, None] * placed.colors, 0, 255).astype(np.uint8)
+    kept = scene.is_shirt | (y > 0.8)
+    surface, source = submesh(TriangleMesh(vertices, placed.faces, colors), kept[placed.faces].all(axis=1))
+    labels = label_garment(surface, scene.form, SubtractConfig(), Job())
+    shirt = scene.is_shirt[source]
+    assert labels.garment[shirt].mean() > 0.95
+    assert labels.garment[~shirt].mean() < 0.3

@@ -52,8 +52,9 @@ def label_garment(surface: TriangleMesh, mannequin: TriangleMesh, config: Subtra
     """Divide the scan into garment and the rest by an exact graph cut.
 
     Evidence per vertex: the signed distance against the noise measured on the bare parts, the colour, and whether the
-    normal agrees with the mannequin's. A boundary is cheap where the colour changes. The level surface that the scan
-    stands on is floor or board; cloth that hangs below the mannequin is cloth.
+    normal agrees with the mannequin's. The form's colours are those of what lies just inside of it, where no cloth can
+    be: as far outside, tight cloth may be most of what there is. A boundary is cheap where the colour changes. The
+    level surface that the scan stands on is floor or board; cloth that hangs below the mannequin is cloth.
 
     Args:
         surface: The scan in the mannequin's frame.
@@ -70,7 +71,7 @@ def label_garment(surface: TriangleMesh, mannequin: TriangleMesh, config: Subtra
     floor = _on_floor(surface, mannequin, sigma, job)
     thickness = config.thickness_mm * 1e-3
     sure_garment = (near.distance > thickness + 3.0 * sigma) & ~floor
-    sure_bare = (np.abs(near.distance) < 2.0 * sigma) & (facing > 0.7) & ~floor
+    sure_bare = (near.distance < 0.0) & (near.distance > -2.0 * sigma) & (facing > 0.7) & ~floor
     if not sure_garment.any():
         raise GarmentError(
             f"no part of the scan stands off from the mannequin by more than {(thickness + 3 * sigma) * 1e3:.1f} mm",

@@ -43,7 +43,7 @@ def map_photos(database: Path, folder: Path, count: int, job: Job) -> Any | None
     straight = _best(database, folder, count, job, bent=False)
     if straight is None or not _explains_as_much(straight, found):
         return found
-    job.note(f"took the lens as straight: one that moves the corners by {100 * bend(found):.0f} % is no better")
+    job.note(f"took the lens as straight: one that moves the corners by {100 * bend(found):.0f} % explains no more")
     return straight
 
 
