@@ -71,8 +71,9 @@ def test_bad_usage_is_json_where_json_is_asked_for(vto):
 
 
 def test_the_table_of_commands_is_the_folder(request):
-    files = {path.stem for path in (request.config.rootpath / "vto_pipeline" / "cli" / "commands").glob("*.py")}
-    assert set(COMMANDS) == files - {"__init__"}
+    folder = request.config.rootpath / "vto_pipeline" / "cli" / "commands"
+    modules = {path.stem for path in folder.glob("*.py")} | {path.parent.name for path in folder.glob("*/__init__.py")}
+    assert set(COMMANDS) == modules - {"__init__"}
     assert main_module.vto.list_commands(click.Context(main_module.vto)) == list(COMMANDS)
 
 
