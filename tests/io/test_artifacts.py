@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pattern_shapes import rich_pattern
 
 from vto_pipeline.errors import InputError
 from vto_pipeline.io.runs.artifacts import ARTIFACTS
@@ -69,6 +70,8 @@ VALUES: dict[str, Any] = {
     "fit_report": {"zones": {"waist": {"ease_mm": -3.25}}},
     "observed": RNG.random(8) > 0.5,
     "fit_maps": {"stretch": RNG.random(8), "clearance_mm": RNG.random(8)},
+    "panels": rich_pattern(),
+    "garment_mesh": TriangleMesh(POINTS, FACES, texture=np.random.default_rng(6).random((9, 3, 2))),
     "page": "<!doctype html><p>é</p>\n",
 }
 

@@ -17,7 +17,7 @@ class DrapeConfig(StepConfig, PlaceConfig, Materials):
     )
     friction: float | None = Field(None, ge=0, le=5, description="Friction against the body; by default the fabric's")
     body_speed: float = Field(
-        0.3,
+        0.6,
         gt=0,
         le=5,
         description="Top speed of the changing body under the cloth [m/s]",
