@@ -8,6 +8,7 @@ import numpy as np
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.pattern.sampling import Samples
+from vto_pipeline.garment.simulation_mesh import least_angles
 from vto_pipeline.geometry.remeshing.refine import refine
 from vto_pipeline.io.patterns.loops import edges_area, edges_points
 from vto_pipeline.model.arrays import FloatArray, IntArray
@@ -29,6 +30,7 @@ class FlatPanel:
         faces: Anticlockwise, shape (F, 3).
         first: Number of the first sample of each edge, shape (E,).
         outline: How many points the outline has.
+        angles: The smallest of each triangle [rad], shape (F,).
     """
 
     name: str
@@ -36,20 +38,11 @@ class FlatPanel:
     faces: IntArray
     first: IntArray
     outline: int
+    angles: FloatArray
 
     def vertex(self, edge: int, sample: int) -> int:
         """Return the point that is a sample of an edge; an edge's last is the next one's first."""
         return (int(self.first[edge]) + sample) % self.outline
-
-    @property
-    def angles(self) -> FloatArray:
-        """The smallest angle of each triangle [rad], shape (F,)."""
-        corners = self.points[self.faces]
-        sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)  # from each corner to the next
-        a, b, c = sides[:, 0], sides[:, 1], sides[:, 2]
-        cosines = np.stack([(a * a + c * c - b * b) / (2 * a * c), (a * a + b * b - c * c) / (2 * a * b),
-                            (b * b + c * c - a * a) / (2 * b * c)], axis=1)  # fmt: skip
-        return np.asarray(np.arccos(np.clip(cosines, -1.0, 1.0)).min(axis=1))
 
 
 def triangulate_panel(panel: Panel, samples: Samples, edge: float) -> FlatPanel:
@@ -82,7 +75,8 @@ def triangulate_panel(panel: Panel, samples: Samples, edge: float) -> FlatPanel:
         raise GarmentError(problem, hint="or a cut-out leaves the outline; look at it with vto pattern -o FILE.svg")
     flat = TriangleMesh(np.concatenate([points, np.zeros((len(points), 1))], axis=1), faces)
     fine = refine(flat, edge, np.zeros((len(points), len(points)), np.bool_))
-    return FlatPanel(panel.name, fine.vertices[:, :2], fine.faces, first.astype(np.int32), len(loops[0]))
+    outline = len(loops[0])
+    return FlatPanel(panel.name, fine.vertices[:, :2], fine.faces, first.astype(np.int32), outline, least_angles(fine))
 
 
 def _evenly(points: FloatArray, edge: float) -> FloatArray:
