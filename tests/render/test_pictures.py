@@ -8,8 +8,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.numerics.rasterise import rasterise
+from vto_pipeline.render.frames import BACK, FRONT, LEFT, Frame, bounds, frame_box
 from vto_pipeline.render.marks import mark_places
-from vto_pipeline.render.pictures import BACK, FRONT, LEFT, render_picture
+from vto_pipeline.render.pictures import render_picture
 from vto_pipeline.render.tint import tint
 
 RED, GREEN = (220, 40, 40), (40, 200, 60)
@@ -31,11 +32,16 @@ def card(z: float, color, half: float = 0.5) -> TriangleMesh:
     return tint(TriangleMesh(vertices, [[0, 1, 2], [0, 2, 3]]), color)
 
 
+def level(things: list[TriangleMesh], azimuth: float) -> Frame:
+    """All of them, seen from their own height."""
+    return frame_box(*bounds(things), azimuth, 0.0)
+
+
 @pytest.mark.parametrize("azimuth", [0.0, 90.0, 213.0])
 def test_silhouette_of_a_sphere_is_a_disc(azimuth: float) -> None:
     box = np.full(3, -0.5), np.full(3, 0.5)
     black = ball(color=(0, 0, 0))  # whatever the light, a pixel's darkness is the share of it that is covered
-    picture = render_picture([black], azimuth_deg=azimuth, elevation_deg=0, size=(240, 240), margin=0.1, box=box)
+    picture = render_picture([black], frame_box(*box, azimuth, 0.0), size=(240, 240), margin=0.1)
     a = np.radians(azimuth)
     half_width = 0.5 * max(abs(np.cos(a)) + abs(np.sin(a)), 1.0)  # of the turned box
     radius_px = 0.5 / half_width * 0.8 * 120
@@ -63,23 +69,23 @@ def test_two_triangles_of_a_square_leave_no_gap() -> None:
 
 def test_the_nearer_thing_hides_the_farther() -> None:
     things = [card(-0.2, GREEN), card(0.2, RED)]
-    front = render_picture(things, azimuth_deg=FRONT, elevation_deg=0, size=(40, 40))[20, 20]
-    back = render_picture(things, azimuth_deg=BACK, elevation_deg=0, size=(40, 40))[20, 20]
+    front = render_picture(things, level(things, FRONT), size=(40, 40))[20, 20]
+    back = render_picture(things, level(things, BACK), size=(40, 40))[20, 20]
     assert front[0] > front[1]
     assert back[1] > back[0]
 
 
 def test_the_left_view_shows_the_persons_left() -> None:
     things = [ball((0.6, 0, 0), 0.2, GREEN), ball((-0.6, 0, 0), 0.2, RED)]
-    left = render_picture(things, azimuth_deg=LEFT, elevation_deg=0, size=(60, 60))[30, 30]
+    left = render_picture(things, level(things, LEFT), size=(60, 60))[30, 30]
     assert left[1] > left[0]
-    front = render_picture(things, azimuth_deg=FRONT, elevation_deg=0, size=(90, 40))
+    front = render_picture(things, level(things, FRONT), size=(90, 40))
     assert front[20, 75, 1] > front[20, 75, 0]  # who faces us has the left hand on our right
 
 
 def test_both_sides_of_cloth_are_lit_the_inside_darker() -> None:
-    outside = render_picture([card(0.0, RED)], azimuth_deg=FRONT, elevation_deg=0, size=(40, 40))[20, 20, 0]
-    inside = render_picture([card(0.0, RED)], azimuth_deg=BACK, elevation_deg=0, size=(40, 40))[20, 20, 0]
+    outside = render_picture([card(0.0, RED)], level([card(0.0, RED)], FRONT), size=(40, 40))[20, 20, 0]
+    inside = render_picture([card(0.0, RED)], level([card(0.0, RED)], BACK), size=(40, 40))[20, 20, 0]
     assert 60 < inside < outside
 
 

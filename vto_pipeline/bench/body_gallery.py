@@ -14,7 +14,8 @@ from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.io.bodies.size_letters import chest_range
 from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.body import Measurements
-from vto_pipeline.render.pictures import BACK, FRONT, LEFT, render_picture
+from vto_pipeline.render.frames import BACK, FRONT, LEFT, frame_box
+from vto_pipeline.render.pictures import render_picture
 
 _LETTERS = ("XS", "M", "4XL")
 _STATURE_M = {"female": 1.66, "neutral": 1.72, "male": 1.78}
@@ -32,11 +33,7 @@ def draw_bodies() -> ByteArray:
             ).mesh
             for side, width in ((FRONT, 370), (LEFT, 170), (BACK, 370)):
                 size = (width, _TALL_PX)
-                views.append(
-                    render_picture(
-                        [body], azimuth_deg=side, elevation_deg=0, size=size, margin=0.01, box=_framed(width)
-                    )
-                )
+                views.append(render_picture([body], frame_box(*_framed(width), side, 0.0), size=size, margin=0.01))
         rows.append(np.hstack(views))
     return np.vstack(rows)
 

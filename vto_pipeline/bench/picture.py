@@ -10,6 +10,7 @@ from vto_pipeline.io.captures.images import read_image
 from vto_pipeline.io.gltf.write import read_glb
 from vto_pipeline.io.meshes import read_own_mesh
 from vto_pipeline.model.arrays import ByteArray
+from vto_pipeline.render.frames import frame_view
 from vto_pipeline.render.pictures import render_picture
 from vto_pipeline.render.tint import SKIN, tint
 
@@ -31,6 +32,6 @@ def draw_demo(run: Path, samples: Path) -> ByteArray:
     garment = read_own_mesh(out / "garment.ply")
     dressed = [tint(read_own_mesh(out / "avatar.ply"), SKIN), read_glb(out / "render_mesh.glb")[0].mesh]
     columns = [photo[:, 130:670]]
-    columns += [render_picture([garment], azimuth_deg=azimuth, size=(480, _HEIGHT)) for azimuth in (0, 180)]
-    columns += [render_picture(dressed, azimuth_deg=azimuth, size=(420, _HEIGHT)) for azimuth in (0, 180)]
+    for shown, width in (([garment], 480), (dressed, 420)):
+        columns += [render_picture(shown, frame_view(name, shown), size=(width, _HEIGHT)) for name in ("front", "back")]
     return np.hstack(columns)

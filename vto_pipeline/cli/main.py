@@ -33,6 +33,8 @@ COMMANDS = {
     "plan": "Show what a document would run, without running it.",
     "bench": "Measure error against run time and plot it.",
     "report": "Rebuild the page of a run.",
+    "view": "Show the page of a run in the browser.",
+    "render": "Draw pictures of what a run made, or of a mesh.",
     "stages": "List all stages.",
     "schema": "Print the JSON schema of a pipeline document.",
     "doctor": "Check the installation and show how to fix it.",

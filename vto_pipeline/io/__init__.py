@@ -5,6 +5,7 @@ formats/, gltf/, fabric_formats/: one file a format; fabric_presets/: one YAML f
 patterns/: sewing patterns in and out
 captures/, bodies/: what cameras deliver; what is known of a body
 runs/: the artifacts of a run
+animations: moving pictures
 sniff: what a path holds
 sandbox: untrusted bytes are parsed in a limited child process
 files, arrays, documents, text_numbers: what readers and writers share

@@ -1,5 +1,6 @@
 """The detailed garment after the drape, and pictures.
 
 dress, transfer: the render mesh rides on the simulation mesh
-pictures, shading, tint, marks: pictures without a display
+pictures, frames: pictures without a display, and what they frame
+shading, shadows, surface_colors, tint, marks: how surfaces look in them
 """

@@ -5,5 +5,5 @@ documents: the pipeline document that each of them stands for
 planning: the tables, and the request and the plan of a document
 batches: the rows of a batch, planned, and finished at once where all is stored
 outcome: what a run made, and what it says
-pictures: a small picture of it
+shown, pictures: what of it can be drawn, and a small picture of that
 """

@@ -1,0 +1,70 @@
+"""vto render."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from vto_pipeline.io.meshes import write_ply
+from vto_pipeline.model.mesh import TriangleMesh
+
+
+@pytest.fixture
+def tent() -> Path:
+    vertices = np.array([(-0.3, 0.0, 0.0), (0.3, 0.0, 0.0), (0.0, 0.6, 0.0), (0.0, 0.0, 0.3)])
+    path = Path("tent.ply").absolute()
+    write_ply(path, TriangleMesh(vertices, [[0, 1, 2], [0, 2, 3], [1, 3, 2], [0, 3, 1]]))
+    return path
+
+
+def test_views_are_drawn_beside_a_mesh(vto, tent):
+    said = vto("render", tent, "--views", "front, back,front", "--size", 96, "--json")
+    assert said.code == 0
+    assert list(said.data["pictures"]) == ["front", "back"]
+    for name, one in said.data["pictures"].items():
+        assert Path(one["file"]) == tent.parent / "pictures" / f"{name}.png"
+        assert one["seconds"] > 0
+        with Image.open(one["file"]) as picture:
+            assert picture.size == (72, 96)
+            assert np.asarray(picture).min() < 240
+
+
+@pytest.mark.parametrize("name", ["turn.gif", "turn.mp4"])
+def test_a_turn_has_all_its_frames(vto, tent, name):
+    import cv2
+
+    said = vto("render", tent, "--views", "", "--size", 64, "--turntable", name, "--json")
+    assert said.code == 0
+    assert list(said.data["pictures"]) == ["turntable"]
+    if name.endswith("gif"):
+        with Image.open(name) as animation:
+            assert (animation.n_frames, animation.size, animation.info["duration"]) == (72, (48, 64), 40)
+    else:
+        video = cv2.VideoCapture(name)
+        frames = sum(1 for _ in iter(lambda: video.read()[0], False))
+        assert frames == 72
+        assert video.get(cv2.CAP_PROP_FPS) == pytest.approx(24.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "text"),
+    [
+        (["tent.ply", "--views", "top"], 2, "no view 'top'; allowed: front, side, back, closeup"),
+        (["tent.ply", "--turntable", "turn.avi"], 2, "'turn.avi' is no name of a moving picture"),
+        (["tent.ply", "--size", "10"], 2, "64<=x<=4096"),
+        (["none.ply"], 3, "no such file"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(vto, tent, arguments, code, text):
+    said = vto("render", *arguments)
+    assert (said.code, text in said.err) == (code, True)
+    assert not Path("pictures").exists()
+
+
+def test_a_run_without_a_surface_is_refused(vto):
+    assert vto("run", "toy.yaml", "-o", "RUN").code == 0
+    said = vto("render", "RUN")
+    assert (said.code, "nothing that can be drawn" in said.err) == (3, True)

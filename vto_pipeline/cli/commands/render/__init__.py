@@ -1,0 +1,9 @@
+"""vto render.
+
+command: the command
+draw: pictures of views, and of a turn
+"""
+
+from vto_pipeline.cli.commands.render.command import render_command
+
+__all__ = ["render_command"]

@@ -1,0 +1,66 @@
+"""What a run made that can be drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from vto_pipeline.errors import VtoError
+from vto_pipeline.model.mesh import Skin, TriangleMesh
+from vto_pipeline.model.render import GlbPart
+from vto_pipeline.numerics.srgb import encode_srgb
+from vto_pipeline.render.tint import SKIN, tint
+from vto_pipeline.stages.entry.outcome import Outcome
+
+_ALONE = ("garment", "garment_surface", "avatar", "fitted_avatar", "body_surface", "mannequin_surface", "surface")
+"""What is shown of a run without a drape: the first of these that it made."""
+
+_UNDYED = (1.0, 1.0, 1.0)  # what glTF assumes where nothing is said
+
+
+def shown_artifacts(outcome: Outcome, *, detailed: bool = False) -> list[str]:
+    """Return the names of what was draped and of its body, or of what was scanned or fitted; garments first.
+
+    Args:
+        outcome: Of the run.
+        detailed: Whether garments are shown as their render meshes, where there are any.
+    """
+    made = list(_made(outcome))
+    draped = [name for name in made if name.endswith("draped")]
+    if draped:
+        if detailed:
+            fine = [f"{name.removesuffix('draped')}render_mesh" for name in draped]
+            draped = [rich if rich in made else plain for rich, plain in zip(fine, draped, strict=True)]
+        return draped + [name for name in made if name.endswith("collider")][:1]
+    return [name for name in _ALONE if name in made][:1]
+
+
+def shown_meshes(name: str, value: Any) -> list[TriangleMesh]:
+    """Return the surfaces of an artifact; the body under a garment in a colour of its own."""
+    if isinstance(value, TriangleMesh):
+        return [value]
+    if isinstance(value, tuple):
+        return [_painted(part) for part in value]
+    return [tint(value.final, SKIN)] if name.endswith("collider") else [value.mesh]
+
+
+def _made(outcome: Outcome) -> Iterator[str]:
+    for kind in outcome.tables.kinds:
+        with suppress(VtoError):
+            if kind.filename and outcome.made(kind.name):
+                yield kind.name
+
+
+def _painted(part: GlbPart) -> TriangleMesh:
+    """Return the mesh of a part with its picture, or its colour, on it."""
+    if part.texture is None or part.uv is None:
+        if part.mesh.colors is not None or part.base_color[:3] == _UNDYED:
+            return part.mesh
+        red, green, blue = (int(value) for value in encode_srgb(np.array(part.base_color[:3])))
+        return tint(part.mesh, (red, green, blue))
+    places = part.uv[part.mesh.faces] * (1.0, -1.0) + (0.0, 1.0)  # glTF counts v downward
+    return replace(part.mesh, skin=Skin(places, part.texture))
