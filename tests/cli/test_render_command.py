@@ -53,7 +53,7 @@ def test_a_turn_has_all_its_frames(vto, tent, name):
     ("arguments", "code", "text"),
     [
         (["tent.ply", "--views", "top"], 2, "no view 'top'; allowed: front, side, back, closeup"),
-        (["tent.ply", "--turntable", "turn.avi"], 2, "'turn.avi' is no name of a moving picture"),
+        (["tent.ply", "--turntable", "turn.avi"], 2, "'turn.avi' cannot hold a moving picture"),
         (["tent.ply", "--size", "10"], 2, "64<=x<=4096"),
         (["none.ply"], 3, "no such file"),
     ],

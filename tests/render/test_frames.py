@@ -10,7 +10,7 @@ from vto_pipeline.model.mesh import Skin, TriangleMesh
 from vto_pipeline.render.frames import Frame, bounds, frame_box, frame_turn, frame_view
 from vto_pipeline.render.pictures import render_picture
 from vto_pipeline.render.shading import KEY_LIGHT
-from vto_pipeline.render.shadows import lit_share
+from vto_pipeline.render.shadows import ShadowMap
 from vto_pipeline.render.tint import tint
 
 
@@ -57,7 +57,7 @@ def test_the_shadow_of_a_square_has_its_area_and_place() -> None:
     corners = np.array([[-right - up, right - up, right + up], [-right - up, right + up, -right + up]])
     along = np.linspace(-1.5, 1.5, 301)
     places = along[:, None] * right - 0.5 * KEY_LIGHT
-    lit = lit_share(corners, places, np.broadcast_to(KEY_LIGHT, places.shape), KEY_LIGHT)
+    lit = ShadowMap(corners, KEY_LIGHT).lit(places, np.broadcast_to(KEY_LIGHT, places.shape))
     dark_width = (1.0 - lit).sum() * (along[1] - along[0])
     assert dark_width == pytest.approx(2.0, abs=0.01)
     assert (lit[np.abs(along) < 0.97] == 0.0).all()
@@ -76,23 +76,36 @@ def test_a_sheet_does_not_shade_itself(tilt_deg: float) -> None:
     )
     s = np.random.default_rng(0).uniform(-0.95, 0.95, (500, 2))
     places = s[:, :1] * right + s[:, 1:] * across
-    assert (lit_share(corners, places, np.broadcast_to(normal, places.shape), KEY_LIGHT) == 1.0).all()
+    assert (ShadowMap(corners, KEY_LIGHT).lit(places, np.broadcast_to(normal, places.shape)) == 1.0).all()
 
 
 def test_what_stands_throws_a_shadow_on_the_ground_only() -> None:
     block = tint(quad([(-0.2, 0.0, 0.0), (0.2, 0.0, 0.0), (0.2, 1.0, 0.0), (-0.2, 1.0, 0.0)]), (40, 40, 40))
     frame = Frame(np.array([0.0, 0.5, 0.0]), (1.5, 1.0), 0.0, 30.0)
-    plain = render_picture([block], frame, size=(150, 100)).astype(int)
-    shaded = render_picture([block], frame, size=(150, 100), shadows=True).astype(int)
+    plain = render_picture([block], frame, size=(450, 300)).astype(int)
+    shaded = render_picture([block], frame, size=(450, 300), shadows=True).astype(int)
     away = (plain == 255).all(axis=2) & (shaded < 250).any(axis=2)
     rows, columns = np.nonzero(away)
     light = frame.axes.T @ KEY_LIGHT
     tip = np.array([0.2, 1.0, 0.0]) - light / light[1]  # where the upper right corner's shadow meets the ground
-    x, y = frame.axes[:2] @ (tip - frame.middle) * 0.9 * 50.0  # px: a tenth is margin, and 100 px show 2 m
-    assert columns.max() == pytest.approx(75.0 + x, abs=2.0)
-    assert rows[columns > columns.max() - 2].mean() == pytest.approx(50.0 - y, abs=3.0)
+    x, y = frame.axes[:2] @ (tip - frame.middle) * 0.9 * 150.0  # px: a tenth is margin, and 300 px show 2 m
+    assert columns.max() == pytest.approx(225.0 + x, abs=4.0)
+    assert rows[columns > columns.max() - 4].mean() == pytest.approx(150.0 - y, abs=6.0)
     assert shaded[away].min() >= 160  # 0.65 of paper
-    assert (shaded[:20] == 255).all()
+    assert (shaded[:60] == 255).all()
+
+
+def test_a_card_throws_a_shadow_on_the_wall_behind_it() -> None:
+    """A hand's breadth before a wall, light from the viewer's upper left: a shadow of its size, to the lower right."""
+    wall, hung = tint(card(1.0, 0.0), (200, 200, 200)), tint(card(0.2, 0.1), (200, 0, 0))
+    frame = Frame(np.zeros(3), (0.9, 0.9), 0.0, 0.0)
+    plain, shaded = (render_picture([wall, hung], frame, size=(180, 180), shadows=on).astype(int) for on in (0, 1))
+    rows, columns = np.nonzero((plain - shaded).max(axis=2) > 30)
+    slide = -0.1 * KEY_LIGHT[:2] / KEY_LIGHT[2] * 90.0  # px: nine tenths of 100 a metre
+    assert columns.max() == pytest.approx(90 + 18 + slide[0], abs=2.0)
+    assert rows.max() == pytest.approx(90 + 18 - slide[1], abs=2.0)
+    hidden = (18 * 2 - slide[0]) * (18 * 2 + slide[1])
+    assert len(rows) == pytest.approx((18 * 2) ** 2 - hidden, rel=0.15)
 
 
 def test_a_picture_on_a_mesh_is_seen_where_its_places_say() -> None:

@@ -39,7 +39,7 @@ def animation_writer(path: Path) -> Callable[[Path, Iterator[ByteArray], float],
     """
     writers = {".gif": _write_gif, ".mp4": _write_mp4}
     if path.suffix.lower() not in writers:
-        raise ConfigError(f"{path.name!r} is no name of a moving picture", hint="it ends with .gif or .mp4")
+        raise ConfigError(f"{path.name!r} cannot hold a moving picture", hint="its name ends with .gif or .mp4")
     return writers[path.suffix.lower()]
 
 
@@ -56,7 +56,7 @@ def _write_mp4(path: Path, frames: Iterator[ByteArray], per_second: float) -> No
 
     first = next(frames)
     height, width = (2 * (side // 2) for side in first.shape[:2])  # its colours have half the pixels
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*_CODEC), per_second, (width, height))
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*_CODEC), per_second, (width, height))
     if not writer.isOpened():
         raise MissingDependencyError(f"OpenCV has no encoder {_CODEC}", hint="write a .gif instead")
     try:

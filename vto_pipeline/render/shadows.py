@@ -17,26 +17,36 @@ _ASIDE = 3  # texels to each side that are compared, twice the distance of a pix
 _CLEAR, _STEEP = 1.5, 24.0  # texels: how far behind what the light sees a place is lit all the same, and most of it
 
 
-def lit_share(corners: FloatArray, places: FloatArray, normals: FloatArray, towards: FloatArray) -> FloatArray:
-    """Return how much of a distant light each place sees, 0 to 1, shape (N,).
+class ShadowMap:
+    """What a distant light sees.
 
     Args:
         corners: Of the triangles that cast shadows, shape (F, 3, 3).
-        places, normals: In the same frame, shape (N, 3); normals of any length and sign.
         towards: Where the light comes from, a unit vector, shape (3,).
     """
-    right = np.cross([0.0, 1.0, 0.0], towards)
-    right /= np.linalg.norm(right)
-    axes = np.stack([right, np.cross(towards, right), -towards])  # depth grows away from the light
-    seen = corners @ axes.T
-    low, high = seen.reshape(-1, 3).min(axis=0), seen.reshape(-1, 3).max(axis=0)
-    texels = (_MAP - 2 * _ASIDE - 1) / max(float((high - low)[:2].max()), 1e-9)  # per metre
-    shift = low - _ASIDE / texels
-    depth = rasterise((seen - shift) * texels, _MAP, _MAP)[2]
-    across = np.abs(normals @ towards) / np.maximum(np.linalg.norm(normals, axis=1), 1e-12)
-    slope = np.sqrt(1.0 - np.minimum(across, 1.0) ** 2) / np.maximum(across, 1e-6)
-    clear = np.minimum(_CLEAR + (_ASIDE + 0.5) * slope, _STEEP)  # so a tilted surface does not shade itself
-    return _lit((places @ axes.T - shift) * texels, clear, depth)
+
+    def __init__(self, corners: FloatArray, towards: FloatArray) -> None:
+        right = np.cross([0.0, 1.0, 0.0], towards)
+        right /= np.linalg.norm(right)
+        self._towards = towards
+        self._axes = np.stack([right, np.cross(towards, right), -towards])  # depth grows away from the light
+        seen = corners @ self._axes.T
+        low, high = seen.reshape(-1, 3).min(axis=0), seen.reshape(-1, 3).max(axis=0)
+        self._texels = (_MAP - 2 * _ASIDE - 1) / max(float((high - low)[:2].max()), 1e-9)  # per metre
+        self._shift = low - _ASIDE / self._texels
+        self._depth = rasterise((seen - self._shift) * self._texels, _MAP, _MAP)[2]
+
+    def lit(self, places: FloatArray, normals: FloatArray) -> FloatArray:
+        """Return how much of the light each place sees, 0 to 1, shape (N,).
+
+        Args:
+            places, normals: In the frame of the triangles, shape (N, 3); normals of any length and sign.
+        """
+        across = np.abs(normals @ self._towards) / np.maximum(np.linalg.norm(normals, axis=1), 1e-12)
+        slope = np.sqrt(1.0 - np.minimum(across, 1.0) ** 2) / np.maximum(across, 1e-6)
+        clear = np.minimum(_CLEAR + (_ASIDE + 0.5) * slope, _STEEP)  # so a tilted surface does not shade itself
+        shares: FloatArray = _lit((places @ self._axes.T - self._shift) * self._texels, clear, self._depth)
+        return shares
 
 
 @njit(cache=True, error_model="numpy", parallel=True)

@@ -4,4 +4,5 @@ scan, fit, drape, run, batch: what makes something
 pattern/: a sewing pattern measured, and written in another format
 status, info, plan, stages, schema, doctor: what only looks
 report, prune, cancel, bench: the page again, room on the disk, an end, measurements
+view/, render/: the page in the browser; pictures
 """

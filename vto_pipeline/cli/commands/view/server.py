@@ -58,7 +58,8 @@ class _PageHandler(BaseHTTPRequestHandler):
 
     @property
     def _port(self) -> int:
-        return int(self.server.server_address[1])
+        assert isinstance(self.server, ThreadingHTTPServer)
+        return self.server.server_port
 
     def _page(self) -> bytes:
         try:
