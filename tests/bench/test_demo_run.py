@@ -147,7 +147,7 @@ def test_the_page_stands_alone(ended: Ended) -> None:
 @whole_run
 def test_another_reader_finds_the_garment_where_it_was_draped(ended: Ended) -> None:
     out = ended.folder / "out"
-    (shown,) = trimesh.load(out / "render_mesh.glb").geometry.values()
+    shown, body = trimesh.load(out / "render_mesh.glb").geometry.values()
     draped = trimesh.load(out / "draped.ply", process=False)
     garment = trimesh.load(out / "garment.ply", process=False)
     most = TextureConfig().max_triangles if (out / "texture.npz").exists() else DressConfig().max_triangles
@@ -155,6 +155,7 @@ def test_another_reader_finds_the_garment_where_it_was_draped(ended: Ended) -> N
     assert fine - 1 <= len(shown.faces) <= fine  # as fine as it came; a collapse takes two triangles out at once
     # the render mesh has folds that the simulation's does not, of some millimetres
     assert_allclose(shown.bounds, draped.bounds, rtol=0, atol=0.02)
+    assert_allclose(body.bounds, trimesh.load(out / "avatar.ply", process=False).bounds, rtol=0, atol=1e-6)
 
 
 @whole_run

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,8 +12,10 @@ import trimesh
 from numpy.testing import assert_allclose
 
 from vto_pipeline.io.gltf.write import write_glb
+from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import Skin, TriangleMesh
+from vto_pipeline.model.render import GlbPart
 from vto_pipeline.model.texture import TexturedMesh
 from vto_pipeline.render.dress import DressConfig, deform_render_mesh
 from vto_pipeline.stages import CATALOGUE
@@ -70,3 +74,24 @@ def test_the_picture_of_a_given_mesh_is_taken_and_bare_places_stay() -> None:
     assert_allclose(placed.uv[placed.mesh.faces] * (1, -1) + (0, 1), flat.texture, rtol=0, atol=1e-12)  # rounding
     (bare,) = row.run({**inputs, "garment_mesh": sim}, DressConfig(), Job())["render_mesh"]
     assert bare.uv is None
+
+
+def test_the_body_is_a_part_of_its_own_unless_it_is_not_wanted() -> None:
+    sim = TriangleMesh(sheet().vertices, sheet().faces)
+    row = next(stage for stage in CATALOGUE.stages if stage.name == "transfer")
+    moving = MovingBody(np.stack([sim.vertices - 1.0, sim.vertices - [0.0, 0.0, 0.2]]), sim.faces)
+    inputs = {"garment": sim, "sim_mesh": sim, "draped": sim, "collider": moving}
+    garment, body = row.run(inputs, DressConfig(), Job())["render_mesh"]
+    assert (garment.name, body.name) == ("garment", "body")
+    assert np.array_equal(body.mesh.vertices, moving.keyframes[-1])  # as it stands in the end
+    assert len(row.run(inputs, DressConfig(body=False), Job())["render_mesh"]) == 1
+
+
+def test_the_page_shows_the_body_of_a_drape_without_an_avatar() -> None:
+    sim = TriangleMesh(sheet().vertices, sheet().faces)
+    parts = [GlbPart("garment", sim), GlbPart("body", sim)]
+    row = next(stage for stage in CATALOGUE.stages if stage.name == "page")
+    page = row.run({"run_record": {"stages": [], "seconds": 1.0}, "render_mesh": parts}, row.settings(), Job())["page"]
+    scene = re.search(r'id="scene"[^>]*>(.*?)</script>', page, re.DOTALL)
+    assert scene is not None
+    assert [layer["name"] for layer in json.loads(scene[1])["layers"]] == ["Garment", "Body"]

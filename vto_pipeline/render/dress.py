@@ -1,9 +1,10 @@
-"""The render mesh: the garment in full detail, after the drape."""
+"""The render mesh: the garment in full detail after the drape, and the body that wears it."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 from pydantic import Field
 
 from vto_pipeline.geometry.remeshing.decimate import decimate
@@ -14,7 +15,12 @@ from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.render import GlbPart
 from vto_pipeline.model.settings import Config
 from vto_pipeline.model.texture import TexturedMesh
+from vto_pipeline.numerics.srgb import decode_srgb
+from vto_pipeline.render.tint import SKIN
 from vto_pipeline.render.transfer import apply, bind
+
+BODY = "body"
+"""Name of the part that wears the others."""
 
 
 class DressConfig(Config):
@@ -23,6 +29,7 @@ class DressConfig(Config):
     max_triangles: int = Field(
         130_000, ge=1_000, le=5_000_000, description="Most triangles, for web viewers; a finer scan is thinned out"
     )
+    body: bool = Field(True, description="Whether the body is a part of it")
 
 
 def deform_render_mesh(
@@ -53,3 +60,16 @@ def deform_render_mesh(
     if moved.texture is not None:
         return [cut_open("garment", moved, None)]
     return [GlbPart("garment", moved, normals=vertex_normals(moved))]
+
+
+def body_part(body: TriangleMesh, config: DressConfig) -> GlbPart:
+    """Return the body as a part of its own, in the colour of skin.
+
+    Args:
+        body: As it stands under the draped garment [m].
+        config: Settings.
+    """
+    shape = decimate(TriangleMesh(body.vertices, body.faces), config.max_triangles)
+    red, green, blue = (float(value) for value in decode_srgb(np.array(SKIN, dtype=np.uint8)))
+    normals = vertex_normals(shape)
+    return GlbPart(BODY, shape, normals=normals, base_color=(red, green, blue, 1.0), roughness=0.6, double_sided=False)

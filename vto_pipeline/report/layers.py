@@ -23,6 +23,7 @@ _PLAIN = (  # artifact, name, group, colour where it has none of its own
     ("draped", "Simulated cloth", "garment", _CLOTH),
     ("garment", "Garment as scanned", "garment", _CLOTH),
     ("avatar", "Body", "body", _SKIN),
+    ("worn_by", "Body", "body", _SKIN),
     ("mannequin_surface", "Mannequin", "body", _FORM),
     ("crossings", "Crossings", "marks", _MARK),
     ("garment_surface", "Garment scan", "scan", _CLOTH),

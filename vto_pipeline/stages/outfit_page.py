@@ -13,6 +13,7 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.render import GlbPart
 from vto_pipeline.model.settings import Config
 from vto_pipeline.pipeline.stage import Stage
+from vto_pipeline.render.dress import BODY
 
 OWN_PARTS = ("render_mesh", "fit_report", "fit_maps")
 """What is made of each draped garment."""
@@ -42,9 +43,9 @@ def outfit_page(stage: Stage, names: Sequence[str]) -> Stage:
             maps = list(found["fit_maps"].values())
             parts["fit_maps"] = {key: np.concatenate([one[key] for one in maps]) for key in maps[0]}
         if found["render_mesh"]:
-            parts["render_mesh"] = [
-                _named_part(part, name, names) for name, some in found["render_mesh"].items() for part in some
-            ]
+            every = [(name, part) for name, some in found["render_mesh"].items() for part in some]
+            parts["render_mesh"] = [_named_part(part, name, names) for name, part in every if part.name != BODY]
+            parts["render_mesh"] += [part for _, part in every if part.name == BODY][:1]  # all wear the same
         parts["fit_reports"] = found["fit_report"]
         if "audit" in parts:
             parts["audit"] = {name: value for name, value in parts["audit"].items() if name != "layers"}

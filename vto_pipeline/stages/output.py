@@ -20,7 +20,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
 from vto_pipeline.model.texture import TexturedMesh
 from vto_pipeline.pipeline.stage import Stage
-from vto_pipeline.render.dress import DressConfig, deform_render_mesh
+from vto_pipeline.render.dress import BODY, DressConfig, body_part, deform_render_mesh
 from vto_pipeline.render.marks import mark_places
 from vto_pipeline.report.page import build_page
 
@@ -30,7 +30,10 @@ Outputs = Mapping[str, Any]
 
 def _transfer(inputs: Inputs, settings: DressConfig, job: Job) -> Outputs:
     garment = _most_detailed(inputs)
-    return {"render_mesh": deform_render_mesh(garment, inputs["sim_mesh"], inputs["draped"], settings, job)}
+    parts = deform_render_mesh(garment, inputs["sim_mesh"], inputs["draped"], settings, job)
+    if settings.body and "collider" in inputs:
+        parts.append(body_part(inputs["collider"].final, settings))
+    return {"render_mesh": parts}
 
 
 def _most_detailed(inputs: Inputs) -> TriangleMesh | TexturedMesh:
@@ -81,6 +84,11 @@ def _page(inputs: Inputs, settings: Config, job: Job) -> Outputs:
     if "garment_texture" in parts and "render_mesh" not in parts:
         textured: TexturedMesh = parts["garment_texture"]
         parts["garment"] = [cut_open("garment", textured.mesh, textured.picture)]
+    if "render_mesh" in parts:
+        shown = parts["render_mesh"]
+        parts["render_mesh"] = [part for part in shown if part.name != BODY]
+        if "avatar" not in parts and len(parts["render_mesh"]) < len(shown):
+            parts["worn_by"] = next(part.mesh for part in shown if part.name == BODY)
     places = _crossings(inputs.get("audit", {}))
     if places:
         parts["crossings"] = mark_places(np.array(places))
@@ -96,9 +104,9 @@ def _crossings(audit: Mapping[str, Any]) -> list[list[float]]:
 STAGES: tuple[Stage, ...] = (
     Stage(
         name="transfer",
-        about="the detailed garment follows the draped simulation mesh",
+        about="the detailed garment follows the draped simulation mesh, on the body",
         needs=("garment", "sim_mesh", "draped"),
-        optional=("garment_texture", "garment_mesh"),
+        optional=("garment_texture", "garment_mesh", "collider"),
         makes=("render_mesh",),
         run=_transfer,
         settings=DressConfig,

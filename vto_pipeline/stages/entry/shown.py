@@ -13,6 +13,7 @@ from vto_pipeline.errors import VtoError
 from vto_pipeline.model.mesh import Skin, TriangleMesh
 from vto_pipeline.model.render import GlbPart
 from vto_pipeline.numerics.srgb import encode_srgb
+from vto_pipeline.render.dress import BODY
 from vto_pipeline.render.tint import SKIN, tint
 from vto_pipeline.stages.entry.outcome import Outcome
 
@@ -44,7 +45,7 @@ def shown_meshes(name: str, value: Any) -> list[TriangleMesh]:
     if isinstance(value, TriangleMesh):
         return [value]
     if isinstance(value, tuple):
-        return [_painted(part) for part in value]
+        return [_painted(part) for part in value if part.name != BODY]
     return [tint(value.final, SKIN)] if name.endswith("collider") else [value.mesh]
 
 
