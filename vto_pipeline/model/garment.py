@@ -101,7 +101,9 @@ class Garment:
     Args:
         mesh: Simulation mesh where it is now [m].
         rest: Its rest shape.
+        laid_out: Whether it stands as a pattern's file has it, upright about a body that is not known.
     """
 
     mesh: TriangleMesh
     rest: RestShape
+    laid_out: bool = False

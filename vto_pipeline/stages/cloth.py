@@ -56,7 +56,7 @@ def _grade(inputs: Inputs, settings: GradeConfig, job: Job) -> Outputs:
 def _drape(inputs: Inputs, settings: DrapeConfig, job: Job) -> Outputs:
     for text in assumption_notes(inputs["fabric"]):
         job.note(text)
-    garment = Garment(inputs["sim_mesh"], inputs["worn_rest"])
+    garment = Garment(inputs["sim_mesh"], inputs["worn_rest"], laid_out="garment_pattern" in inputs)
     draped = drape(garment, inputs["collider"], inputs["fabric"], settings, job)
     return {"draped": draped.mesh, "audit": dict(draped.audit), "trace": tuple(draped.trace)}
 
@@ -92,6 +92,7 @@ STAGES: tuple[Stage, ...] = (
         name="drape",
         about="the garment at rest on the body",
         needs=("sim_mesh", "worn_rest", "collider", "fabric"),
+        optional=("garment_pattern",),
         makes=("draped", "audit", "trace"),
         run=_drape,
         settings=DrapeConfig,

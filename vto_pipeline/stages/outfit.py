@@ -208,7 +208,8 @@ def _drape_row(stage: Stage, names: Sequence[str]) -> Stage:
         for name in names:
             fabric = inputs[_own("fabric", name)]
             job.notes += [f"{name}: {text}" for text in assumption_notes(fabric)]
-            garment = Garment(inputs[_own("sim_mesh", name)], inputs[_own("worn_rest", name)])
+            laid_out = _own("garment_pattern", name) in inputs
+            garment = Garment(inputs[_own("sim_mesh", name)], inputs[_own("worn_rest", name)], laid_out)
             layers.append(Layer(name, garment, fabric))
         outfit = drape_layers(layers, inputs["collider"], settings, job)
         meshes = {_own("draped", name): mesh for name, mesh in outfit.meshes.items()}
@@ -218,6 +219,7 @@ def _drape_row(stage: Stage, names: Sequence[str]) -> Stage:
         stage,
         about="the garments at rest on the body, in layers",
         needs=(*needs, "collider"),
+        optional=tuple(_own("garment_pattern", name) for name in names),
         makes=(*(_own("draped", name) for name in names), "audit", "trace"),
         run=run,
     )

@@ -91,7 +91,7 @@ def plan_body_growth(body: TriangleMesh, garment: TriangleMesh, job: Job) -> Bod
         garment: In its place about the body [m].
         job: Warned when the garment is led, or no thinning gets the body clear of it.
     """
-    thinning = _Thinning(body)
+    thinning = Thinning(body)
     first = best = thinning.growth(garment)
     if first.fault == (0, 0):
         return first
@@ -114,7 +114,7 @@ def plan_body_growth(body: TriangleMesh, garment: TriangleMesh, job: Job) -> Bod
     return best
 
 
-def _led(first: BodyGrowth, thinning: _Thinning) -> Iterator[TriangleMesh]:
+def _led(first: BodyGrowth, thinning: Thinning) -> Iterator[TriangleMesh]:
     """Yield the garment led onto the limbs, as a whole, and each of these and itself part by part."""
     garment, body = first.garment, thinning.after(0)
     onto = lead_onto_limbs(garment, body, thinning.limbs, thinning.after(_LINES), first.pieces)
@@ -134,7 +134,7 @@ def _enclosed(garment: TriangleMesh, body: TriangleMesh) -> float:
     return float(laplacian(body)[1][inside].sum())
 
 
-class _Thinning:
+class Thinning:
     """A body and its thinner ones, made as they are asked for.
 
     The flow lets the webs of armpits and crotch sag out of the body, onto cloth that lies close there: what would leave
@@ -166,3 +166,17 @@ class _Thinning:
         grown = MovingBody(np.stack(self._frames[least::-1]), self._faces)
         pieces = pieces_with_limbs(garment, self.limbs, self.after(least))
         return BodyGrowth(garment, grown, crossing[least], pieces, [limb.name for limb in self.limbs.limbs])
+
+    def limbs_astray(self, garment: TriangleMesh) -> int:
+        """Return how many limbs go through cloth or another opening than their own, here and with sleeves on arms.
+
+        That puts some limbs right and others wrong: what is well in one of both can be led there.
+        """
+        thin = self.after(_LINES)
+        pieces = pieces_with_limbs(garment, self.limbs, thin)
+        here = [piece.misplaced() for piece in pieces]
+        if not any(here):
+            return 0
+        led = lead_onto_limbs(garment, self.after(0), self.limbs, thin, pieces)
+        there = [piece.misplaced() for piece in pieces_with_limbs(led, self.limbs, thin)]
+        return sum(len(one & other) for one, other in zip(here, there, strict=True))

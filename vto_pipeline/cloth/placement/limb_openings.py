@@ -53,6 +53,12 @@ class Piece(NamedTuple):
             if len(self.pierced[limb]) > 0 or (meant >= 0 and alone[limb] and len(through) > 0 and meant not in through)
         ]
 
+    def misplaced(self) -> set[int]:
+        """Return the limbs that are astray, or never come to the opening that is there for them alone."""
+        alone = {limb for limb, opening in enumerate(self.meant) if opening >= 0 and self.meant.count(opening) == 1}
+        idle = {limb for limb in alone if self.meant[limb] not in self.through[limb]}
+        return idle | set(self.astray())
+
     def missed(self, limb: int) -> str:
         """Return in words how far from its opening a limb goes through cloth; nothing where that is unknown."""
         if self.meant[limb] < 0:

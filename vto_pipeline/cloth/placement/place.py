@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from pydantic import Field
 
+from vto_pipeline.cloth.placement.body_growth import Thinning
 from vto_pipeline.cloth.placement.voxel_fit import VoxelFit, VoxelPlacement, quarter_turns
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
@@ -27,6 +29,11 @@ _ALIKE = 0.98  # as good, but for where the cubes happen to lie
 _LARGER, _STEPS = 1.2, 4  # a garment may start up to twice as large as it is
 _FALLING = 0.85  # of the best worth yet: larger garments need not be tried
 _DEEP = 0.01  # m
+_HEIGHTS = 8  # tried where limbs go through cloth
+_WORTH_A_TRY = 0.5  # of the score of the first place: less is beside the body
+_FILE_STATURE = 1.72  # m: the mean of both sexes, which GarmentCode draws for
+_FILE_ORIGINS = (0.0, 1.15)  # m over the floor: GarmentCode has it there, its predecessor where SMPL's template has it
+_BESIDE, _ABOVE, _BELOW = 0.1, 0.03, 0.12  # m from where a file has it: hoods are laid out higher than they are worn
 _AROUND = 32  # cubes along the longest side: enough to tell units, which differ by 2.5 at least
 
 
@@ -81,14 +88,17 @@ class Placement(NamedTuple):
 _AS_IT_STANDS = Placement(1.0, np.eye(3), 1.0, np.zeros(3))
 
 
-def find_placement(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig, job: Job) -> Placement:
-    """Return the placement in which the body fills the garment best.
+def find_placement(
+    garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig, job: Job, laid_out: bool = False
+) -> Placement:
+    """Return the placement in which the body fills the garment best, of those in which no limb goes through cloth.
 
     Args:
         garment: As it stands, in metres or another unit, with any axis up.
         body: Where it shall go [m].
         config: Search and thresholds.
         job: Receives what is done, and why.
+        laid_out: Whether it stands as a pattern file has it, in metres and upright: its own place is the first choice.
 
     Raises:
         InputError: in no unit is this a garment for a body of this size, or the body fills it nowhere.
@@ -96,6 +106,10 @@ def find_placement(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfi
     if config.place == "as_it_stands":
         job.note("garment left where it stands, as requested")
         return _AS_IT_STANDS
+    if laid_out and config.place == "auto":
+        own = _as_laid_out(garment, body, config, job)
+        if own is not None:
+            return own
     scale = _scale(garment, body, config, job)
     metres = TriangleMesh(scale * garment.vertices, garment.faces)
     stands, best = _best_orientation(metres, body, config)
@@ -122,6 +136,9 @@ def find_placement(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfi
     stretch, best = _enlarge_until_body_inside(metres, body, best, config)
     if stretch > 1.0:
         job.warn(f"too small: this body needs it {stretch - 1:.0%} larger; it starts stretched by that much")
+    larger = TriangleMesh(stretch * metres.vertices, metres.faces)
+    others = VoxelFit(larger, body, 1e-3 * config.cube_mm, config.cloth_in_body).best_placements
+    best = _least_pierced(best, lambda: others(best.turn, _HEIGHTS), larger, body, job)
     share = _relative_score(best.score_in_place, best.score)
     if config.place == "auto" and best is stands and scale == 1.0 and share >= config.stands_well:
         job.note(f"garment left where it stands: its place scores {share:.0%} of the best")
@@ -138,11 +155,76 @@ def place_garment(garment: Garment, body: TriangleMesh, config: PlaceConfig, job
 
     Args, Raises: See `find_placement`.
     """
-    placed = find_placement(garment.mesh, body, config, job)
+    placed = find_placement(garment.mesh, body, config, job, garment.laid_out)
     mesh = TriangleMesh(placed.start_positions(garment.mesh.vertices), garment.mesh.faces, garment.mesh.colors)
     rest = garment.rest
     panels = None if rest.panels is None else placed.scale * rest.panels
     return Garment(mesh, replace(rest, positions=placed.rest_positions(rest.positions), panels=panels))
+
+
+def _as_laid_out(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig, job: Job) -> Placement | None:
+    """Return the placement that a pattern's file means; None where that is beside the body.
+
+    The file was drawn for another body: the garment's top, which it hangs from, goes to the same share of the stature.
+    """
+    fit = VoxelFit(garment, body, 1e-3 * config.cube_mm, config.cloth_in_body)
+    top, floor = float(garment.vertices[:, 1].max()), float(body.vertices[:, 1].min())
+    ratio = float(np.ptp(body.vertices[:, 1])) / _FILE_STATURE
+    middle = np.median(body.vertices, axis=0)
+    within = (_BESIDE, 0.5 * (_ABOVE + _BELOW), _BESIDE)
+    meant = []
+    for origin in _FILE_ORIGINS:
+        height = floor + ratio * (top + origin) - top
+        near = np.array([middle[0], height + 0.5 * (_ABOVE - _BELOW), middle[2]])
+        meant += fit.best_placements(np.eye(3), 1, near, within)
+    best = max(meant, key=lambda way: way.score, default=None)
+    if best is None or round(best.score, 6) <= 0.0:
+        return None
+
+    def at_other_heights() -> list[VoxelPlacement]:
+        anywhere = (_BESIDE, np.inf, _BESIDE)
+        ways = fit.best_placements(np.eye(3), _HEIGHTS, best.shift, anywhere)
+        return sorted(ways, key=lambda way: abs(way.shift[1] - best.shift[1]))
+
+    best = _least_pierced(best, at_other_heights, garment, body, job)
+    job.note(
+        f"garment put where its file has it on a body of {_FILE_STATURE:.2f} m, at this body's stature: moved by "
+        f"({', '.join(f'{1e3 * part:.0f}' for part in best.shift)}) mm (x, y, z)"
+    )
+    return Placement(1.0, best.turn, 1.0, best.shift)
+
+
+def _least_pierced(
+    first: VoxelPlacement,
+    others: Callable[[], Sequence[VoxelPlacement]],
+    garment: TriangleMesh,
+    body: TriangleMesh,
+    job: Job,
+) -> VoxelPlacement:
+    """Return the first place, or the next in which fewer limbs go through cloth, sleeves once laid on arms.
+
+    Args:
+        first: The best place.
+        others: Finds further ones, the next best first.
+        garment: As large as it starts [m].
+        body: [m].
+        job: Receives that it went elsewhere.
+    """
+    thinning = Thinning(body)
+
+    def astray(way: VoxelPlacement) -> int:
+        return thinning.limbs_astray(TriangleMesh(garment.vertices @ way.turn.T + way.shift, garment.faces))
+
+    best, fewest = first, astray(first)
+    for way in others() if fewest else ():
+        if way.score >= _WORTH_A_TRY * first.score and (found := astray(way)) < fewest:
+            best, fewest = way, found
+        if fewest == 0:
+            break
+    if best is not first:
+        rise = 1e3 * (best.shift[1] - first.shift[1])
+        job.note(f"another height than that which fits best, by {rise:+.0f} mm: fewer limbs go through cloth there")
+    return best
 
 
 def _best_orientation(

@@ -19,6 +19,9 @@ from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 
 
+_ANOTHER = 0.08  # m: places nearer in height are the same to a limb
+
+
 class VoxelPlacement(NamedTuple):
     """The best place of a garment, turned in one way.
 
@@ -73,16 +76,39 @@ class VoxelFit:
 
     def best_placement(self, turn: FloatArray) -> VoxelPlacement:
         """Return the best place of the garment after a quarter turn."""
+        return self.best_placements(turn, 1)[0]
+
+    def best_placements(
+        self, turn: FloatArray, count: int, near: FloatArray | None = None, within: tuple[float, ...] = ()
+    ) -> list[VoxelPlacement]:
+        """Return the best places of the garment after a quarter turn, best first, each at another height.
+
+        Args:
+            turn: The rotation about the origin, shape (3, 3).
+            count: How many at most.
+            near: The shift about which to look [m], shape (3,); None: everywhere.
+            within: How far from it along each axis [m].
+        """
         worth, low = self._turned(turn)
         size = [next_fast_len(int(a + b)) for a, b in zip(self._body.shape, worth.shape, strict=True)]
         score = irfftn(rfftn(self._body.astype(np.float64), size) * np.conj(rfftn(worth, size)), size)
-        best = np.unravel_index(int(np.argmax(np.round(score, 6))), score.shape)
-        steps = np.array([k if k < b else k - n for k, n, b in zip(best, size, self._body.shape, strict=True)])
+        axes = [np.where(np.arange(n) < b, np.arange(n), np.arange(n) - n) for n, b in zip(size, self._body.shape, strict=True)]
+        shifts = [self._body_low[k] + axes[k] * self._cube - low[k] for k in range(3)]
         stay: IntArray = np.round((low - self._body_low) / self._cube).astype(np.int64)
         overlaps = ((stay < np.array(self._body.shape)) & (stay > -np.array(worth.shape))).all()
-        here = score[tuple(stay % np.array(size))] if overlaps else 0.0
-        shift = self._body_low + steps * self._cube - low
-        return VoxelPlacement(turn, shift, float(score[best] / self._whole), float(here / self._whole))
+        here = float(score[tuple(stay % np.array(size))]) if overlaps else 0.0
+        open_to = np.round(score, 6)
+        if near is not None:
+            for k, axis in enumerate(np.ix_(*shifts)):
+                far = np.abs(axis - near[k]) > within[k] + 0.5 * self._cube
+                open_to = np.where(far, -np.inf, open_to)
+        found: list[VoxelPlacement] = []
+        while len(found) < count and np.isfinite(open_to).any():
+            best = np.unravel_index(int(np.argmax(open_to)), score.shape)
+            shift = np.array([shifts[k][best[k]] for k in range(3)])
+            found.append(VoxelPlacement(turn, shift, float(score[best] / self._whole), here / self._whole))
+            open_to[:, np.abs(shifts[1] - shift[1]) < _ANOTHER, :] = -np.inf
+        return found
 
     def _turned(self, turn: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the garment's cubes after a quarter turn, and their lowest corner [m]."""

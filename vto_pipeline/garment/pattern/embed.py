@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array
 from scipy.sparse.linalg import splu
+from scipy.spatial.transform import Rotation
 
 from vto_pipeline.garment.pattern.sew import Sewn
 from vto_pipeline.geometry.topology import laid_edge_lengths
@@ -36,7 +37,8 @@ def in_shape(sewn: Sewn, job: Job) -> TriangleMesh:
         sewn: As it comes from the welding.
         job: Measures what stretch is left.
     """
-    mesh = replace(sewn.mesh, vertices=embed(sewn.mesh, sewn.frames))
+    placed = sewn.mesh.vertices
+    mesh = replace(sewn.mesh, vertices=_as_placed(embed(sewn.mesh, sewn.frames), placed))
     assert mesh.texture is not None
     stretch = laid_edge_lengths(mesh, mesh.vertices[mesh.faces]) / laid_edge_lengths(mesh, mesh.texture) - 1.0
     low, high = np.percentile(stretch, [1, 99])
@@ -77,6 +79,18 @@ def embed(mesh: TriangleMesh, frames: FloatArray) -> FloatArray:
             x = x + _bulge(mesh, frames)
         frames = _frames(np.roll(x[mesh.faces], -1, axis=1) - x[mesh.faces], flat, weight)
     return x
+
+
+def _as_placed(x: FloatArray, placed: FloatArray) -> FloatArray:
+    """Return the positions turned and shifted to where the panels are placed, its top, which it hangs from, as high.
+
+    Without stretch, cloth that is free to turn does: an open jacket by more than a right angle.
+    """
+    around = x - x.mean(axis=0)
+    turn, _ = Rotation.align_vectors(placed - placed.mean(axis=0), around)
+    found = turn.apply(around) + placed.mean(axis=0)
+    found[:, 1] += placed[:, 1].max() - found[:, 1].max()
+    return np.asarray(found)
 
 
 def _area_vectors(faces: IntArray, x: FloatArray) -> FloatArray:
