@@ -166,6 +166,17 @@ def test_a_panel_with_a_hole_has_good_triangles():
         assert np.array(there) == pytest.approx(at_shares(curve.kind, curve.points, curve.bulge, shares), abs=1e-12)
 
 
+def test_an_open_jacket_stays_as_it_is_laid_out():
+    """Free to turn, cloth bent without stretch does; then it is turned back, its top as high as its panels'."""
+    whole = tube(6, 0.12, 0.5)
+    sewn = sew(replace(whole, stitches=whole.stitches[:-1]), EDGE, Job())
+    mesh = in_shape(sewn, Job())
+    now, placed = (x - x.mean(axis=0) for x in (mesh.vertices, sewn.mesh.vertices))
+    u, _, v = np.linalg.svd(now.T @ placed)  # Kabsch 1976
+    assert np.trace(u @ v) == pytest.approx(3.0, abs=1e-9)
+    assert mesh.vertices[:, 1].max() == pytest.approx(0.5, abs=1e-9)
+
+
 def test_eased_seams_are_warned_of_and_closed():
     pattern = tube(3)
     wide = polygon("p1", [(0, 0), (0.2, 0), (0.2, 0.33), (0, 0.33)], placement=pattern.panels[1].placement)

@@ -1,0 +1,83 @@
+"""Sewn patterns go where their file has them, at the wearer's stature, and no garment goes where arms pierce it."""
+
+import numpy as np
+import pytest
+from cloth_scenes import moved, tube
+from figures import SHOULDER, arm_end, figure
+from numpy.testing import assert_allclose
+
+from vto_pipeline.cloth.drape_config import DrapeConfig
+from vto_pipeline.cloth.placement.place import PlaceConfig, find_placement, place_garment
+from vto_pipeline.model.garment import Garment, RestShape
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+
+BELOW, RADIUS = 1.0, 0.19  # of the arms [rad]; of a skirt that the trunk and the hips fill [m]
+CUBE = 0.015
+
+
+def skirt(top):
+    return tube(RADIUS, 0.4, 48, 21, base=top - 0.4)
+
+
+def height_of_arms():
+    """Where the middle of an arm meets the skirt's cylinder, in closed form."""
+    shoulder, hand = SHOULDER, arm_end(1.0, BELOW)
+    return float(np.interp(RADIUS, [shoulder[0], hand[0]], [shoulder[1], hand[1]]))
+
+
+def top_and_bottom(placement, garment):
+    y = placement.start_positions(garment.vertices)[:, 1]
+    return y.max(), y.min()
+
+
+@pytest.mark.parametrize("origin", [0.0, 1.15])
+@pytest.mark.parametrize("stature", [1.4, 1.7])
+def test_a_skirt_goes_to_the_height_of_its_file(origin, stature):
+    """Its top is at 1.0 m on a body of 1.72 m, counted from the floor or from the origin of SMPL's template."""
+    body = figure(BELOW)
+    tall = np.ptp(body.vertices[:, 1])
+    body = moved(TriangleMesh(body.vertices * stature / tall, body.faces), 0.4, 0.7, -0.3)
+    drawn = skirt(1.0 - origin)
+    drawn = TriangleMesh(drawn.vertices * [stature / tall, 1.0, stature / tall], drawn.faces)
+    job = Job()
+    placement = find_placement(drawn, body, PlaceConfig(), job, laid_out=True)
+    top, _ = top_and_bottom(placement, drawn)
+    meant = body.vertices[:, 1].min() + stature * 1.0 / 1.72
+    assert meant - 0.12 - CUBE <= top <= meant + 0.03 + CUBE
+    assert_allclose(placement.shift[[0, 2]], [0.4, -0.3], rtol=0, atol=0.03)
+    assert (placement.scale, placement.stretch) == (1.0, 1.0)
+    assert "where its file has it" in job.notes[-1]
+
+
+def test_where_a_file_has_arms_go_through_cloth_another_height_is_taken():
+    arms = height_of_arms()
+    drawn, job = skirt(arms + 0.25), Job()
+    top, bottom = top_and_bottom(find_placement(drawn, figure(BELOW), PlaceConfig(), job, laid_out=True), drawn)
+    assert not bottom < arms < top
+    assert any("fewer limbs" in note for note in job.notes)
+
+
+@pytest.mark.parametrize("far", [(0.0, 0.0, 0.0), (0.5, 0.3, 0.2)])
+def test_a_skirt_of_any_origin_is_not_put_where_arms_go_through_it(far):
+    arms = height_of_arms()
+    strayed = moved(skirt(arms + 0.15), *far)
+    top, bottom = top_and_bottom(find_placement(strayed, figure(BELOW), PlaceConfig(), Job()), strayed)
+    assert not bottom < arms < top
+
+
+def test_what_lies_beside_the_body_wherever_the_file_has_it_is_looked_for():
+    body = figure(BELOW)
+    high, job = skirt(3.0), Job()
+    found = find_placement(high, body, PlaceConfig(), job, laid_out=True)
+    assert top_and_bottom(found, high)[0] < 1.7
+    assert not any("where its file has it" in note for note in job.notes)
+
+
+def test_a_place_that_was_chosen_by_hand_is_kept():
+    drawn = skirt(1.0 - 1.15)
+    rest = RestShape(drawn.vertices)
+    kept = place_garment(Garment(drawn, rest, True), figure(BELOW), DrapeConfig(place="as_it_stands"), Job())
+    assert_allclose(kept.mesh.vertices, drawn.vertices, rtol=0, atol=0)
+    placed = place_garment(Garment(drawn, rest, True), figure(BELOW), DrapeConfig(), Job())
+    assert placed.mesh.vertices[:, 1].max() == pytest.approx(1.0, abs=0.15)
