@@ -66,9 +66,10 @@ def test_a_skirt_of_any_origin_is_not_put_where_arms_go_through_it(far):
     assert not bottom < arms < top
 
 
-def test_what_lies_beside_the_body_wherever_the_file_has_it_is_looked_for():
+@pytest.mark.parametrize("top", [2.35, 3.0])
+def test_what_lies_beside_the_body_wherever_the_file_has_it_is_looked_for(top):
     body = figure(BELOW)
-    high, job = skirt(3.0), Job()
+    high, job = skirt(top), Job()
     found = find_placement(high, body, PlaceConfig(), job, laid_out=True)
     assert top_and_bottom(found, high)[0] < 1.7
     assert not any("where its file has it" in note for note in job.notes)

@@ -35,7 +35,7 @@ _OUTCOMES = {0: "done", 1: "crashed", 2: "refused", 3: "refused", 4: "failed", 5
 def main() -> None:
     """Read the command line, drape, and print a row each."""
     parser = argparse.ArgumentParser(prog="python -m vto_pipeline.bench.drape.garments", description=__doc__)
-    parser.add_argument("--garment", type=Path, nargs="+", required=True, help="mesh files")
+    parser.add_argument("--garment", type=Path, nargs="+", required=True, help="mesh or pattern files")
     parser.add_argument("--body", type=Path, required=True, help="mesh file of the wearer")
     parser.add_argument(
         "--limit", type=float, default=150.0, metavar="SECONDS", help="of a run, after which it is ended"
@@ -57,7 +57,8 @@ def drape_row(garment: Path, body: Path, folder: Path, settings: Sequence[str], 
     """Return what became of one run; figures that it did not reach are None.
 
     Args:
-        garment, body: Mesh files.
+        garment: Mesh or pattern file.
+        body: Mesh file.
         folder: Of the run.
         settings: As `--set` takes them.
         limit: Wall time after which the run is ended, with all that it has started [s].

@@ -57,6 +57,11 @@ class BodyGrowth(NamedTuple):
         """What is wrong with the begin: pairs that cross, and limbs that go where they are not meant to."""
         return self.crossing, sum(len(piece.astray()) for piece in self.pieces)
 
+    @property
+    def pierced(self) -> int:
+        """How many limbs go through cloth."""
+        return sum(len(places) > 0 for piece in self.pieces for places in piece.pierced)
+
     def refuse_pierced(self) -> None:
         """Raise an error if a limb goes through cloth: nothing that moves cloth a little can free it.
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import Field
 
-from vto_pipeline.cloth.placement.body_growth import Thinning
+from vto_pipeline.cloth.placement.body_growth import Thinning, plan_body_growth
 from vto_pipeline.cloth.placement.voxel_fit import VoxelFit, VoxelPlacement, quarter_turns
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
@@ -29,7 +29,7 @@ _ALIKE = 0.98  # as good, but for where the cubes happen to lie
 _LARGER, _STEPS = 1.2, 4  # a garment may start up to twice as large as it is
 _FALLING = 0.85  # of the best worth yet: larger garments need not be tried
 _DEEP = 0.01  # m
-_HEIGHTS = 8  # tried where limbs go through cloth
+_HEIGHTS = 6  # tried where limbs go through cloth
 _WORTH_A_TRY = 0.5  # of the score of the first place: less is beside the body
 _FILE_STATURE = 1.72  # m: the mean of both sexes, which GarmentCode draws for
 _FILE_ORIGINS = (0.0, 1.15)  # m over the floor: GarmentCode has it there, its predecessor where SMPL's template has it
@@ -138,7 +138,8 @@ def find_placement(
         job.warn(f"too small: this body needs it {stretch - 1:.0%} larger; it starts stretched by that much")
     larger = TriangleMesh(stretch * metres.vertices, metres.faces)
     others = VoxelFit(larger, body, 1e-3 * config.cube_mm, config.cloth_in_body).best_placements
-    best = _least_pierced(best, lambda: others(best.turn, _HEIGHTS), larger, body, job)
+    thinning = Thinning(body)
+    best = _least_pierced(best, lambda: others(best.turn, _HEIGHTS), larger, thinning.limbs_astray, job)
     share = _relative_score(best.score_in_place, best.score)
     if config.place == "auto" and best is stands and scale == 1.0 and share >= config.stands_well:
         job.note(f"garment left where it stands: its place scores {share:.0%} of the best")
@@ -177,16 +178,19 @@ def _as_laid_out(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig,
         height = floor + ratio * (top + origin) - top
         near = np.array([middle[0], height + 0.5 * (_ABOVE - _BELOW), middle[2]])
         meant += fit.best_placements(np.eye(3), 1, near, within)
-    best = max(meant, key=lambda way: way.score, default=None)
-    if best is None or round(best.score, 6) <= 0.0:
+    if not meant or round(max(way.score for way in meant), 6) <= 0.0:
         return None
+    best = max(meant, key=lambda way: way.score)
 
     def at_other_heights() -> list[VoxelPlacement]:
         anywhere = (_BESIDE, np.inf, _BESIDE)
         ways = fit.best_placements(np.eye(3), _HEIGHTS, best.shift, anywhere)
         return sorted(ways, key=lambda way: abs(way.shift[1] - best.shift[1]))
 
-    best = _least_pierced(best, at_other_heights, garment, body, job)
+    def pierced(there: TriangleMesh) -> int:
+        return plan_body_growth(body, there, Job()).pierced  # made for other arms, many can be led onto these
+
+    best = _least_pierced(best, at_other_heights, garment, pierced, job)
     job.note(
         f"garment put where its file has it on a body of {_FILE_STATURE:.2f} m, at this body's stature: moved by "
         f"({', '.join(f'{1e3 * part:.0f}' for part in best.shift)}) mm (x, y, z)"
@@ -198,26 +202,28 @@ def _least_pierced(
     first: VoxelPlacement,
     others: Callable[[], Sequence[VoxelPlacement]],
     garment: TriangleMesh,
-    body: TriangleMesh,
+    astray: Callable[[TriangleMesh], int],
     job: Job,
 ) -> VoxelPlacement:
-    """Return the first place, or the next in which fewer limbs go through cloth, sleeves once laid on arms.
+    """Return the first place, or the next in which fewer limbs go through cloth.
 
     Args:
         first: The best place.
         others: Finds further ones, the next best first.
         garment: As large as it starts [m].
-        body: [m].
+        astray: Counts the limbs that go through cloth where a garment is.
         job: Receives that it went elsewhere.
     """
-    thinning = Thinning(body)
 
-    def astray(way: VoxelPlacement) -> int:
-        return thinning.limbs_astray(TriangleMesh(garment.vertices @ way.turn.T + way.shift, garment.faces))
+    def count(way: VoxelPlacement) -> int:
+        return astray(TriangleMesh(garment.vertices @ way.turn.T + way.shift, garment.faces))
 
-    best, fewest = first, astray(first)
-    for way in others() if fewest else ():
-        if way.score >= _WORTH_A_TRY * first.score and (found := astray(way)) < fewest:
+    best, fewest = first, count(first)
+    if fewest == 0:
+        return first
+    job.progress(0.0, f"{fewest} limbs go through cloth: other heights are tried")
+    for way in others():
+        if way.score >= _WORTH_A_TRY * first.score and (found := count(way)) < fewest:
             best, fewest = way, found
         if fewest == 0:
             break

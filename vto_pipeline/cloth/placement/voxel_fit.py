@@ -92,8 +92,8 @@ class VoxelFit:
         worth, low = self._turned(turn)
         size = [next_fast_len(int(a + b)) for a, b in zip(self._body.shape, worth.shape, strict=True)]
         score = irfftn(rfftn(self._body.astype(np.float64), size) * np.conj(rfftn(worth, size)), size)
-        axes = [np.where(np.arange(n) < b, np.arange(n), np.arange(n) - n) for n, b in zip(size, self._body.shape, strict=True)]
-        shifts = [self._body_low[k] + axes[k] * self._cube - low[k] for k in range(3)]
+        counts = [(np.arange(n) + n - b) % n - n + b for n, b in zip(size, self._body.shape, strict=True)]
+        shifts = [self._body_low[k] + counts[k] * self._cube - low[k] for k in range(3)]
         stay: IntArray = np.round((low - self._body_low) / self._cube).astype(np.int64)
         overlaps = ((stay < np.array(self._body.shape)) & (stay > -np.array(worth.shape))).all()
         here = float(score[tuple(stay % np.array(size))]) if overlaps else 0.0
