@@ -18,7 +18,6 @@ from vto_pipeline.geometry.topology import boundary_loops
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 
-
 _ANOTHER = 0.08  # m: places nearer in height are the same to a limb
 
 
