@@ -187,8 +187,10 @@ def _as_laid_out(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig,
         ways = fit.best_placements(np.eye(3), _HEIGHTS, best.shift, anywhere)
         return sorted(ways, key=lambda way: abs(way.shift[1] - best.shift[1]))
 
+    thinning = Thinning(body)
+
     def pierced(there: TriangleMesh) -> int:
-        return plan_body_growth(body, there, Job()).pierced  # made for other arms, many can be led onto these
+        return thinning.limbs_astray(there) or plan_body_growth(body, there, Job()).pierced  # the dearer one last
 
     best = _least_pierced(best, at_other_heights, garment, pierced, job)
     job.note(
