@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+from numpy.typing import NDArray
 
 from vto_pipeline.errors import InputError
 from vto_pipeline.io.motion.joint_map import JointMap, rest_left
@@ -74,11 +74,13 @@ def carry_over(clip: Clip, joints: JointMap, avatar: Avatar, job: Job) -> tuple[
         _aim_foot(side, found, delta, joints, at_rest, avatar)
     _fill(found, len(turn))
     scale = _leg(bind) / leg_length(clip, joints)
-    _level_feet(found, joints, place, clip.frame_time, job)
+    still = {side: _still(side, joints, place, clip.frame_time) for side in ("left", "right")}
+    _level_feet(found, still, job)
     hips = [indices["left_hip"], indices["right_hip"]]
     ankles = [indices["left_ankle"], indices["right_ankle"]]
     middle = place[:, hips].mean(axis=1)
-    floor = np.percentile(place[:, ankles, 1].min(axis=1), _LOW_SHARE)
+    stands = np.concatenate([place[still[side], k, 1] for side, k in zip(("left", "right"), ankles, strict=True)])
+    floor = np.median(stands) if len(stands) else np.percentile(place[:, ankles, 1].min(axis=1), _LOW_SHARE)
     middle = scale * (middle - [middle[0, 0], floor, middle[0, 2]])
     middle[:, 1] += min(bind[f"{side}_ankle"][1] for side in ("left", "right")) - avatar.bind_vertices[:, 1].min()
     inside = (bind["left_hip"] + bind["right_hip"]) / 2 - bind["pelvis"]
@@ -176,28 +178,31 @@ def _halfway(first: FloatArray, second: FloatArray) -> FloatArray:
     return first @ vector_matrices(between / 2)
 
 
-def _level_feet(
-    found: dict[str, FloatArray], joints: JointMap, place: FloatArray, frame_time: float, job: Job
-) -> None:
-    """Turn each foot in its own frame so that it is level, on average, while it stands still.
-
-    Skeletons at rest hold their feet in different ways, some across the shank, some level: the floor is the same.
-    """
+def _still(side: str, joints: JointMap, place: FloatArray, frame_time: float) -> NDArray[np.bool_]:
+    """In which frames a foot of the source stands still: ankle and toe are slow, and the ankle low, shape (T,)."""
     reach = max(1, round(_STILL_S / 2 / frame_time))
     frames = np.arange(len(place))
     ahead, behind = np.minimum(frames + reach, len(place) - 1), np.maximum(frames - reach, 0)
     seconds = np.maximum(ahead - behind, 1) * frame_time
-    for side in ("left", "right"):
-        ankle = joints.indices[f"{side}_ankle"]
-        points = [ankle, joints.indices.get(f"{side}_toe", ankle)]
-        moved = np.linalg.norm(place[ahead][:, points] - place[behind][:, points], axis=-1).max(axis=1)
-        low = place[:, ankle, 1] < np.percentile(place[:, ankle, 1], 50) + 1e-6
-        still = (moved < _STILL_M_S * seconds) & low
-        if not still.any():
+    ankle = joints.indices[f"{side}_ankle"]
+    points = [ankle, joints.indices.get(f"{side}_toe", ankle)]
+    moved = np.linalg.norm(place[ahead][:, points] - place[behind][:, points], axis=-1).max(axis=1)
+    low = place[:, ankle, 1] <= np.median(place[:, ankle, 1])
+    still: NDArray[np.bool_] = (moved < _STILL_M_S * seconds) & low
+    return still
+
+
+def _level_feet(found: dict[str, FloatArray], still: Mapping[str, NDArray[np.bool_]], job: Job) -> None:
+    """Turn each foot in its own frame so that it is level, on average, while it stands still.
+
+    Skeletons at rest hold their feet in different ways, some across the shank, some level: the floor is the same.
+    """
+    for side, frames in still.items():
+        if not frames.any():
             continue
-        up = (np.swapaxes(found[f"{side}_ankle"][still], -1, -2) @ _UP).mean(axis=0)
+        up = (np.swapaxes(found[f"{side}_ankle"][frames], -1, -2) @ _UP).mean(axis=0)
         tilt = shortest_rotations(_UP, up)
-        angle = float(np.linalg.norm(Rotation.from_matrix(tilt).as_rotvec()))
+        angle = float(np.linalg.norm(matrix_vectors(tilt)))
         if angle > _MOST_TILT_RAD:
             job.warn(f"the {side} foot stands at {np.rad2deg(angle):.0f} degrees to the floor; it is left so")
             continue

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import convolve1d
 
 from vto_pipeline.avatar.motion.leg_reach import lowering, two_bones
 from vto_pipeline.avatar.motion.plants import runs
@@ -21,7 +22,11 @@ from vto_pipeline.numerics.kinematics import matrix_vectors, shortest_rotations,
 
 _FADE_S = 0.25
 _LOWER_S = 0.15
-_REACH = 0.998
+_HINGE_S = 0.1
+_SIDEWAYS = 0.15
+"""Weight of the thigh's own axis beside the sine of the knee's bend."""
+
+_REACH = 0.99
 """Share of the straight leg that a planted foot may need: knees that snap straight jerk."""
 
 
@@ -63,7 +68,7 @@ def hold_feet(
         way = held[side].ankle - place[:, hip]
         level = np.minimum(way[:, 0] ** 2 + way[:, 2] ** 2, length**2)
         need = np.maximum(-way[:, 1] - np.sqrt(length**2 - level), 0.0)
-        drop = np.maximum(drop, np.where(planted[:, where].any(axis=1), need, 0.0))
+        drop = np.maximum(drop, need)
     drop = lowering(drop, round(_LOWER_S / frame_time))
     root = place[:, names.index("pelvis")] - drop[:, None] * [0.0, 1.0, 0.0]
     for side, goal in held.items():
@@ -74,7 +79,7 @@ def hold_feet(
             goal.ankle,
             turn[:, hip] @ thigh,
             turn[:, knee] @ shank,
-            turn[:, hip, :, 0],
+            _hinge(turn[:, hip], turn[:, knee], thigh, shank, round(_HINGE_S / frame_time)),
         )
         turn[:, hip], turn[:, knee] = first @ turn[:, hip], second @ turn[:, knee]
         turn[:, ankle] = goal.turn
@@ -101,12 +106,14 @@ def _hold(
         level[span], anchor[span] = _stance(turn[span], world[span], planted[span], points)
     correction = matrix_vectors(level @ np.swapaxes(turn, -1, -2))
     turn = vector_matrices(fade_out(correction, flat, fade)) @ turn
-    turn = _above_floor(turn, planted, points)
+    turn = vector_matrices(fade_out(_dips(turn, planted, points), either, fade)) @ turn
     goal = anchor - np.einsum("tab,cb->tca", turn, points)
     wanted = np.where(planted[:, :1], goal[:, 0], goal[:, 1])
     ankle = ankle + fade_out(wanted - ankle, either, fade)
     lowest = (ankle[:, None, 1] + np.einsum("tb,cb->tc", turn[:, 1], points)).min(axis=1)
-    ankle = ankle + np.where(either, 0.0, np.maximum(-lowest, 0.0))[:, None] * [0.0, 1.0, 0.0]
+    lift = lowering(np.where(either, 0.0, np.maximum(-lowest, 0.0)), fade // 3)
+    grounded = fade_out(np.ones((len(lift), 1)), either, max(1, fade // 2))[:, 0]
+    ankle = ankle + ((1.0 - grounded) * lift)[:, None] * [0.0, 1.0, 0.0]
     return Held(turn, ankle)
 
 
@@ -128,21 +135,46 @@ def _stance(
     return level, anchor
 
 
-def _above_floor(turn: FloatArray, planted: NDArray[np.bool_], points: FloatArray) -> FloatArray:
-    """Level a foot that stands on its heel or its ball where the other end would dip into the floor."""
-    turn = turn.copy()
+def _dips(turn: FloatArray, planted: NDArray[np.bool_], points: FloatArray) -> FloatArray:
+    """Rotation vectors that level a foot on its heel or its ball whose other end would dip into the floor, (T, 3)."""
+    found = np.zeros((len(turn), 3))
     for c, sign in ((0, 1.0), (1, -1.0)):
         way = sign * np.einsum("tab,b->ta", turn, points[1] - points[0])
         dips = planted[:, c] & ~planted[:, 1 - c] & (way[:, 1] < 0)
         if dips.any():
-            turn[dips] = shortest_rotations(way[dips], way[dips] * [1.0, 0.0, 1.0]) @ turn[dips]
-    return turn
+            found[dips] = matrix_vectors(shortest_rotations(way[dips], way[dips] * [1.0, 0.0, 1.0]))
+    return found
+
+
+def _hinge(hip: FloatArray, knee: FloatArray, thigh: FloatArray, shank: FloatArray, reach: int) -> FloatArray:
+    """Return what each knee bends about: across thigh and shank, and where they are in line, across the thigh.
+
+    Smooth in the thigh's own frame: an almost straight knee has a plane, but not a steady one.
+
+    Args:
+        hip: World rotation of the thigh, shape (T, 3, 3).
+        knee: Of the shank.
+        thigh: From hip to knee in the bind pose, shape (3,).
+        shank: From knee to ankle in the bind pose, shape (3,).
+        reach: Half the window of the mean, in frames.
+    """
+    u = thigh / np.linalg.norm(thigh)
+    w = np.einsum("tba,tbc,c->ta", hip, knee, shank / np.linalg.norm(shank))
+    bend = np.cross(np.broadcast_to(u, w.shape), w)
+    forward = np.maximum(bend[:, :1], 0.0) / np.maximum(np.linalg.norm(bend, axis=1, keepdims=True), 1e-12)
+    normal = forward * bend + _SIDEWAYS * np.array([1.0, 0.0, 0.0])
+    weights = np.hanning(2 * reach + 3)[1:-1]
+    normal = convolve1d(normal, weights / weights.sum(), axis=0, mode="nearest")
+    normal = np.einsum("tab,tb->ta", hip, normal)
+    unit: FloatArray = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    return unit
 
 
 def fade_out(values: FloatArray, known: NDArray[np.bool_], reach: int) -> FloatArray:
     """Return values where they are known, fading to zero or to the next known ones over a number of frames.
 
-    The weight is 2 s^3 - 3 s^2 + 1 (Kovar et al. 2002, section 4.3).
+    Cubic Hermite curves that leave the known values with their slope (Kovar et al. 2002, section 4.3, has no slope:
+    a foot would then start with a jerk).
 
     Args:
         values: Shape (T, N).
@@ -150,13 +182,14 @@ def fade_out(values: FloatArray, known: NDArray[np.bool_], reach: int) -> FloatA
         reach: In frames.
     """
     faded = np.where(known[:, None], values, 0.0)
-    if not known.any():
-        return faded
     for first, end in runs(~known):
         gap = min(reach, end - first + 1)
         steps = np.arange(1, end - first + 1)
-        for edge, away in ((first - 1, steps), (end, steps[::-1])):
-            if 0 <= edge < len(known):
-                s = np.minimum(away / gap, 1.0)
-                faded[first:end] += (2 * s**3 - 3 * s**2 + 1)[:, None] * values[edge]
+        for edge, inward, away in ((first - 1, -1, steps), (end, 1, steps[::-1])):
+            if not 0 <= edge < len(known):
+                continue
+            before = edge + inward
+            slope = values[edge] - values[before] if 0 <= before < len(known) and known[before] else 0.0 * values[edge]
+            s = np.minimum(away / gap, 1.0)[:, None]
+            faded[first:end] += (2 * s**3 - 3 * s**2 + 1) * values[edge] + gap * (s**3 - 2 * s**2 + s) * slope
     return faded

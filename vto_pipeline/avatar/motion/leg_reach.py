@@ -8,10 +8,6 @@ from scipy.ndimage import convolve1d, maximum_filter1d
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.numerics.kinematics import vector_matrices
 
-_STRAIGHT, _BENT = 0.1, 0.3
-"""Sine of the knee's bend below which its plane is the thigh's own, and above which it is that of the bones."""
-
-
 def two_bones(
     hip: FloatArray,
     ankle: FloatArray,
@@ -21,34 +17,28 @@ def two_bones(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the rotations that thigh and shank make so that the shank ends at the ankle, shapes (T, 3, 3).
 
-    The knee stays in the plane it bends in. What is farther than both bones is reached for, straight.
+    The knee bends about the hinge. What is farther than both bones is reached for, straight.
 
     Args:
         hip: Where the thigh begins [m], shape (T, 3).
         ankle: Where the shank is to end [m], shape (T, 3).
         thigh: From hip to knee, as they are [m], shape (T, 3).
         shank: From knee to ankle, as they are [m], shape (T, 3).
-        hinge: About which a knee bends forward where its bones say nothing, unit, shape (T, 3).
+        hinge: About which the shank turns back from the thigh, unit, shape (T, 3).
     """
     first, second = (np.linalg.norm(bone, axis=1, keepdims=True) for bone in (thigh, shank))
     u, w = thigh / first, shank / second
-    bend = np.cross(u, w)
-    sine = np.linalg.norm(bend, axis=1, keepdims=True)
-    bend = np.where((bend * hinge).sum(axis=1, keepdims=True) < 0, -bend, bend) / np.maximum(sine, 1e-12)
-    s = np.clip((sine - _STRAIGHT) / (_BENT - _STRAIGHT), 0.0, 1.0)
-    share = s * s * (3 - 2 * s)
-    normal = share * bend + (1 - share) * hinge
     way = ankle - hip
     distance = np.linalg.norm(way, axis=1, keepdims=True)
     along = way / np.maximum(distance, 1e-12)
-    across = _across(normal, along)
+    across = _across(hinge, along)
     distance = np.clip(distance, abs(first - second) + 1e-9, first + second)
     cosine = np.clip((first**2 + distance**2 - second**2) / (2 * first * distance), -1.0, 1.0)
     new_u = np.einsum("tab,tb->ta", vector_matrices(-np.arccos(cosine) * across), along)
     new_w = (distance * along - first * new_u) / second
     return (
-        _frame(new_u, across) @ np.swapaxes(_frame(u, _across(normal, u)), -1, -2),
-        _frame(new_w, across) @ np.swapaxes(_frame(w, _across(normal, w)), -1, -2),
+        _frame(new_u, across) @ np.swapaxes(_frame(u, _across(hinge, u)), -1, -2),
+        _frame(new_w, across) @ np.swapaxes(_frame(w, _across(hinge, w)), -1, -2),
     )
 
 

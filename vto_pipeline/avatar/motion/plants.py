@@ -17,7 +17,8 @@ _SPAN_S = 0.03
 def find_plants(places: FloatArray, frame_time: float) -> NDArray[np.bool_]:
     """Return when each point is planted, shape (T, N).
 
-    A point is planted from when it is slow and low until it is fast or high; shorter times than 0.08 s do not count.
+    A point is planted from when it is slow and low until it is fast or high; times shorter than 0.08 s do not count,
+    neither on the floor nor just above it.
     After Kovar, Schreiner & Gleicher 2002, "Footskate cleanup for motion capture editing".
 
     Args:
@@ -35,6 +36,9 @@ def find_plants(places: FloatArray, frame_time: float) -> NDArray[np.bool_]:
             entered = np.flatnonzero(enter[first:end, n])
             if len(entered):
                 planted[first + entered[0] : end, n] = True
+        for first, end in runs(~planted[:, n]):  # a short rise is a tremble
+            if 0 < first and end < frames and (end - first) * frame_time < _SHORTEST_S:
+                planted[first:end, n] = bool(height[first:end, n].max() < _LEAVE_M)
         for first, end in runs(planted[:, n]):
             if frames > 1 and (end - first) * frame_time < _SHORTEST_S:
                 planted[first:end, n] = False
