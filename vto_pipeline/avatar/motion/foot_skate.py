@@ -93,9 +93,7 @@ def _bones(avatar: Avatar, side: str) -> tuple[FloatArray, FloatArray]:
     return knee - hip, ankle - knee
 
 
-def _hold(
-    turn: FloatArray, ankle: FloatArray, planted: NDArray[np.bool_], points: FloatArray, fade: int
-) -> Held:
+def _hold(turn: FloatArray, ankle: FloatArray, planted: NDArray[np.bool_], points: FloatArray, fade: int) -> Held:
     """One foot. `planted` and `points` are those of its heel and ball."""
     flat, either = planted.all(axis=1), planted.any(axis=1)
     level = np.tile(np.eye(3), (len(turn), 1, 1))
@@ -130,7 +128,9 @@ def _stance(
         middle = world[flat].mean(axis=(0, 1))
         anchor = middle + (points - points.mean(axis=0)) @ level.T
     else:
-        anchor = np.stack([world[planted[:, c], c].mean(axis=0) if planted[:, c].any() else np.zeros(3) for c in (0, 1)])
+        anchor = np.stack(
+            [world[planted[:, c], c].mean(axis=0) if planted[:, c].any() else np.zeros(3) for c in (0, 1)]
+        )
     anchor[:, 1] = 0.0
     return level, anchor
 

@@ -8,6 +8,7 @@ from scipy.ndimage import convolve1d, maximum_filter1d
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.numerics.kinematics import vector_matrices
 
+
 def two_bones(
     hip: FloatArray,
     ankle: FloatArray,

@@ -9,7 +9,7 @@ from vto_pipeline.model.arrays import FloatArray
 
 _ENTER_M_S, _LEAVE_M_S = 0.20, 0.40
 _ENTER_M, _LEAVE_M = 0.035, 0.06
-_SHORTEST_S = 0.08
+_SHORTEST_S = 0.1
 _SPAN_S = 0.03
 """Over which speeds are taken: captured places are noisy."""
 
@@ -17,7 +17,7 @@ _SPAN_S = 0.03
 def find_plants(places: FloatArray, frame_time: float) -> NDArray[np.bool_]:
     """Return when each point is planted, shape (T, N).
 
-    A point is planted from when it is slow and low until it is fast or high; times shorter than 0.08 s do not count,
+    A point is planted from when it is slow and low until it is fast or high; times shorter than 0.1 s do not count,
     neither on the floor nor just above it.
     After Kovar, Schreiner & Gleicher 2002, "Footskate cleanup for motion capture editing".
 
@@ -37,7 +37,7 @@ def find_plants(places: FloatArray, frame_time: float) -> NDArray[np.bool_]:
             if len(entered):
                 planted[first + entered[0] : end, n] = True
         for first, end in runs(~planted[:, n]):  # a short rise is a tremble
-            if 0 < first and end < frames and (end - first) * frame_time < _SHORTEST_S:
+            if first > 0 and end < frames and (end - first) * frame_time < _SHORTEST_S:
                 planted[first:end, n] = bool(height[first:end, n].max() < _LEAVE_M)
         for first, end in runs(planted[:, n]):
             if frames > 1 and (end - first) * frame_time < _SHORTEST_S:

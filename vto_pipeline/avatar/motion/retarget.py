@@ -150,7 +150,10 @@ def _report(figures: MotionFigures, contacts: FloatArray, place: FloatArray, fra
     if figures.spikes_after > figures.spikes_before:
         job.warn(f"{figures.spikes_after - figures.spikes_before} more frames with a jerk than before")
     if share is not None and share < _BALANCED:
-        job.warn(f"the body is in balance in {share:.0%} of the frames only; a person would fall")
+        job.warn(
+            f"the zero moment point lies outside of the feet in {1 - share:.0%} of the frames on the floor: "
+            "a person who moves like this would stumble"
+        )
     if figures.plants == 0 and len(contacts) > 2:
         pelvis = float(np.linalg.norm(place[-1, 0] - place[0, 0])) / ((len(place) - 1) * frame_time)
         lowest = contacts[..., 1].argmin(axis=1)

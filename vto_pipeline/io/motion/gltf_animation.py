@@ -86,7 +86,9 @@ def _parents(document: GltfDocument) -> dict[int, int]:
             raise FormatError(f"nodes[{k}].children is not a list", where=str(document.path))
         for child in children:
             if type(child) is not int or not 0 <= child < count or child in above:
-                raise FormatError(f"nodes[{k}]: child {child} does not exist, or has two parents", where=str(document.path))
+                raise FormatError(
+                    f"nodes[{k}]: child {child} does not exist, or has two parents", where=str(document.path)
+                )
             above[child] = k
     return above
 
@@ -119,7 +121,9 @@ def _channels(document: GltfDocument, needed: set[int]) -> tuple[dict[int, dict[
         targets = [one.get("target") for one in entries]
         if not all(isinstance(target, dict) for target in targets):
             raise FormatError("a channel of an animation has no target", where=where)
-        sizes.append([one for one in entries if one["target"].get("node") in needed and one["target"].get("path") in WIDTHS])
+        sizes.append(
+            [one for one in entries if one["target"].get("node") in needed and one["target"].get("path") in WIDTHS]
+        )
     if not sizes or not max(map(len, sizes)):
         return {}, ["no animation: the skeleton at rest is a single pose"]
     index = max(range(len(sizes)), key=lambda k: len(sizes[k]))

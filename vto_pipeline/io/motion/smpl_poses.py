@@ -54,7 +54,9 @@ def parse_smpl_poses(name: str) -> Arrays:
         vectors = np.concatenate([vectors, body.reshape(frames, -1).astype(np.float64)], axis=1)
     joints = len(NAMES)
     if vectors.shape[1] < 3 * joints or vectors.shape[1] % 3:
-        raise FormatError(f"{vectors.shape[1]} numbers a frame; expected 3 a joint, from {joints} joints on", where=name)
+        raise FormatError(
+            f"{vectors.shape[1]} numbers a frame; expected 3 a joint, from {joints} joints on", where=name
+        )
     vectors = vectors[:, : 3 * joints].reshape(frames, joints, 3)
     places = next((arrays[key] for key in _PLACES if key in arrays), np.zeros((frames, 3)))
     if places.shape != (frames, 3):
@@ -68,7 +70,9 @@ def parse_smpl_poses(name: str) -> Arrays:
     if not 0.1 <= rate <= 1e4:
         raise FormatError(f"{rate:g} frames a second", where=name)
     lost = ~(np.isfinite(vectors).all(axis=(1, 2)) & np.isfinite(places).all(axis=1))
-    lost |= (abs(np.nan_to_num(vectors)) > _LARGEST).any(axis=(1, 2)) | (abs(np.nan_to_num(places)) > _LARGEST).any(axis=1)
+    lost |= (abs(np.nan_to_num(vectors)) > _LARGEST).any(axis=(1, 2)) | (abs(np.nan_to_num(places)) > _LARGEST).any(
+        axis=1
+    )
     vectors, places = np.where(lost[:, None, None], 0.0, vectors), np.where(lost[:, None], 0.0, places)
     parents, offsets = standard_skeleton()
     rotations = matrix_quaternions(vector_matrices(vectors))
