@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 Floats = NDArray[np.float64]
 
 
-def world_transforms(parents: Sequence[int], rotations: Floats, translations: Floats) -> tuple[Floats, Floats]:
+def world_transforms(parents: Iterable[int], rotations: Floats, translations: Floats) -> tuple[Floats, Floats]:
     """Return the world rotation and place of each joint, shapes (T, J, 3, 3) and (T, J, 3).
 
     Args:
@@ -31,7 +31,7 @@ def world_transforms(parents: Sequence[int], rotations: Floats, translations: Fl
     return turn, place
 
 
-def local_rotations(parents: Sequence[int], turn: Floats) -> Floats:
+def local_rotations(parents: Iterable[int], turn: Floats) -> Floats:
     """Return rotations in the parents' frames of those in the world, shape (T, J, 3, 3)."""
     local = turn.copy()
     for j, parent in enumerate(parents):

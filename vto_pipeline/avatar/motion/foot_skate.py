@@ -95,7 +95,7 @@ def _bones(avatar: Avatar, side: str) -> tuple[FloatArray, FloatArray]:
 
 def _hold(turn: FloatArray, ankle: FloatArray, planted: NDArray[np.bool_], points: FloatArray, fade: int) -> Held:
     """One foot. `planted` and `points` are those of its heel and ball."""
-    flat, either = planted.all(axis=1), planted.any(axis=1)
+    flat, either = np.all(planted, axis=1), np.any(planted, axis=1)
     level = np.tile(np.eye(3), (len(turn), 1, 1))
     anchor = np.zeros((len(turn), 2, 3))
     world = ankle[:, None] + np.einsum("tab,cb->tca", turn, points)
@@ -118,7 +118,7 @@ def _hold(turn: FloatArray, ankle: FloatArray, planted: NDArray[np.bool_], point
 def _stance(
     turn: FloatArray, world: FloatArray, planted: NDArray[np.bool_], points: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the level foot (3, 3) and where heel and ball stand (2, 3), from when the foot first touches to its rise."""
+    """Return the level foot (3, 3), and where heel and ball stand (2, 3), while a foot is on the floor."""
     flat = planted.all(axis=1)
     some = flat if flat.any() else planted.any(axis=1)
     ahead = turn[some, :, 2].mean(axis=0)
@@ -128,9 +128,9 @@ def _stance(
         middle = world[flat].mean(axis=(0, 1))
         anchor = middle + (points - points.mean(axis=0)) @ level.T
     else:
-        anchor = np.stack(
-            [world[planted[:, c], c].mean(axis=0) if planted[:, c].any() else np.zeros(3) for c in (0, 1)]
-        )
+        anchor = np.zeros((2, 3))
+        for c in np.flatnonzero(planted.any(axis=0)):
+            anchor[c] = world[planted[:, c], c].mean(axis=0)
     anchor[:, 1] = 0.0
     return level, anchor
 

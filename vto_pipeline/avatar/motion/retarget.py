@@ -32,10 +32,10 @@ _ON_THE_SPOT_M_S, _SLIDES_M_S = 0.2, 0.4
 class RetargetConfig(Config):
     """Settings of the retargeting."""
 
-    frames_per_second: float = Field(0.0, ge=0.0, le=240.0, description="Of the result; 0 keeps the clip's")
-    hold_feet: bool = Field(True, description="Whether feet that stand still are held where they stand")
+    frames_per_second: float = Field(default=0.0, ge=0.0, le=240.0, description="Of the result; 0 keeps the clip's")
+    hold_feet: bool = Field(default=True, description="Whether feet that stand still are held where they stand")
     lead_in_s: float = Field(
-        0.0, ge=0.0, le=10.0, description="Time in which the avatar gets from its own pose to the first frame [s]"
+        default=0.0, ge=0.0, le=10.0, description="Time from the avatar's own pose to the first frame [s]"
     )
 
 

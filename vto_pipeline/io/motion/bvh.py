@@ -69,8 +69,8 @@ def parse_bvh(name: str) -> Arrays:
         "rest": rotations[0] * 0.0 + [0.0, 0.0, 0.0, 1.0],
         "rotations": rotations,
         "translations": translations,
-        "frame_time": np.float64(read.frame_time),
-        "dialect": np.str_(_dialect(joints)),
+        "frame_time": np.array(read.frame_time),
+        "dialect": np.array(_dialect(joints)),
         "notes": np.array([], dtype=np.str_),
         "warnings": np.array([*read.warnings, *warnings], dtype=np.str_),
     }

@@ -12,7 +12,7 @@ from vto_pipeline.errors import FormatError
 from vto_pipeline.io.arrays import Arrays
 from vto_pipeline.io.gltf.document import GltfDocument, open_gltf
 from vto_pipeline.io.motion.bvh import MOST_TURNS
-from vto_pipeline.io.motion.gltf_samplers import WIDTHS, read_sampler, sample
+from vto_pipeline.io.motion.gltf_samplers import WIDTHS, Keys, read_sampler, sample
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.numerics.kinematics import local_rotations, matrix_quaternions, quaternion_matrices
 
@@ -70,8 +70,8 @@ def parse_animation(name: str) -> Arrays:
         "rest": rest[0],
         "rotations": rotations,
         "translations": translations,
-        "frame_time": np.float64(frame_time),
-        "dialect": np.str_(f"glTF, {'a skin' if skins else 'nodes'}, {' and '.join(kinds) or 'no animation'}"),
+        "frame_time": np.array(frame_time),
+        "dialect": np.array(f"glTF, {'a skin' if skins else 'nodes'}, {' and '.join(kinds) or 'no animation'}"),
         "notes": np.array(notes, dtype=np.str_),
         "warnings": np.array([], dtype=np.str_),
     }
@@ -86,9 +86,8 @@ def _parents(document: GltfDocument) -> dict[int, int]:
             raise FormatError(f"nodes[{k}].children is not a list", where=str(document.path))
         for child in children:
             if type(child) is not int or not 0 <= child < count or child in above:
-                raise FormatError(
-                    f"nodes[{k}]: child {child} does not exist, or has two parents", where=str(document.path)
-                )
+                problem = f"nodes[{k}]: child {child} does not exist, or has two parents"
+                raise FormatError(problem, where=str(document.path))
             above[child] = k
     return above
 
@@ -108,10 +107,10 @@ def _with_ancestors(chosen: list[int], above: Mapping[int, int], where: str) -> 
     return sorted(depths, key=lambda node: (depths[node], node))
 
 
-def _channels(document: GltfDocument, needed: set[int]) -> tuple[dict[int, dict[str, tuple[Any, ...]]], list[str]]:
+def _channels(document: GltfDocument, needed: set[int]) -> tuple[dict[int, dict[str, Keys]], list[str]]:
     """Node -> path -> times, values, interpolation, of the animation with most channels on these nodes; and notes."""
     where = str(document.path)
-    best: dict[int, dict[str, tuple[Any, ...]]] = {}
+    best: dict[int, dict[str, Keys]] = {}
     animations = document.items("animations")
     sizes = []
     for animation in animations:
@@ -121,9 +120,7 @@ def _channels(document: GltfDocument, needed: set[int]) -> tuple[dict[int, dict[
         targets = [one.get("target") for one in entries]
         if not all(isinstance(target, dict) for target in targets):
             raise FormatError("a channel of an animation has no target", where=where)
-        sizes.append(
-            [one for one in entries if one["target"].get("node") in needed and one["target"].get("path") in WIDTHS]
-        )
+        sizes.append([one for one in entries if _moves_joint(one["target"], needed)])
     if not sizes or not max(map(len, sizes)):
         return {}, ["no animation: the skeleton at rest is a single pose"]
     index = max(range(len(sizes)), key=lambda k: len(sizes[k]))
@@ -142,7 +139,12 @@ def _channels(document: GltfDocument, needed: set[int]) -> tuple[dict[int, dict[
     return best, notes if others else []
 
 
-def _times(channels: Mapping[int, Mapping[str, tuple[Any, ...]]]) -> tuple[FloatArray, float]:
+def _moves_joint(target: Mapping[str, Any], needed: set[int]) -> bool:
+    node, path = target.get("node"), target.get("path")
+    return type(node) is int and node in needed and isinstance(path, str) and path in WIDTHS
+
+
+def _times(channels: Mapping[int, Mapping[str, Keys]]) -> tuple[FloatArray, float]:
     """Times of the frames and their distance [s]."""
     keys = [times for one in channels.values() for times, _, _ in one.values()]
     moving = [times for times in keys if len(times) > 1]
@@ -158,7 +160,7 @@ def _times(channels: Mapping[int, Mapping[str, tuple[Any, ...]]]) -> tuple[Float
 def _worlds(
     nodes: list[Mapping[str, Any]],
     parents: list[int],
-    channels: list[Mapping[str, tuple[Any, ...]]],
+    channels: list[Mapping[str, Keys]],
     times: FloatArray,
     path: Path,
 ) -> FloatArray:
@@ -172,9 +174,7 @@ def _worlds(
     return world
 
 
-def _local_matrices(
-    node: Mapping[str, Any], moved: Mapping[str, tuple[Any, ...]], times: FloatArray, path: Path
-) -> FloatArray:
+def _local_matrices(node: Mapping[str, Any], moved: Mapping[str, Keys], times: FloatArray, path: Path) -> FloatArray:
     local = np.tile(np.eye(4), (len(times), 1, 1))
     try:
         if "matrix" in node and not moved:
@@ -186,7 +186,7 @@ def _local_matrices(
             "scale": np.array(node.get("scale", (1, 1, 1)), dtype=np.float64).reshape(3),
         }
         values = {
-            name: sample(*moved[name], name, times) if name in moved else np.tile(value, (len(times), 1))
+            name: sample(moved[name], name, times) if name in moved else np.tile(value, (len(times), 1))
             for name, value in still.items()
         }
         turn = quaternion_matrices(values["rotation"])

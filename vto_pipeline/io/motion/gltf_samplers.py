@@ -15,10 +15,13 @@ from vto_pipeline.model.arrays import FloatArray
 WIDTHS = {"translation": 3, "rotation": 4, "scale": 3}
 """Path of a channel -> numbers of a value; weights of morph targets move no joint."""
 
+Keys = tuple[FloatArray, FloatArray, str]
+"""Times [s], shape (K,); values, shape (K, W), or with tangents (K, 3, W); the interpolation."""
+
 _TINY = 1e-6
 
 
-def read_sampler(document: GltfDocument, sampler: Mapping[str, Any], path: str) -> tuple[FloatArray, FloatArray, str]:
+def read_sampler(document: GltfDocument, sampler: Mapping[str, Any], path: str) -> Keys:
     """Read keys of a channel.
 
     Args:
@@ -52,18 +55,17 @@ def read_sampler(document: GltfDocument, sampler: Mapping[str, Any], path: str) 
     return times[:, 0], values, kind
 
 
-def sample(times: FloatArray, values: FloatArray, kind: str, path: str, wanted: FloatArray) -> FloatArray:
+def sample(keys: Keys, path: str, wanted: FloatArray) -> FloatArray:
     """Return values at other times, shape (T, W); before the first key and after the last, theirs.
 
     glTF 2.0, appendix C: slerp for linear rotations; cubic Hermite splines whose tangents are per second.
 
     Args:
-        times: Of the keys [s], shape (K,).
-        values: As `read_sampler` gives them.
-        kind: The interpolation.
+        keys: Times, values and interpolation, as `read_sampler` gives them.
         path: What is animated.
         wanted: Times [s], shape (T,).
     """
+    times, values, kind = keys
     wanted = np.clip(wanted, times[0], times[-1])
     middle = values[:, 1] if kind == "CUBICSPLINE" else values
     if len(times) == 1:

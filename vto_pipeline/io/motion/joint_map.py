@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -114,7 +115,7 @@ def _is_body(found: Mapping[str, int], parents: Sequence[int]) -> bool:
     for side in ("left", "right"):
         for chain in _CHAINS:
             there = [found[f"{side}_{joint}"] for joint in chain if f"{side}_{joint}" in found]
-            if any(a not in ancestors(parents, b) for a, b in zip(there, there[1:], strict=False)):
+            if any(a not in ancestors(parents, b) for a, b in pairwise(there)):
                 return False
     return True
 

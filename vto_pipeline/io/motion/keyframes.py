@@ -29,9 +29,9 @@ class KeyPose(Config):
     Angles count from the T-pose, about the body's axes: first x (a bow), then y (a turn to the left), then z.
     """
 
-    at_s: float = Field(0.0, ge=0.0, le=_LONGEST_S, description="When [s]")
-    place_m: tuple[float, float] = Field((0.0, 0.0), description="Where the pelvis is: to the left, ahead [m]")
-    lift_m: float = Field(0.0, ge=-2.0, le=2.0, description="How far the lower foot is off the floor [m]")
+    at_s: float = Field(default=0.0, ge=0.0, le=_LONGEST_S, description="When [s]")
+    place_m: tuple[float, float] = Field(default=(0.0, 0.0), description="Where the pelvis is: to the left, ahead [m]")
+    lift_m: float = Field(default=0.0, ge=-2.0, le=2.0, description="How far the lower foot is off the floor [m]")
     joints_deg: dict[str, tuple[_ANGLE, _ANGLE, _ANGLE]] = Field(
         default_factory=dict, description="Joint -> angles about x, y, z; joints left out stay in the T-pose"
     )
@@ -40,8 +40,8 @@ class KeyPose(Config):
 class KeyPoses(Config):
     """A file of poses."""
 
-    name: str = Field("", max_length=200, description="What it shows")
-    frames_per_second: float = Field(30.0, ge=1.0, le=240.0, description="Of the clip made of it")
+    name: str = Field(default="", max_length=200, description="What it shows")
+    frames_per_second: float = Field(default=30.0, ge=1.0, le=240.0, description="Of the clip made of it")
     poses: tuple[KeyPose, ...] = Field(min_length=1, max_length=_MOST_POSES, description="In the order of their times")
 
 
@@ -74,7 +74,7 @@ def parse_keyframes(name: str) -> Arrays:
                 raise FormatError(f"joint {joint!r}; expected one of {', '.join(NAMES)}", where=where)
             keys[k, NAMES.index(joint)] = Rotation.from_euler("xyz", angles, degrees=True).as_quat()
     rate = given.frames_per_second
-    count = int(round((times[-1] - times[0]) * rate)) + 1
+    count = round((times[-1] - times[0]) * rate) + 1
     wanted = np.minimum(times[0] + np.arange(count) / rate, times[-1])
     rotations = _between(times, continuous_signs(keys), wanted)
     rotations /= np.linalg.norm(rotations, axis=-1, keepdims=True)
@@ -92,8 +92,8 @@ def parse_keyframes(name: str) -> Arrays:
         "rest": np.tile([0.0, 0.0, 0.0, 1.0], (len(NAMES), 1)),
         "rotations": rotations,
         "translations": translations,
-        "frame_time": np.float64(1.0 / rate),
-        "dialect": np.str_(f"{len(times)} poses in YAML"),
+        "frame_time": np.array(1.0 / rate),
+        "dialect": np.array(f"{len(times)} poses in YAML"),
         "notes": np.array([], dtype=np.str_),
         "warnings": np.array([], dtype=np.str_),
     }

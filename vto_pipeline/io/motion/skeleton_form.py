@@ -11,6 +11,9 @@ from vto_pipeline.model.arrays import FloatArray
 _LEVEL = 0.5
 """A bone that rises or falls less than this share of its length belongs to the foot."""
 
+_SHORT = 0.7
+"""Of the arm's longest bone: what is shorter at its end belongs to the hand; forearms are nine tenths of upper arms."""
+
 
 def ancestors(parents: Sequence[int], joint: int) -> list[int]:
     """Return a joint and all above it, from the joint to the root."""
@@ -85,6 +88,10 @@ def _limb(chain: list[int], places: FloatArray, up: int | None, half: str, names
         while len(chain) > 3 and abs(places[chain[-1], up] - places[chain[-2], up]) < _LEVEL * np.linalg.norm(
             places[chain[-1]] - places[chain[-2]]
         ):
+            chain = chain[:-1]
+    else:  # cut the hand off: its bones are short
+        bones = np.linalg.norm(np.diff(places[chain], axis=0), axis=1)
+        while len(chain) > 3 and bones[len(chain) - 2] < _SHORT * bones.max():
             chain = chain[:-1]
     if len(chain) < 3:
         return {}

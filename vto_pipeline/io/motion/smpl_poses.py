@@ -54,10 +54,9 @@ def parse_smpl_poses(name: str) -> Arrays:
         vectors = np.concatenate([vectors, body.reshape(frames, -1).astype(np.float64)], axis=1)
     joints = len(NAMES)
     if vectors.shape[1] < 3 * joints or vectors.shape[1] % 3:
-        raise FormatError(
-            f"{vectors.shape[1]} numbers a frame; expected 3 a joint, from {joints} joints on", where=name
-        )
-    vectors = vectors[:, : 3 * joints].reshape(frames, joints, 3)
+        problem = f"{vectors.shape[1]} numbers a frame; expected 3 a joint, from {joints} joints on"
+        raise FormatError(problem, where=name, hint=_HINT)
+    turns = vectors[:, : 3 * joints].reshape(frames, joints, 3)
     places = next((arrays[key] for key in _PLACES if key in arrays), np.zeros((frames, 3)))
     if places.shape != (frames, 3):
         raise FormatError(f"trans has the shape {places.shape}; expected ({frames}, 3)", where=name, hint=_HINT)
@@ -69,13 +68,11 @@ def parse_smpl_poses(name: str) -> Arrays:
         notes.append(f"the file holds no frame rate: {rate:g} frames a second are assumed")
     if not 0.1 <= rate <= 1e4:
         raise FormatError(f"{rate:g} frames a second", where=name)
-    lost = ~(np.isfinite(vectors).all(axis=(1, 2)) & np.isfinite(places).all(axis=1))
-    lost |= (abs(np.nan_to_num(vectors)) > _LARGEST).any(axis=(1, 2)) | (abs(np.nan_to_num(places)) > _LARGEST).any(
-        axis=1
-    )
-    vectors, places = np.where(lost[:, None, None], 0.0, vectors), np.where(lost[:, None], 0.0, places)
+    both = np.concatenate([turns.reshape(frames, -1), places], axis=1)
+    lost = np.logical_not(np.all(abs(both) < _LARGEST, axis=1))  # NaN is below nothing
+    turns, places = np.where(lost[:, None, None], 0.0, turns), np.where(lost[:, None], 0.0, places)
     parents, offsets = standard_skeleton()
-    rotations = matrix_quaternions(vector_matrices(vectors))
+    rotations = matrix_quaternions(vector_matrices(turns))
     translations = np.tile(offsets, (frames, 1, 1))
     translations[:, 0] += places
     rotations, translations, warnings = fill_gaps(rotations, translations, lost, 1.0 / rate, Path(name))
@@ -86,8 +83,8 @@ def parse_smpl_poses(name: str) -> Arrays:
         "rest": np.tile([0.0, 0.0, 0.0, 1.0], (joints, 1)),
         "rotations": rotations,
         "translations": translations,
-        "frame_time": np.float64(1.0 / rate),
-        "dialect": np.str_("poses of the SMPL family"),
+        "frame_time": np.array(1.0 / rate),
+        "dialect": np.array("poses of the SMPL family"),
         "notes": np.array(notes, dtype=np.str_),
         "warnings": np.array(warnings, dtype=np.str_),
     }
