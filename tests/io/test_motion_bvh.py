@@ -150,7 +150,9 @@ CONVENTIONS = {
             ("UpLeg", "Hip"), ("Leg", "Knee"), ("Foot", "Ankle"), ("ToeBase", "Toe"))},
         "Spine1": "Chest",
     }.get(name, name),
-    "smpl": lambda name: _sided(name, "{0}_{1}", ("Collar", "Shoulder", "Elbow", "Wrist", "Hip", "Knee", "Ankle", "Foot")),
+    "smpl": lambda name: _sided(
+        name, "{0}_{1}", ("Collar", "Shoulder", "Elbow", "Wrist", "Hip", "Knee", "Ankle", "Foot")
+    ),
     "biped": lambda name: "Bip01 " + _sided(
         name, "{0} {1}", ("Clavicle", "UpperArm", "Forearm", "Hand", "Thigh", "Calf", "Foot", "Toe0")
     ),
@@ -187,7 +189,8 @@ def test_joints_are_found_by_name_or_by_form(tmp_path, convention):
 
 
 def test_what_is_no_person_is_refused(tmp_path):
-    text = "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 3 Xrotation Yrotation Zrotation\nEnd Site\n{\nOFFSET 0 1 0\n}\n}\n"
+    text = "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 3 Xrotation Yrotation Zrotation\n"
+    text += "End Site\n{\nOFFSET 0 1 0\n}\n}\n"
     (tmp_path / "a.bvh").write_text(text + "MOTION\nFrames: 1\nFrame Time: 0.1\n0 0 0\n")
     with pytest.raises(FormatError, match="not the skeleton of a person"):
         read(tmp_path / "a.bvh")
