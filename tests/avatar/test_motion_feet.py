@@ -185,7 +185,7 @@ def test_a_standing_body_is_balanced_and_a_leaning_one_is_not():
     poses[:, body.joint_names.index("spine"), 0] = 1.2  # bowed from the waist
     leaning = balance(*posed_joints(body, poses, np.tile(body.joints[0], (40, 1))), body, 1 / 30)
     assert (leaning.zero_moment[:, 1] > found.zero_moment[:, 1] + 0.05).all()
-    aloft = balance(turn, place + [0.0, 1.0, 0.0], body, 1 / 30)
+    aloft = balance(turn, place + np.array([0.0, 1.0, 0.0]), body, 1 / 30)
     assert aloft.inside_share is None
 
 
