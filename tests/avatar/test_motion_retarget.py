@@ -24,8 +24,9 @@ from vto_pipeline.numerics.kinematics import matrix_quaternions, vector_matrices
 
 REAL = Path(__file__).parents[2].parent / "shared" / "data" / "motion"
 CLIPS = ("cmu_131_bvh/131_01", "cmu_131_bvh/131_02", "cmu_131_bvh/131_03", "pymo_bvh/AV_8Walk_Meredith_HVHA_Rep1")
-JERKS = 20
-"""Frames of a real clip in which a knee may jerk: the recordings have up to ten of their own."""
+BONES = (("shoulder", "elbow"), ("elbow", "wrist"))
+MORE_JERKS = 2
+"""Frames with a jerk that may come on top of the recording's own: a held foot passes them on to its knee."""
 
 
 @cache
@@ -166,6 +167,6 @@ def test_planted_feet_of_real_clips_drift_by_less_than_two_millimetres(clip, nam
     assert drift <= 0.002
     assert figures.plants > 10
     assert figures.drift_before > 0.01
-    assert figures.spikes_after <= JERKS
+    assert figures.spikes_after <= figures.spikes_before + MORE_JERKS
     assert figures.below_floor < 0.02
     assert abs(contacts[..., 1][motion.planted]).max() < 0.001

@@ -10,6 +10,9 @@ from vto_pipeline.model.arrays import FloatArray
 _ENTER_M_S, _LEAVE_M_S = 0.20, 0.40
 _ENTER_M, _LEAVE_M = 0.035, 0.06
 _SHORTEST_S = 0.1
+_TREMBLE_M = 0.03
+"""A short rise ends no plant if the foot comes down within this."""
+
 _SPAN_S = 0.03
 """Over which speeds are taken: captured places are noisy."""
 
@@ -38,7 +41,8 @@ def find_plants(places: FloatArray, frame_time: float) -> NDArray[np.bool_]:
                 planted[first + entered[0] : end, n] = True
         for first, end in runs(~planted[:, n]):  # a short rise is a tremble
             if first > 0 and end < frames and (end - first) * frame_time < _SHORTEST_S:
-                planted[first:end, n] = bool(height[first:end, n].max() < _LEAVE_M)
+                moved = float(np.linalg.norm(places[end, n] - places[first - 1, n]))
+                planted[first:end, n] = moved < _TREMBLE_M and height[first:end, n].max() < _LEAVE_M
         for first, end in runs(planted[:, n]):
             if frames > 1 and (end - first) * frame_time < _SHORTEST_S:
                 planted[first:end, n] = False
