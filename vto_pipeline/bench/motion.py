@@ -1,4 +1,4 @@
-"""`python -m vto_pipeline.bench.motion FILE...` carries motions over to five bodies and prints how clean they come out."""
+"""`python -m vto_pipeline.bench.motion FILE...` carries motions over to five bodies, and prints how clean they are."""
 
 from __future__ import annotations
 

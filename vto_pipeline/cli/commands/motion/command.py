@@ -36,7 +36,7 @@ def motion_command(
 ) -> None:
     """Show what a motion holds, and carry it over to an avatar.
 
-    Reads BVH, glTF and GLB with a skeleton, poses of the SMPL family (.npz), poses in YAML, and presets by name:
+    Reads BVH, glTF and GLB with a skeleton, poses of the SMPL family (.npz), and poses in YAML. Presets have names:
     t_pose, a_pose, arms_down, arms_up, sitting, walking_step.
 
     \b

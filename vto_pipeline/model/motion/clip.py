@@ -1,7 +1,4 @@
-"""Motion: a clip of a foreign skeleton, and the same movement of one of our avatars.
-
-World frame: metres, +Y up, +Z forward, y = 0 the floor. Quaternions are (x, y, z, w).
-"""
+"""A moving skeleton, as a file holds it."""
 
 from __future__ import annotations
 
@@ -11,9 +8,6 @@ import numpy as np
 
 from vto_pipeline.errors import InputError
 from vto_pipeline.model.arrays import FloatArray, IntArray, freeze
-
-CONTACTS = ("left_heel", "left_ball", "right_heel", "right_ball")
-"""Where a foot may touch the floor, in the order of the columns of `AvatarMotion.planted`."""
 
 _LONGEST_FRAME_S = 10.0
 
@@ -58,7 +52,7 @@ class Clip:
         for quaternions in (self.rest, self.rotations):
             if (abs(np.linalg.norm(quaternions, axis=-1) - 1.0) > 1e-6).any():
                 raise InputError("clip rotations: a quaternion is not of unit length")
-        _check_frame_time(self.frame_time)
+        check_frame_time(self.frame_time)
 
     @property
     def seconds(self) -> float:
@@ -66,42 +60,11 @@ class Clip:
         return (len(self.rotations) - 1) * self.frame_time
 
 
-@dataclass(frozen=True)
-class AvatarMotion:
-    """A movement of one avatar; frame t is `pose_avatar(avatar, poses[t], translations[t])`.
+def check_frame_time(seconds: float) -> None:
+    """Refuse a time from frame to frame that is none.
 
-    Args:
-        joint_names: J names.
-        poses: Rotation vector of each joint relative to the bind pose [rad], in the parent's frame, shape (T, J, 3).
-        translations: Of the root from its place in the bind pose [m], shape (T, 3).
-        planted: Which of `CONTACTS` stand still on the floor, shape (T, 4).
-        frame_time: From one frame to the next [s].
+    Raises:
+        InputError: it is not above 0, or above 10 s.
     """
-
-    joint_names: tuple[str, ...]
-    poses: FloatArray
-    translations: FloatArray
-    planted: np.ndarray
-    frame_time: float
-
-    def __post_init__(self) -> None:
-        bones, frames = len(self.joint_names), len(self.poses)
-        for name, shape, dtype in (
-            ("poses", (frames, bones, 3), "f8"),
-            ("translations", (frames, 3), "f8"),
-            ("planted", (frames, len(CONTACTS)), "?"),
-        ):
-            object.__setattr__(self, name, freeze(f"motion {name}", getattr(self, name), shape, dtype))
-        if frames == 0:
-            raise InputError("a motion has no frames; expected at least one")
-        _check_frame_time(self.frame_time)
-
-    @property
-    def seconds(self) -> float:
-        """From the first frame to the last [s]."""
-        return (len(self.poses) - 1) * self.frame_time
-
-
-def _check_frame_time(seconds: float) -> None:
     if not 0 < seconds <= _LONGEST_FRAME_S:
         raise InputError(f"the frame time is {seconds} s; expected more than 0 and at most {_LONGEST_FRAME_S:g} s")
