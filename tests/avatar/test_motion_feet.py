@@ -102,6 +102,12 @@ def test_corrections_fade_without_a_jump_of_place_or_speed():
     assert abs(np.diff(speed, axis=0)).max() < (6 * 0.6 + 4 * 8 * 0.007) / 64
 
 
+def test_a_correction_that_grows_keeps_its_speed_where_it_ends():
+    known = np.arange(40) < 20
+    faded = fade_out(np.minimum(np.arange(40) - 19.0, 0.0)[:, None] * 0.02, known, 8)
+    assert abs(np.diff(faded[:, 0], 2)).max() < 0.011  # 4 v / 8; without it, the whole v of 0.02
+
+
 def test_the_root_is_lowered_smoothly_and_enough():
     need = np.zeros(100)
     need[40:45] = 0.03
@@ -161,6 +167,7 @@ def test_a_lead_in_starts_from_the_pose_and_arrives_at_speed():
     elbow = led.poses[:, names.index("left_elbow"), 1]
     np.testing.assert_allclose(elbow[15:], poses[:, names.index("left_elbow"), 1], rtol=0, atol=1e-9)
     assert abs(np.diff(elbow, 2)).max() < 0.03  # rad per frame squared; a jump of speed would be 1 rad/s / 30
+    assert elbow[15] - elbow[14] == pytest.approx(-1 / 30, rel=0.2)  # a Hermite curve's last of 15 steps
     # the motion goes where the body faces: it went to +x facing 1.2 rad, now it faces +z
     way = led.translations[-1] - led.translations[15]
     np.testing.assert_allclose(way, 39 / 30 * np.array([np.cos(-1.2), 0.0, -np.sin(-1.2)]), rtol=0, atol=1e-9)

@@ -15,6 +15,7 @@ from vto_pipeline.avatar.model.pose import joint_transforms
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.errors import FormatError
 from vto_pipeline.geometry.topology import vertex_normals
+from vto_pipeline.io.bodies.skinned import read_skinned
 from vto_pipeline.io.gltf.animate import write_animated_glb
 from vto_pipeline.io.motion.archive import read_avatar_motion, write_avatar_motion
 from vto_pipeline.io.motion.gltf_animation import parse_animation
@@ -186,6 +187,8 @@ def test_a_moving_avatar_comes_back_from_its_glb_and_its_archive(tmp_path):
     write_animated_glb(tmp_path / "m.glb", body, normals, motion)
     found = read_motion(tmp_path / "m.glb")
     assert found.joints.convention == "ours"
+    resting = read_skinned(tmp_path / "m.glb")
+    np.testing.assert_allclose(resting.vertices, body.bind_vertices, rtol=0, atol=1e-6)  # single precision in the file
     assert found.clip.frame_time == pytest.approx(1 / 24, rel=1e-6)
     _, places = world_transforms(found.clip.parents, quaternion_matrices(found.clip.rotations), found.clip.translations)
     order = [found.clip.joint_names.index(name) for name in body.joint_names]
