@@ -18,6 +18,7 @@ from vto_pipeline.errors import ConfigError, InputError
 from vto_pipeline.io.bodies.measurements import read_measurements
 from vto_pipeline.io.captures.photos import read_board
 from vto_pipeline.io.fabrics import read_fabric
+from vto_pipeline.io.motion.keyframes import parse_keyframes
 from vto_pipeline.pipeline.batch.order import read_order
 from vto_pipeline.stages.entry.planning import catalogue, planned
 
@@ -189,6 +190,7 @@ def test_examples_are_read_as_they_stand(page, block, tmp_path):
         "instrument": lambda: read_fabric(path),
         "sex": lambda: read_measurements(path),
         "columns": lambda: read_board(path),
+        "frames_per_second": lambda: parse_keyframes(str(path)),
     }
     assert kinds[first_key(block)]()
 

@@ -18,6 +18,7 @@ from fuzz_captures import CAPTURES, sound_capture
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from io_shapes import write_all_formats
+from motion_targets import MOTIONS, write_smpl
 from pattern_targets import PATTERNS
 from test_fabric_sheets import FAST, KES_CSV
 from test_fabric_u3m import raw_data
@@ -58,6 +59,7 @@ TEXTS: dict[str, tuple[str, str, Callable[[Path], Any]]] = {
         read_order,
     ),
     **PATTERNS,
+    **MOTIONS,
     "table": ("t.csv", "name,seed,stages.add.offset\na,1,2\nb,2,\n", lambda path: read_order(_order_beside(path))),
 }
 TARGETS = [
@@ -67,6 +69,7 @@ TARGETS = [
     "arrays",
     "arrays_packed",
     "trajectory",
+    "motion_smpl",
     *CAPTURES,
 ]
 WORDS = (
@@ -121,6 +124,8 @@ def sound_file(target: str, folder: Path) -> tuple[Path, Callable[[Path], Any]]:
         arrays = {"vertices": np.eye(3), "faces": np.arange(3)}
         write_arrays(folder / "a.npz", arrays, compress=target == "arrays_packed")
         return folder / "a.npz", read_arrays
+    if target == "motion_smpl":
+        return write_smpl(folder / "a.npz")
     if target == "trajectory":
         (folder / "a.json").write_text(json.dumps({"world_from_cam": [np.eye(4).tolist()] * 2}))
         return folder / "a.json", read_trajectory

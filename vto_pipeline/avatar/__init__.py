@@ -4,6 +4,7 @@ from_measurements, from_scan, from_silhouettes: the three ways to an avatar
 measure: measure any body
 template/: fixed topology, and how it is built
 model/: shape and pose
+motion/: how an avatar moves as another skeleton does
 measuring/: what each measurement means, the tape that reads it, and the population
 scan/: registration to a scan, and how sure the result is
 silhouettes/: outlines in two photos

@@ -3,7 +3,7 @@
 meshes, clouds, fabrics: read any format
 formats/, gltf/, fabric_formats/: one file a format; fabric_presets/: one YAML file a fabric
 patterns/: sewing patterns in and out
-captures/, bodies/: what cameras deliver; what is known of a body
+captures/, bodies/, motion/: what cameras deliver; what is known of a body, and how it moves
 runs/: the artifacts of a run
 animations: moving pictures
 sniff: what a path holds

@@ -6,6 +6,7 @@ ccd, separation: continuous collision detection
 line_search: how much of a descent step to take
 rasterise, resample: the visible triangle of each pixel; values of a picture between its pixels
 solids, volume: signed distance to solids with a formula; what a surface encloses
+kinematics: skeletons over many frames
 srgb: bytes of pictures and linear light
 linear/, spatial/, mechanics/: linear algebra, what is near what, formulas of one stencil
 cpu_threads, kernel_cache: threads of the processor; where compiled kernels are kept

@@ -2,6 +2,7 @@
 
 scan, fit, drape, run, batch: what makes something
 pattern/: a sewing pattern measured, and written in another format
+motion/: a motion measured, and carried over to an avatar
 status, info, plan, stages, schema, doctor: what only looks
 report, prune, cancel, bench: the page again, room on the disk, an end, measurements
 view/, render/: the page in the browser; pictures

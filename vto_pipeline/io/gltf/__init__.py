@@ -4,5 +4,5 @@ document: chunks, buffers and accessors, checked against the bytes
 read, skin: triangles of a scene; skeletons at rest
 pictures: base colours of a scene's parts, as one picture
 draco: compressed meshes, unpacked
-write: parts with normals, colours, textures and materials
+write, animate: parts with normals, colours, textures and materials; an avatar that moves
 """

@@ -1,0 +1,164 @@
+"""From a clip of any skeleton to the motion of an avatar, with feet that stand where they stand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import Field
+
+from vto_pipeline.avatar.motion.align import carry_over
+from vto_pipeline.avatar.motion.balance import Balance, balance
+from vto_pipeline.avatar.motion.figures import plant_drift, spikes
+from vto_pipeline.avatar.motion.foot_skate import hold_feet
+from vto_pipeline.avatar.motion.limits import limit_turns
+from vto_pipeline.avatar.motion.plants import find_plants, runs, speeds
+from vto_pipeline.avatar.motion.soles import contact_places
+from vto_pipeline.avatar.motion.timing import lead_in, resample
+from vto_pipeline.io.motion.joint_map import JointMap
+from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.body import Avatar
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.motion import AvatarMotion, Clip
+from vto_pipeline.model.settings import Config
+from vto_pipeline.numerics.kinematics import local_rotations, matrix_vectors, vector_matrices, world_transforms
+
+_OFTEN = 0.05
+_DRIFT_M = 0.002
+_BALANCED = 0.7
+_ON_THE_SPOT_M_S, _SLIDES_M_S = 0.2, 0.4
+
+
+class RetargetConfig(Config):
+    """Settings of the retargeting."""
+
+    frames_per_second: float = Field(default=0.0, ge=0.0, le=240.0, description="Of the result; 0 keeps the clip's")
+    hold_feet: bool = Field(default=True, description="Whether feet that stand still are held where they stand")
+    lead_in_s: float = Field(
+        default=0.0, ge=0.0, le=10.0, description="Time from the avatar's own pose to the first frame [s]"
+    )
+
+
+@dataclass(frozen=True)
+class MotionFigures:
+    """How a motion came out.
+
+    Args:
+        plants: Number of times a heel or ball stands still.
+        drift_before: Farthest that one of them strays, before the feet are held [m].
+        drift_after: The same after.
+        spikes_before: Frames in which a joint is jerked, before.
+        spikes_after: The same after.
+        below_floor: Deepest that a heel or ball dips below the floor [m].
+        balance: The zero moment point.
+        limited: Joint -> share of frames in which its turn was limited.
+    """
+
+    plants: int
+    drift_before: float
+    drift_after: float
+    spikes_before: int
+    spikes_after: int
+    below_floor: float
+    balance: Balance
+    limited: dict[str, float]
+
+
+def retarget(
+    clip: Clip, joints: JointMap, avatar: Avatar, config: RetargetConfig | None = None, job: Job | None = None
+) -> tuple[AvatarMotion, MotionFigures]:
+    """Return an avatar's motion after a clip, and how it came out.
+
+    Args:
+        clip: In metres, +Y up.
+        joints: Of the clip.
+        avatar: Any of our bodies.
+        config: Settings.
+        job: Receives the figures, and warnings about feet that slide, joints bent too far, and a body that would fall.
+
+    Raises:
+        InputError: the source stands neither at rest nor in its first frame, or too many frames are asked for.
+    """
+    config, job = config or RetargetConfig(), job or Job()
+    if config.frames_per_second:
+        clip = resample(clip, config.frames_per_second)
+    job.progress(0.1, f"carry over {len(clip.rotations)} frames")
+    turn, root = carry_over(clip, joints, avatar, job)
+    poses = matrix_vectors(local_rotations(avatar.parents.tolist(), turn))
+    poses, limited = limit_turns(poses, avatar.joint_names)
+    turn, place = posed_joints(avatar, poses, root)
+    before = contact_places(turn, place, avatar)
+    planted = find_plants(before, clip.frame_time)
+    spikes_before = spikes(place, clip.frame_time)
+    if config.hold_feet:
+        job.progress(0.4, "hold the feet")
+        turn, root = hold_feet(turn, place, planted, avatar, clip.frame_time)
+        poses = matrix_vectors(local_rotations(avatar.parents.tolist(), turn))
+        turn, place = posed_joints(avatar, poses, root)
+    after = contact_places(turn, place, avatar)
+    job.progress(0.7, "find the zero moment point")
+    figures = MotionFigures(
+        plants=sum(len(runs(column)) for column in planted.T),
+        drift_before=plant_drift(before, planted),
+        drift_after=plant_drift(after, planted),
+        spikes_before=spikes_before,
+        spikes_after=spikes(place, clip.frame_time),
+        below_floor=float(max(-after[..., 1].min(), 0.0)),
+        balance=balance(turn, place, avatar, clip.frame_time),
+        limited=limited,
+    )
+    _report(figures, before, place, clip.frame_time, job)
+    pelvis = avatar.joints[avatar.joint_names.index("pelvis")]
+    motion = AvatarMotion(avatar.joint_names, poses, root - pelvis, planted, clip.frame_time)
+    if config.lead_in_s:
+        motion = lead_in(motion, avatar, config.lead_in_s)
+    return motion, figures
+
+
+def posed_joints(avatar: Avatar, poses: FloatArray, root: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return world rotations relative to the bind pose, and places of the joints, (T, J, 3, 3) and (T, J, 3).
+
+    Args:
+        avatar: Any of our bodies.
+        poses: Rotation vectors in the parents' frames [rad], shape (T, J, 3).
+        root: Places of the root [m], shape (T, 3).
+    """
+    parents = avatar.parents.tolist()
+    offsets = np.array([avatar.joints[j] - avatar.joints[max(parent, 0)] for j, parent in enumerate(parents)])
+    local = np.tile(offsets, (len(poses), 1, 1))
+    local[:, [j for j, parent in enumerate(parents) if parent < 0]] = root[:, None]
+    return world_transforms(parents, vector_matrices(poses), local)
+
+
+def _report(figures: MotionFigures, contacts: FloatArray, place: FloatArray, frame_time: float, job: Job) -> None:
+    share = figures.balance.inside_share
+    job.measure(
+        plants=figures.plants,
+        drift_before_mm=1e3 * figures.drift_before,
+        drift_after_mm=1e3 * figures.drift_after,
+        spikes_before=figures.spikes_before,
+        spikes_after=figures.spikes_after,
+        below_floor_mm=1e3 * figures.below_floor,
+        balanced_share=share,
+    )
+    often = {name: part for name, part in figures.limited.items() if part > _OFTEN}
+    if often:
+        said = ", ".join(f"{name} {part:.0%}" for name, part in sorted(often.items(), key=lambda one: -one[1]))
+        job.warn(f"joints bent further than people can, in a share of the frames, were limited: {said}")
+    if figures.drift_after > _DRIFT_M and figures.plants:
+        job.warn(f"planted feet drift by up to {1e3 * figures.drift_after:.1f} mm: a leg does not reach")
+    if figures.spikes_after > figures.spikes_before:
+        job.warn(f"{figures.spikes_after - figures.spikes_before} more frames with a jerk than before")
+    if share is not None and share < _BALANCED:
+        job.warn(
+            f"the zero moment point lies outside of the feet in {1 - share:.0%} of the frames on the floor: "
+            "a person who moves like this would stumble"
+        )
+    if figures.plants == 0 and len(contacts) > 2:
+        pelvis = float(np.linalg.norm(place[-1, 0] - place[0, 0])) / ((len(place) - 1) * frame_time)
+        lowest = contacts[..., 1].argmin(axis=1)
+        slide = float(np.median(speeds(contacts, frame_time)[np.arange(len(lowest)), lowest]))
+        if pelvis < _ON_THE_SPOT_M_S and slide > _SLIDES_M_S:
+            job.warn(f"no foot stands still: it walks on the spot, on a floor that moves by {slide:.1f} m/s")
+        else:
+            job.note("no foot stands still on the floor")

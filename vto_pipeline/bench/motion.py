@@ -1,0 +1,94 @@
+"""`python -m vto_pipeline.bench.motion FILE...` carries motions over to five bodies, and prints how clean they are."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from vto_pipeline.avatar.from_measurements import fit_measurements
+from vto_pipeline.avatar.motion.figures import crossing_frames
+from vto_pipeline.avatar.motion.retarget import retarget
+from vto_pipeline.avatar.template.template import template
+from vto_pipeline.errors import VtoError
+from vto_pipeline.io.motion.read import read_motion
+from vto_pipeline.model.body import Avatar, Measurements
+
+_HEADS = (
+    "clip",
+    "body",
+    "frames",
+    "plants",
+    "drift before mm",
+    "after mm",
+    "jerks before",
+    "after",
+    "below floor mm",
+    "balanced %",
+    "limbs through",
+    "CPU s",
+)
+_LOOKED_AT = 12
+
+
+def bodies() -> dict[str, Avatar]:
+    """Return five bodies: the mean woman and man, and a short wide, a tall slim and a heavy one."""
+    return {
+        "woman": template(0.0),
+        "man": template(1.0),
+        "short, wide": fit_measurements(
+            Measurements({"stature": 1.52, "waist_girth": 1.0, "hip_girth": 1.15}, sex="female")
+        ),
+        "tall, slim": fit_measurements(Measurements({"stature": 1.92, "chest_girth": 0.96}, sex="male")),
+        "heavy": fit_measurements(Measurements({"stature": 1.78, "waist_girth": 1.15}, sex="male")),
+    }
+
+
+def rows(sources: list[str]) -> Iterator[tuple[str, ...]]:
+    """Yield a row of figures for each motion and body.
+
+    Args:
+        sources: Files, or names of presets.
+    """
+    people = bodies()
+    for source in sources:
+        read = read_motion(source)
+        for name, body in people.items():
+            began = time.process_time()
+            motion, figures = retarget(read.clip, read.joints, body)
+            seconds = time.process_time() - began
+            crossing, looked_at = crossing_frames(motion, body, _LOOKED_AT)
+            share = figures.balance.inside_share
+            yield (
+                Path(source).stem,
+                name,
+                str(len(motion.poses)),
+                str(figures.plants),
+                f"{1e3 * figures.drift_before:.1f}",
+                f"{1e3 * figures.drift_after:.3f}",
+                str(figures.spikes_before),
+                str(figures.spikes_after),
+                f"{1e3 * figures.below_floor:.1f}",
+                "-" if share is None else f"{100 * share:.0f}",
+                f"{crossing} of {looked_at}",
+                f"{seconds:.2f}",
+            )
+
+
+def main() -> int:
+    """Read the command line and print the table."""
+    parser = argparse.ArgumentParser(prog="python -m vto_pipeline.bench.motion", description=__doc__)
+    parser.add_argument("sources", nargs="+", metavar="FILE", help="a motion, or the name of a preset")
+    try:
+        for row in (_HEADS, ("---",) * len(_HEADS), *rows(parser.parse_args().sources)):
+            sys.stdout.write(f"| {' | '.join(row)} |\n")
+    except VtoError as error:
+        sys.stderr.write(f"{error}\n")
+        return error.exit_code
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
