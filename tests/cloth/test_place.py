@@ -8,7 +8,7 @@ from cloth_scenes import moved, tube
 from numpy.testing import assert_allclose
 
 from vto_pipeline.cloth.placement.place import PlaceConfig, find_placement
-from vto_pipeline.cloth.placement.voxel_fit import VoxelFit, quarter_turns
+from vto_pipeline.cloth.placement.voxel_fit import BodyCubes, VoxelFit, quarter_turns
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.remeshing.remesh import RemeshConfig, remesh
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
@@ -132,11 +132,11 @@ def test_quarter_turns_are_the_rotations_of_a_cube_and_cubes_turn_like_meshes():
         assert_allclose(turn @ turn.T, np.eye(3), rtol=0, atol=0)
         assert np.linalg.det(turn) == pytest.approx(1.0)
     worn = moved(skirt(), 0.037, 0.0, 0.021)
-    cubes = VoxelFit(worn, pear(), 0.02, 2.0)
+    cubes = VoxelFit(worn, BodyCubes(pear()), 0.02, 2.0)
     for turn in turns[5::6]:
         found = cubes.best_placement(turn)
         turned = TriangleMesh(worn.vertices @ turn.T + found.shift, worn.faces)
-        anew = VoxelFit(turned, pear(), 0.02, 2.0).best_placement(np.eye(3))
+        anew = VoxelFit(turned, BodyCubes(pear()), 0.02, 2.0).best_placement(np.eye(3))
         assert_allclose(anew.shift, 0.0, rtol=0, atol=0.021)  # a cube: the lattices differ by part of one
         assert_allclose(anew.score, found.score, rtol=0, atol=0.05)
 

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from vto_pipeline.cloth.placement.body_growth import Thinning, plan_body_growth
-from vto_pipeline.cloth.placement.voxel_fit import VoxelFit, VoxelPlacement, quarter_turns
+from vto_pipeline.cloth.placement.voxel_fit import BodyCubes, VoxelFit, VoxelPlacement, quarter_turns
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.arrays import FloatArray
@@ -106,20 +106,21 @@ def find_placement(
     if config.place == "as_it_stands":
         job.note("garment left where it stands, as requested")
         return _AS_IT_STANDS
+    cubes = BodyCubes(body)
     if laid_out and config.place == "auto":
-        own = _as_laid_out(garment, body, config, job)
+        own = _as_laid_out(garment, cubes, config, job)
         if own is not None:
             return own
-    scale = _scale(garment, body, config, job)
+    scale = _scale(garment, cubes, config, job)
     metres = TriangleMesh(scale * garment.vertices, garment.faces)
-    stands, best = _best_orientation(metres, body, config)
+    stands, best = _best_orientation(metres, cubes, config)
     if round(best.score, 6) <= 0.0:  # but for what the transforms round
         raise InputError(
             "the body fills this garment nowhere: it goes around nothing of the body",
             hint="give it as it is worn, sewn and open; drape.place=as_it_stands drapes it from where it lies",
         )
     if stands.score < config.turned_well * best.score:
-        best = _best_orientation_if_larger(metres, body, config)
+        best = _best_orientation_if_larger(metres, cubes, config)
     as_turned = 1.0 if (best.turn == stands.turn).all() else _relative_score(stands.score, best.score)
     if as_turned >= _ALIKE:
         best = stands
@@ -133,13 +134,16 @@ def find_placement(
             f"garment turned: its ({_axis_names(best)}) is the body's (x, y, z); as it stood, it scored "
             f"{as_turned:.0%} of the best"
         )
-    stretch, best = _enlarge_until_body_inside(metres, body, best, config)
+    stretch, best = _enlarge_until_body_inside(metres, cubes, best, config)
     if stretch > 1.0:
         job.warn(f"too small: this body needs it {stretch - 1:.0%} larger; it starts stretched by that much")
     larger = TriangleMesh(stretch * metres.vertices, metres.faces)
-    others = VoxelFit(larger, body, 1e-3 * config.cube_mm, config.cloth_in_body).best_placements
-    thinning = Thinning(body)
-    best = _least_pierced(best, lambda: others(best.turn, _HEIGHTS), larger, thinning.limbs_astray, job)
+
+    def others() -> list[VoxelPlacement]:
+        fit = VoxelFit(larger, cubes, 1e-3 * config.cube_mm, config.cloth_in_body)
+        return fit.best_placements(best.turn, _HEIGHTS)
+
+    best = _least_pierced(best, others, larger, Thinning(body).limbs_astray, job)
     share = _relative_score(best.score_in_place, best.score)
     if config.place == "auto" and best is stands and scale == 1.0 and share >= config.stands_well:
         job.note(f"garment left where it stands: its place scores {share:.0%} of the best")
@@ -163,15 +167,15 @@ def place_garment(garment: Garment, body: TriangleMesh, config: PlaceConfig, job
     return Garment(mesh, replace(rest, positions=placed.rest_positions(rest.positions), panels=panels))
 
 
-def _as_laid_out(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig, job: Job) -> Placement | None:
+def _as_laid_out(garment: TriangleMesh, body: BodyCubes, config: PlaceConfig, job: Job) -> Placement | None:
     """Return the placement that a pattern's file means; None where that is beside the body.
 
     The file was drawn for another body: the garment's top, which it hangs from, goes to the same share of the stature.
     """
     fit = VoxelFit(garment, body, 1e-3 * config.cube_mm, config.cloth_in_body)
-    top, floor = float(garment.vertices[:, 1].max()), float(body.vertices[:, 1].min())
-    ratio = float(np.ptp(body.vertices[:, 1])) / _FILE_STATURE
-    middle = np.median(body.vertices, axis=0)
+    top, floor = float(garment.vertices[:, 1].max()), float(body.mesh.vertices[:, 1].min())
+    ratio = float(np.ptp(body.mesh.vertices[:, 1])) / _FILE_STATURE
+    middle = np.median(body.mesh.vertices, axis=0)
     within = (_BESIDE, 0.5 * (_ABOVE + _BELOW), _BESIDE)
     meant = []
     for origin in _FILE_ORIGINS:
@@ -187,10 +191,10 @@ def _as_laid_out(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig,
         ways = fit.best_placements(np.eye(3), _HEIGHTS, best.shift, anywhere)
         return sorted(ways, key=lambda way: abs(way.shift[1] - best.shift[1]))
 
-    thinning = Thinning(body)
+    thinning = Thinning(body.mesh)
 
     def pierced(there: TriangleMesh) -> int:
-        return thinning.limbs_astray(there) or plan_body_growth(body, there, Job()).pierced  # the dearer one last
+        return thinning.limbs_astray(there) or plan_body_growth(body.mesh, there, Job()).pierced  # the dearer one last
 
     best = _least_pierced(best, at_other_heights, garment, pierced, job)
     job.note(
@@ -236,7 +240,7 @@ def _least_pierced(
 
 
 def _best_orientation(
-    garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig
+    garment: TriangleMesh, body: BodyCubes, config: PlaceConfig
 ) -> tuple[VoxelPlacement, VoxelPlacement]:
     """Return the best place of the garment as it is turned, and of all quarter turns."""
     cube = 1e-3 * config.cube_mm
@@ -250,7 +254,7 @@ def _best_orientation(
     return ways[0], max(ways, key=lambda way: way.score)
 
 
-def _best_orientation_if_larger(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig) -> VoxelPlacement:
+def _best_orientation_if_larger(garment: TriangleMesh, body: BodyCubes, config: PlaceConfig) -> VoxelPlacement:
     """Return the best place, turned as the garment would be if larger.
 
     One too small for the trunk may suit a thigh, and a tight top the hips upside down, its sleeves beside them. So the
@@ -270,17 +274,17 @@ def _best_orientation_if_larger(garment: TriangleMesh, body: TriangleMesh, confi
 
 
 def _enlarge_until_body_inside(
-    garment: TriangleMesh, body: TriangleMesh, own: VoxelPlacement, config: PlaceConfig
+    garment: TriangleMesh, body: BodyCubes, own: VoxelPlacement, config: PlaceConfig
 ) -> tuple[float, VoxelPlacement]:
     """Return by how much the garment must start larger for the body to be inside it, and its place then.
 
     Args:
         garment: As large as it is [m].
-        body: [m].
+        body: To be inside.
         own: Its best place at its own size, with the turn to keep.
         config: Search and thresholds.
     """
-    depth = -SurfaceDistance(body).signed(garment.vertices @ own.turn.T + own.shift).distance
+    depth = -SurfaceDistance(body.mesh).signed(garment.vertices @ own.turn.T + own.shift).distance
     if (depth > _DEEP).mean() <= config.buried:
         return 1.0, own
     ways = [own]
@@ -293,9 +297,9 @@ def _enlarge_until_body_inside(
     return _LARGER**best, ways[best]
 
 
-def _scale(garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig, job: Job) -> float:
+def _scale(garment: TriangleMesh, body: BodyCubes, config: PlaceConfig, job: Job) -> float:
     """Return the garment's unit in metres: one if plausible, else the unit in which the body fills it best."""
-    longest = np.ptp(garment.vertices, axis=0).max() / np.ptp(body.vertices, axis=0).max()
+    longest = np.ptp(garment.vertices, axis=0).max() / np.ptp(body.mesh.vertices, axis=0).max()
     low, high = _PLAUSIBLE
     plausible = {unit: metres for unit, metres in LENGTH_M.items() if low <= metres * longest <= high}
     if _SMALLEST <= longest <= high:

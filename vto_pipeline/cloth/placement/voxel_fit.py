@@ -49,20 +49,38 @@ def quarter_turns() -> list[FloatArray]:
     return turns
 
 
+class BodyCubes:
+    """A body as cubes, of each size once, for all garments and sizes of them that are tried on it.
+
+    Args:
+        mesh: The body [m].
+    """
+
+    def __init__(self, mesh: TriangleMesh) -> None:
+        self.mesh = mesh
+        self.low: FloatArray = mesh.vertices.min(axis=0)
+        self._made: dict[float, NDArray[np.bool_]] = {}
+
+    def of_side(self, cube: float) -> NDArray[np.bool_]:
+        """Return which cubes of this side [m], counted from `low`, are inside."""
+        if cube not in self._made:
+            self._made[cube] = _voxelise(self.mesh, self.low, cube)
+        return self._made[cube]
+
+
 class VoxelFit:
     """A body and a garment as cubes.
 
     Args:
         garment: Where it stands [m].
-        body: [m].
+        body: To be worn by.
         cube: Side of the cubes [m].
         penalty: Weight of cloth inside the body against body inside the garment.
     """
 
-    def __init__(self, garment: TriangleMesh, body: TriangleMesh, cube: float, penalty: float) -> None:
+    def __init__(self, garment: TriangleMesh, body: BodyCubes, cube: float, penalty: float) -> None:
         self._cube = cube
-        self._body_low = body.vertices.min(axis=0)
-        self._body = _voxelise(body, self._body_low, cube)
+        self._body_low, self._body = body.low, body.of_side(cube)
         # garment cubes lie on the body's lattice, so that the shifts found include "none"
         low = garment.vertices.min(axis=0)
         self._low = self._body_low + np.floor((low - self._body_low) / cube) * cube
