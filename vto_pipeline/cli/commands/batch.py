@@ -158,6 +158,8 @@ def _task(planned: PlannedRow, folder: Path, force_all: bool, workers: int, limi
         str(folder / "rows" / row.name),
         "--cache",
         str(folder / "cache"),
+        "--memory",
+        f"{limits['memory_mb']:g}MB",
         "--json",
     ]
     return RowTask(
