@@ -84,20 +84,20 @@ def new_cluster(tmp_path) -> Iterator[Callable[[], Cluster]]:
     module, started = [sys.executable, "-m"], list[subprocess.Popen[bytes]]()
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
 
+    def start(*arguments: str, cwd: Path) -> subprocess.Popen[bytes]:
+        started.append(subprocess.Popen([*module, *arguments, "--no-dashboard"], cwd=cwd, **quiet))
+        return started[-1]
+
     def new() -> Cluster:
         base = tmp_path / f"cluster{len(started)}"
-        base.mkdir()
-        file = base / "scheduler.json"
-        options = ["--port", "0", "--no-dashboard", "--scheduler-file", str(file)]
-        processes = [subprocess.Popen([*module, "distributed.cli.dask_scheduler", *options], **quiet)]
-        for name in ("one", "other"):
-            (base / name).mkdir()
-            options = ["--scheduler-file", str(file), "--nthreads", "1", "--no-dashboard"]
-            command = [*module, "distributed.cli.dask_worker", *options]
-            processes.append(subprocess.Popen(command, cwd=base / name, **quiet))
-        started.extend(processes)
-        wait(lambda: file.is_file() and file.read_text().endswith("}"))
-        return json.loads(file.read_text())["address"], processes
+        (base / "one").mkdir(parents=True)
+        (base / "other").mkdir()
+        file = str(base / "scheduler.json")
+        processes = [start("distributed.cli.dask_scheduler", "--port", "0", "--scheduler-file", file, cwd=base)]
+        options = ["distributed.cli.dask_worker", "--scheduler-file", file, "--nthreads", "1"]
+        processes += [start(*options, cwd=base / name) for name in ("one", "other")]
+        wait(lambda: Path(file).is_file() and Path(file).read_text().endswith("}"))
+        return json.loads(Path(file).read_text())["address"], processes
 
     yield new
     for process in reversed(started):
@@ -191,6 +191,10 @@ def test_random_kills_of_every_part_change_no_bit(client, new_cluster):
         batches += 1
         while batch.poll() is None:
             time.sleep(chance.uniform(0.0, 2.0))
+            if any(machine.poll() is not None for machine in processes[1:]):  # a worker killed while it starts takes
+                processes[0].kill()  # its machine along: begin with new ones
+                batch.wait(PATIENCE)
+                address, processes = new_cluster()
             if next_victim is None or not workers(processes[1]):
                 continue
             victim = {
