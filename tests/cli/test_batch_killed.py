@@ -102,6 +102,9 @@ def new_cluster(tmp_path) -> Iterator[Callable[[], Cluster]]:
     yield new
     for process in reversed(started):
         process.terminate()
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(PATIENCE / 4)
+        process.kill()
         process.wait(PATIENCE)
 
 
@@ -178,7 +181,7 @@ def contents(batch: str) -> dict[str, bytes]:
 def test_random_kills_of_every_part_change_no_bit(client, new_cluster):
     """The same command at once after each end, whatever is still at work; VTO_KILLS=65 is 50, 10 and 5 in 100 rows."""
     kills = int(os.environ.get("VTO_KILLS", "13"))
-    rows, chance = max(12, 100 * kills // 65), random.Random(11)
+    rows, chance = max(6, 100 * kills // 65), random.Random(11)
     count = {"client": max(1, 10 * kills // 65), "scheduler": max(1, 5 * kills // 65)}
     plan = ["client"] * count["client"] + ["scheduler"] * count["scheduler"]
     plan += ["worker"] * (kills - len(plan))
@@ -197,19 +200,18 @@ def test_random_kills_of_every_part_change_no_bit(client, new_cluster):
                 address, processes = new_cluster()
             if next_victim is None or not workers(processes[1]):
                 continue
-            victim = {
-                "client": lambda batch=batch: psutil.Process(batch.pid),
-                "scheduler": lambda: psutil.Process(processes[0].pid),
-                "worker": lambda: chance.choice([*workers(processes[1]), *workers(processes[2])]),
-            }[next_victim]
             with suppress(psutil.NoSuchProcess, IndexError):
-                victim().kill()
+                if next_victim == "worker":
+                    chance.choice([*workers(processes[1]), *workers(processes[2])]).kill()
+                else:
+                    (batch if next_victim == "client" else processes[0]).kill()
                 if next_victim == "scheduler":
                     batch.wait(PATIENCE)
                     address, processes = new_cluster()
                 next_victim = next(victims, None)
         said = batch.communicate()[0]
-        assert batch.returncode in (0, 6, -signal.SIGKILL), said
+        refused = batch.returncode == 2 and "no scheduler answers" in said  # it died while it was called
+        assert refused or batch.returncode in (0, 6, -signal.SIGKILL), said
         assert "Traceback" not in said
         if batch.returncode == 0 and next_victim is None:
             break

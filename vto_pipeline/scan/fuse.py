@@ -36,7 +36,7 @@ MAX_BLOCKS = 10_000
 """0.8 GB of distances, weights and colours; a scene that needs more gets coarser voxels."""
 
 BLOCK_BYTES = 250_000
-"""What one takes in the end, with its part of the surface [B]; measured 146 to 220 thousand in scenes of 1,600 to 11,000."""
+"""What one takes in the end, with its part of the surface [B]; 146 to 220 thousand in scenes of 1,600 to 11,000."""
 
 PIXEL_BYTES = 40
 """Of the depth map and picture of a view at work [B]."""
