@@ -81,14 +81,27 @@ LOSING = "try: time.sleep(60)\n    except KeyboardInterrupt: raise RuntimeError(
 """What Numba's compiler makes of an interrupt."""
 
 
+DROPPING = """\
+    import weakref
+    class Thing:
+        def __del__(self): time.sleep(60)
+    Thing()
+    thing = type("Other", (), {})()
+    reference = weakref.ref(thing, lambda _: time.sleep(60))
+    del thing
+    time.sleep(60)
+""".strip()
+"""Code out of which nothing can be raised, twice, before code that can be interrupted."""
+
+
 LOADED = "from vto_pipeline.scan.photos.sfm import load_colmap; load_colmap(0)"
 """A library with a handler of its own."""
 
 
 @pytest.mark.parametrize(
     ("before", "waiting"),
-    [("pass", "time.sleep(60)"), ("pass", LOSING), (LOADED, "time.sleep(60)")],
-    ids=["plain", "lost by a library", "taken by a library"],
+    [("pass", "time.sleep(60)"), ("pass", LOSING), ("pass", DROPPING), (LOADED, "time.sleep(60)")],
+    ids=["plain", "lost by a library", "dropped by Python", "taken by a library"],
 )
 @pytest.mark.parametrize("stop", [signal.SIGTERM, signal.SIGINT])
 def test_sigterm_ends_a_command_like_ctrl_c(tmp_path, before, waiting, stop):

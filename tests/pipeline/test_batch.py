@@ -157,7 +157,8 @@ def test_links_in_a_folder_do_not_lead_out_of_a_root(tmp_path: Path) -> None:
 
 def task(folder: Path, program: str, **limits: float) -> RowTask:
     values = {"seconds": 60.0, "memory_mb": 2000.0, "retries": 0} | limits
-    return RowTask("a", "k", (sys.executable, "-c", program), str(folder / "logs" / "a.log"), 1, **values)
+    command, run, log = (sys.executable, "-c", program), str(folder / "rows" / "a"), str(folder / "logs" / "a.log")
+    return RowTask("a", "k", command, run, log, 1, **values)
 
 
 def test_a_row_says_how_it_ended(tmp_path: Path) -> None:
@@ -213,6 +214,31 @@ def test_a_row_ends_with_the_worker_that_started_it(tmp_path: Path) -> None:
             time.sleep(0.05)
         process.kill()
     assert has_ended(int(pid.read_text()))
+
+
+def test_a_row_waits_for_what_an_earlier_batch_has_left_at_work_there(tmp_path: Path) -> None:
+    """The worker of a scheduler that died finishes its row; another process holds the folder meanwhile."""
+    run = tmp_path / "rows" / "a"
+    holder = (
+        "import sys, time; from pathlib import Path; from vto_pipeline.pipeline.execution.folder import "
+        f"locked_run_folder\nwith locked_run_folder(Path({str(run)!r})):\n    print(flush=True); sys.stdin.read()"
+    )
+    taken = (
+        f"from pathlib import Path; from vto_pipeline.pipeline.execution.folder import locked_run_folder\n"
+        f"with locked_run_folder(Path({str(run)!r})): pass"
+    )
+    with subprocess.Popen([sys.executable, "-c", holder], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        assert run_row(task(tmp_path, taken, seconds=1.0)).status != "done"  # no longer than a row may take
+        ended: list[RowResult] = []
+        row = threading.Thread(target=lambda: ended.append(run_row(task(tmp_path, taken))))
+        row.start()
+        row.join(1.0)
+        assert row.is_alive()
+        process.communicate()
+        row.join()
+    assert [one.status for one in ended] == ["done"]
 
 
 def records(batch: Path, *names: str) -> None:

@@ -65,7 +65,7 @@ class AsCompleted:
 def rows(monkeypatch: pytest.MonkeyPatch) -> list[RowTask]:
     monkeypatch.setattr(distributed, "Client", Client)
     monkeypatch.setattr(distributed, "as_completed", AsCompleted)
-    return [RowTask(f"r{i}", "k", ("true",), "log", 1, 1.0, 1.0, 0) for i in range(100)]
+    return [RowTask(f"r{i}", "k", ("true",), "run", "log", 1, 1.0, 1.0, 0) for i in range(100)]
 
 
 def test_a_few_rows_for_each_worker_are_under_way(rows: list[RowTask], tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 from numpy.testing import assert_allclose
 from PIL import Image
@@ -14,6 +15,7 @@ from vto_pipeline.model.camera import CameraSet, Intrinsics
 from vto_pipeline.model.frames import DepthMaps, PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
+from vto_pipeline.pipeline.execution.cost import Meter
 from vto_pipeline.scan import fuse
 from vto_pipeline.scan.canonical import canonical_mesh
 from vto_pipeline.scan.depth.depth_mask import clean_depth
@@ -181,6 +183,35 @@ def test_voxels_grow_until_the_scene_fits_in_memory(true_maps, true_cameras, sho
     assert 5 < job.metrics["voxel_mm"] < 40
     error = distances(scene, mesh.vertices[mesh.vertices[:, 1] > 0.1])
     assert np.median(error) < 1e-3 * job.metrics["voxel_mm"]
+
+
+def test_what_fits_no_memory_is_refused_with_the_voxel_that_fits(true_maps, true_cameras, shot, monkeypatch):
+    """The peak of the process is held against the stated bound; a budget only ever refuses, and changes no bit."""
+
+    def fused(voxel_mm: float, left: float) -> tuple[bytes, Job]:
+        monkeypatch.setattr(Job, "memory_left", lambda _: left)
+        job = Job(memory=1e12)
+        surface = fuse_depth_maps(shot[0], true_cameras, true_maps, FuseConfig(voxel_mm=voxel_mm), job)
+        return surface.vertices.tobytes() + surface.faces.tobytes(), job
+
+    meter, before = Meter(), resident()
+    ample, job = fused(2.0, 1e12)
+    bound = 1e6 * job.metrics["memory_bound_mb"]
+    if Path("/proc/self/clear_refs").exists():
+        assert 0.3 * bound < 1e6 * meter.peak_mb() - before < bound
+    assert fused(2.0, bound + 1e6)[0] == ample
+    with pytest.raises(ScanError, match=r"voxels of 2 mm need up to .* GB of memory; the budget leaves") as caught:
+        fused(2.0, 0.6 * bound)
+    fitting = float(caught.value.hint.split()[-1])
+    assert 2.0 < fitting < 3.5
+    assert fused(1.1 * fitting, 0.6 * bound)[1].metrics["voxel_mm"] == pytest.approx(1.1 * fitting, abs=1e-3)
+    with pytest.raises(ScanError, match="the budget leaves 0 GB") as caught:
+        fused(2.0, -1.0)
+    assert caught.value.hint == "give more memory"
+
+
+def resident() -> int:
+    return psutil.Process().memory_info().rss
 
 
 def test_a_far_background_takes_no_voxels(true_maps, true_cameras, shot):

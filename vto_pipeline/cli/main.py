@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import errno
 import os
-import signal
 import sys
 from collections.abc import Sequence
-from contextlib import suppress
 from difflib import get_close_matches
 from importlib import import_module
 
@@ -16,6 +14,7 @@ import click
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy loads: its sums depend on the thread count
 
 from vto_pipeline import __version__
+from vto_pipeline.cli.interrupts import Interrupts
 from vto_pipeline.cli.session import Session
 from vto_pipeline.errors import ConfigError, InputError, MissingDependencyError, VtoError
 
@@ -105,17 +104,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0 done, 2 bad usage, config or plan, 3 bad input, 4 failed computation, 5 missing dependency,
         6 a batch ended with failures, 130 interrupted. Our own bugs (1) are left to Python, with their traceback.
     """
-    session = Session()
-    stopped = False
-
-    def stop(*_: object) -> None:
-        nonlocal stopped
-        stopped = True
-        raise KeyboardInterrupt
-
-    with suppress(ValueError):  # not the main thread
-        for name in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(name, stop)
+    session, interrupts = Session(), Interrupts()
     try:
         code = vto.main(args=arguments, prog_name="vto", standalone_mode=False, obj=session)
         return code if isinstance(code, int) else 0
@@ -138,9 +127,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return session.fail(MissingDependencyError(f"cannot load a library: {error}", hint="run `vto doctor`"))
     except Exception:
         # Numba's compiler, for one, loses an interrupt and then stumbles over it.
-        if stopped:
+        if interrupts.seen:
             return _interrupted()
         raise
+    finally:
+        interrupts.close()
 
 
 def _interrupted() -> int:

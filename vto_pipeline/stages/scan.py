@@ -104,6 +104,7 @@ STAGES: tuple[Stage, ...] = (
         run=_fuse_photos,
         settings=PhotoFuseConfig,
         uses=("open3d",),
+        fits_memory=True,
     ),
     *for_each_role(
         "odometry",
@@ -122,6 +123,7 @@ STAGES: tuple[Stage, ...] = (
         run=_fuse_depth,
         settings=FuseConfig,
         uses=("open3d", "opencv-python-headless"),
+        fits_memory=True,
     ),
     *for_each_role(
         "poisson",

@@ -158,11 +158,14 @@ def _task(planned: PlannedRow, folder: Path, force_all: bool, workers: int, limi
         str(folder / "rows" / row.name),
         "--cache",
         str(folder / "cache"),
+        "--memory",
+        f"{limits['memory_mb']:g}MB",
         "--json",
     ]
     return RowTask(
         name=row.name,
         key=planned.key,
+        folder=str(folder / "rows" / row.name),
         command=(*PROGRAM, *arguments, *(["--force-all"] if force_all else [])),
         log=str(folder / "logs" / f"{row.name}.log"),
         threads=max(1, thread_count() // workers),

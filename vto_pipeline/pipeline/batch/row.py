@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import IO, Any
 
 import vto_pipeline
+from vto_pipeline.pipeline.execution.folder import wait_until_free
 
 _LOOK = 0.2  # s between looks at a row's memory
 _SIGTERM_SECONDS = 5.0  # for a row to end by itself
@@ -29,6 +30,7 @@ class RowTask:
         name: Of the row.
         key: Of its result.
         command: Program and arguments; it prints one JSON document.
+        folder: RUN. A process of an earlier batch that still works there is waited for, as long as a row may take.
         log: File for what it says.
         threads: Of the numerical code.
         seconds: Limit of wall time [s].
@@ -39,6 +41,7 @@ class RowTask:
     name: str
     key: str
     command: tuple[str, ...]
+    folder: str
     log: str
     threads: int
     seconds: float
@@ -83,6 +86,7 @@ def run_row(task: RowTask) -> RowResult:
         What became of it; never an exception for what the row itself does.
     """
     tries = 0
+    wait_until_free(Path(task.folder), task.seconds)
     while True:
         tries += 1
         result = _try(task, tries)
@@ -107,7 +111,10 @@ def _try(task: RowTask, tries: int) -> RowResult:
         try:
             while process.poll() is None:
                 time.sleep(_LOOK)
-                peak = max(peak, _resident_mb(process.pid))
+                now = _resident_mb(process.pid)
+                if now > task.memory_mb:  # a program that is just being started counts as a copy of who starts it
+                    now = min(now, _resident_mb(process.pid))
+                peak = max(peak, now)
                 if peak > task.memory_mb:
                     stopped = "too large"
                 elif time.monotonic() - began > task.seconds:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import fcntl
 import os
+import time
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from errno import EDQUOT, ENOSPC
 from pathlib import Path
 from socket import gethostname
@@ -14,6 +15,7 @@ from vto_pipeline.errors import ConfigError, InputError
 from vto_pipeline.io.files import remove_partial
 
 _LOCK = ".lock"
+_LOOK = 0.2  # s between looks at a lock that another holds
 RECORD = "run.json"
 
 
@@ -64,6 +66,19 @@ def locked_run_folder(folder: Path, inputs: Iterable[Path] = ()) -> Iterator[Non
             if error.errno in (ENOSPC, EDQUOT) and error.filename is None:
                 error.filename = str(folder)  # what fails to be written has a name, what it is written to has none
             raise
+
+
+def wait_until_free(folder: Path, seconds: float) -> None:
+    """Wait until no process works in a run's folder, or until the time [s] is over; free is what is not there."""
+    until = time.monotonic() + seconds
+    with suppress(OSError), (folder / _LOCK).open(encoding="utf-8") as lock:
+        while time.monotonic() < until:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            except BlockingIOError:
+                time.sleep(_LOOK)
+            else:
+                return
 
 
 def process_in(folder: Path) -> int | None:
