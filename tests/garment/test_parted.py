@@ -102,7 +102,7 @@ def test_an_opening_without_the_straps_that_parted_it_is_refused_and_named(dress
     lost = without_straps(top)
     upper = list_openings(lost)[0]
     with pytest.raises(
-        GarmentError, match=f"the opening of {1e3 * upper.perimeter:.0f} mm at .* should be 3:"
+        GarmentError, match=f"the opening of {1e3 * upper.perimeter:.0f} mm at .* should be at least 3:"
     ) as caught:
         checked(lost, body, photos)
     assert "openings.keep" in caught.value.hint
@@ -113,7 +113,7 @@ def test_one_lost_strap_is_enough(dressed):
     body, top, photos = dressed
     middle = top.vertices[top.faces].mean(axis=1)
     lost = submesh(top, ~((middle[:, 1] > STRAPS) & (middle[:, 0] > 0.0)))[0]
-    with pytest.raises(GarmentError, match="should be 2:"):
+    with pytest.raises(GarmentError, match="should be at least 2:"):
         checked(lost, body, photos)
 
 
@@ -121,7 +121,7 @@ def test_who_gives_the_number_of_openings_is_warned(dressed):
     body, top, photos = dressed
     job = checked(without_straps(top), body, photos, answered=True)
     assert len(job.warnings) == 1
-    assert "should be 3" in job.warnings[0]
+    assert "should be at least 3" in job.warnings[0]
 
 
 def test_a_whole_garment_passes(dressed):

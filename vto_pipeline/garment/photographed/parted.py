@@ -64,10 +64,10 @@ def refuse_parted(
     for parted in parted_openings(sightings, garment.vertices):
         tree = cKDTree(parted.cloth)
         opening = min(openings, key=lambda one: float(np.median(tree.query(garment.vertices[one.loop])[0])))
-        x, y, z = parted.cloth[int(tree.query(parted.cloth.mean(axis=0))[1])]
-        what = f"the opening of {opening.perimeter * 1e3:.0f} mm at {_place(opening.center)} should be {parted.parts}"
-        problem = f"{what}: the photos show {parted.area * 1e4:.0f} cm² of cloth there that the garment lacks"
-        problem += f", as over {_place(np.array([x, y, z]))}"
+        over = parted.cloth[int(tree.query(parted.cloth.mean(axis=0))[1])]
+        what = f"the opening of {opening.perimeter * 1e3:.0f} mm at {_place(opening.center)}"
+        lacks = f"the photos show {parted.area * 1e4:.0f} cm² of cloth there that the garment lacks"
+        problem = f"{what} should be at least {parted.parts}: {lacks}, as over {_place(over)}"
         if answered:
             job.warn(problem)
             continue

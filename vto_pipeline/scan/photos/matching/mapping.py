@@ -10,6 +10,7 @@ from typing import Any
 from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.job import Job
 from vto_pipeline.scan.library_message import COLMAP_ERRORS, library_message
+from vto_pipeline.scan.photos.matching.ties import untie
 
 MIN_PHOTOS = 3
 """Smaller models are chance."""
@@ -22,6 +23,8 @@ left. Where points are few, a bent lens and a wrong focal length explain them as
 
 def map_photos(database: Path, folder: Path, count: int, job: Job) -> Any | None:
     """Reconstruct with the global mapper; if it leaves photos out, try the incremental one and keep the better model.
+
+    Photos that too few points tie to the others count as not placed.
 
     A lens that bends much is refined only where photos need it; else it keeps what is known of it, or is straight.
 
@@ -78,7 +81,8 @@ def _best(database: Path, folder: Path, count: int, job: Job, bent: bool) -> Any
     for name, mapper in (("global", _global), ("incremental", _incremental)):
         if max((model.num_reg_images() for model in models), default=0) < count:
             try:
-                models += mapper(_copy(database, name if bent else f"{name}_straight"), folder, job.seed, bent)
+                found = mapper(_copy(database, name if bent else f"{name}_straight"), folder, job.seed, bent)
+                models += [untie(model) for model in found]
             except COLMAP_ERRORS as error:
                 job.note(f"the {name} mapper failed: {library_message(error)}")
     return max(models, key=_merit, default=None)
