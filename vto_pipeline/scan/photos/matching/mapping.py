@@ -67,9 +67,10 @@ def bend(model: Any) -> float:
 
 
 def _explains_as_much(model: Any, other: Any) -> bool:
-    """Return whether a model places as many photos as another, with about as many sightings and no larger error."""
-    if model.num_reg_images() < other.num_reg_images():
-        return False
+    """Return whether a model places more photos than another, or as many with about as many sightings and no larger
+    error."""
+    if model.num_reg_images() != other.num_reg_images():
+        return bool(model.num_reg_images() > other.num_reg_images())
     if model.compute_num_observations() < FEWER * other.compute_num_observations():
         return False
     return bool(model.compute_mean_reprojection_error() <= CLEARLY * other.compute_mean_reprojection_error())
