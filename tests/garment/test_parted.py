@@ -165,3 +165,12 @@ def test_what_runs_away_from_the_garment_is_a_shadow(until, parts):
     assert [one.parts for one in found] == [2] * (parts > 0)
     if parts:
         assert found[0].area == pytest.approx(cloth.sum() * 1e-4)
+
+
+@pytest.mark.parametrize(("beyond", "parted"), [(0.02, False), (0.05, True)])
+def test_a_sliver_beside_a_rim_is_no_part(beyond, parted):
+    """A strap crosses a plate 20 cm high. What is left of it beyond is 40 or 100 cm²: a hand shows more than 60."""
+    plate = ribbon((-0.3, 0.02 + beyond), (0.0, 0.2))
+    cloth = np.abs(plate[:, 0]) < 0.02
+    found = parted_openings(Sightings(plate, cloth, 1e-4), np.array([[0.0, -0.01, 0.0], [0.0, 0.21, 0.0]]))
+    assert bool(found) == parted
