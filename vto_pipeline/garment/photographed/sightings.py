@@ -73,7 +73,7 @@ def look_at_mannequin(
         job: Receives what was left out, and how many photos told.
 
     Returns:
-        What they show; None where the colours of cloth and mannequin hardly differ.
+        What they show; None where cloth and mannequin hardly differ in colour, or too little of either shows.
     """
     area = float(np.linalg.norm(face_area_vectors(mannequin), axis=1).sum())
     count = max(int(area / SPACING**2), 1)
@@ -100,7 +100,8 @@ def look_at_mannequin(
         score[shows] += ratio
         views[shows] += 1
     if told < LEAST_VIEWS:
-        job.leave_out("cloth beside the openings", "the colours of cloth and mannequin hardly differ in the photos")
+        reason = "in the photos too little of the mannequin shows, or it is of the cloth's colours"
+        job.leave_out("cloth beside the openings", reason)
         return None
     enough = views >= LEAST_VIEWS
     mean = score[enough] / views[enough]
