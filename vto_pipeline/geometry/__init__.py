@@ -5,10 +5,10 @@ predicates, intersections: exact signs; triangles that pass through each other
 signed_distance, closest, geodesic, sampling, laplace, smooth: distances and functions on a surface
 section, hull: where a plane cuts; the path of a taut tape
 binding: one mesh rides on another
-depth_picture: how far away it is, pixel by pixel
 metres: surfaces of unknown unit, refused
 rigid: moving a mesh, or cameras, as a whole
 floor: the floor under a scan
+seen/: what a camera sees of a surface
 remeshing/: other triangles for the same surface
 """
 

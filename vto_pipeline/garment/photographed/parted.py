@@ -82,7 +82,7 @@ def refuse_parted(
 def parted_openings(sightings: Sightings, cloth_points: FloatArray) -> list[Parted]:
     """Return where cloth that the garment lacks divides what it leaves bare of the mannequin.
 
-    What leaves a garment through one opening hangs together on the mannequin: head and arms above a strapless dress, a
+    What leaves a garment through one opening is connected on the mannequin: head and arms above a strapless dress, a
     leg below each hem. Where that falls into parts once the points that show cloth are taken out, the cloth between
     them is a strap or a shoulder that was lost. Cloth lost elsewhere, as a cuff, divides nothing.
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from vto_pipeline.garment.align import PosedPhotos
 from vto_pipeline.garment.color_model import color_evidence
-from vto_pipeline.geometry.depth_picture import depth_picture
 from vto_pipeline.geometry.sampling import sample_surface
+from vto_pipeline.geometry.seen.depth_picture import depth_picture
 from vto_pipeline.geometry.topology import face_area_vectors, submesh
 from vto_pipeline.io.captures.images import read_image
 from vto_pipeline.io.captures.undistort import undistorted

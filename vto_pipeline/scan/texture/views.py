@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from vto_pipeline.geometry.depth_picture import depth_picture
+from vto_pipeline.geometry.seen.depth_picture import depth_picture
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.camera import CameraSet, Intrinsics
 from vto_pipeline.model.mesh import TriangleMesh

@@ -14,7 +14,7 @@ LEAST_TIES = 30
 then to a fraction of a pixel. COLMAP's incremental mapper demands as many of each photo; the global one, none."""
 
 LEAST_LINK = 10
-"""Two parts that hang together by one photo have no common scale: each may be of any size about that photo. Links
+"""Two parts that one photo connects have no common scale: each may be of any size about that photo. Links
 besides it fix the scale; each is between photos that share so many points."""
 
 
@@ -44,7 +44,7 @@ def tied_together(point: NDArray[np.int64], photo: NDArray[np.int64], count: int
     """Return which photos belong to the largest group that is tied together, shape (count,).
 
     The photos are joined by a tree of their strongest ties, those that share most points. It is cut where the points
-    seen on both sides of the cut are too few. Of what is left, no two parts may hang together by one photo alone.
+    seen on both sides of the cut are too few. Of what is left, no two parts may be connected by one photo alone.
 
     Args:
         point, photo: Of each sighting, shape (S,).
