@@ -37,6 +37,7 @@ def test_a_corner_moves_by_k1_times_its_radius_squared():
         (-0.5, model(error=0.40), -0.5),  # the error grows
         (-0.5, model(sightings=5000), -0.5),  # sightings are lost
         (-0.5, model(placed=23), -0.5),  # a photo is lost
+        (-0.5, model(placed=25, sightings=4000, error=0.5), 0.0),  # a photo more outweighs all else
         (-0.5, None, -0.5),  # nothing comes of it
     ],
 )

@@ -5,6 +5,7 @@ outline/: the mannequin found by its outline in the photos
 color_model, graph_cut, subtract: the mannequin taken away
 loop_evidence, bare_parts, notches, rims, openings: real openings kept, scan holes filled
 simulation_mesh: the mesh that is simulated
+photographed/: the garment held beside the photos
 wearable: whether a surface can be a garment at all
 pattern/: sewing patterns as garments
 """

@@ -7,9 +7,12 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from vto_pipeline.errors import GarmentError
+from vto_pipeline.garment.align import PosedPhotos
 from vto_pipeline.garment.bare_parts import BareParts
 from vto_pipeline.garment.loop_evidence import LoopShape, encloses, measure_loops
 from vto_pipeline.garment.notches import close_notches
+from vto_pipeline.garment.photographed.parted import refuse_parted
+from vto_pipeline.garment.photographed.sightings import look_at_mannequin
 from vto_pipeline.garment.rims import drop_flaps, fair_rims, largest_piece, trim_ledges
 from vto_pipeline.garment.wearable import LEAST_PERIMETER_MM, check_wearable
 from vto_pipeline.geometry.remeshing.decimate import decimate, faces_at
@@ -61,6 +64,7 @@ def close_scan_holes(
     config: OpeningsConfig,
     job: Job,
     bare: BareParts | None = None,
+    photos: PosedPhotos | None = None,
 ) -> tuple[TriangleMesh, list[Opening], NDArray[np.bool_]]:
     """Fill the scan holes and keep the garment's own openings.
 
@@ -73,12 +77,14 @@ def close_scan_holes(
         config: Settings.
         job: Receives counts and perimeters.
         bare: What was seen of the bare mannequin, if it is known.
+        photos: Of the garment on the mannequin, in its frame: what they show is held beside the result.
 
     Returns:
         The garment in one piece; its openings, highest first; which of its vertices were observed, shape (V,).
 
     Raises:
-        GarmentError: another number of openings than expected, a hole that cannot be filled, or too little was seen.
+        GarmentError: another number of openings than expected, a hole that cannot be filled, too little was seen, or
+            cloth was lost that makes several openings of one.
         InputError: no opening is left that a body could get through.
     """
     job.progress(0.0, "cleaning rims")
@@ -123,6 +129,10 @@ def close_scan_holes(
         unobserved_share=1.0 - seen,
     )
     _check_seen(seen, final, config, job)
+    if mannequin is not None and photos is not None and found:
+        sightings = look_at_mannequin(final, observed, mannequin, photos, job)
+        if sightings is not None:
+            refuse_parted(sightings, final, found, config.keep is not None, job)
     warn_of_filled_rims(found, observed, job)
     return final, found, observed
 

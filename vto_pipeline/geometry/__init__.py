@@ -8,6 +8,7 @@ binding: one mesh rides on another
 metres: surfaces of unknown unit, refused
 rigid: moving a mesh, or cameras, as a whole
 floor: the floor under a scan
+seen/: what a camera sees of a surface
 remeshing/: other triangles for the same surface
 """
 

@@ -53,11 +53,14 @@ def _subtract(inputs: Inputs, settings: SubtractConfig, job: Job) -> Outputs:
 
 
 def _openings(inputs: Inputs, settings: OpeningsConfig, job: Job) -> Outputs:
-    mannequin, bare = inputs.get("mannequin_surface"), None
-    if mannequin is not None and "garment_placement" in inputs and "labels" in inputs:
-        scan = transform_mesh(inputs["garment_surface"], inputs["garment_placement"])
-        bare = BareParts(scan, inputs["labels"], mannequin)
-    garment, openings, observed = close_scan_holes(inputs["garment_shell"], mannequin, settings, job, bare)
+    mannequin, placement, bare, photos = inputs.get("mannequin_surface"), inputs.get("garment_placement"), None, None
+    if mannequin is not None and placement is not None:
+        if "labels" in inputs:
+            bare = BareParts(transform_mesh(inputs["garment_surface"], placement), inputs["labels"], mannequin)
+        if "garment_photos" in inputs and "garment_cameras" in inputs:
+            cameras = transform_cameras(inputs["garment_cameras"], placement)
+            photos = PosedPhotos(inputs["garment_photos"].paths, cameras)
+    garment, openings, observed = close_scan_holes(inputs["garment_shell"], mannequin, settings, job, bare, photos)
     return {"garment": garment, "openings": openings, "observed": observed}
 
 
@@ -130,11 +133,18 @@ STAGES: tuple[Stage, ...] = (
         name="openings",
         about="scan holes filled, neck, hem and cuffs kept",
         needs=("garment_shell",),
-        optional=("mannequin_surface", "garment_surface", "garment_placement", "labels"),
+        optional=(
+            "mannequin_surface",
+            "garment_surface",
+            "garment_placement",
+            "labels",
+            "garment_photos",
+            "garment_cameras",
+        ),
         makes=("garment", "openings", "observed"),
         run=_openings,
         settings=OpeningsConfig,
-        uses=("libigl",),
+        uses=("libigl", "opencv-python-headless"),
     ),
     Stage(
         name="texture",

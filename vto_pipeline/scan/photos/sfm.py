@@ -22,6 +22,7 @@ from vto_pipeline.scan.photos.matching.adjust import adjust
 from vto_pipeline.scan.photos.matching.features import FAINT, SURE, FeatureConfig, detect, match
 from vto_pipeline.scan.photos.matching.mapping import MIN_PHOTOS, lens_of, map_photos
 from vto_pipeline.scan.photos.matching.still_background import paint_over, still_pixels
+from vto_pipeline.scan.photos.matching.ties import LEAST_TIES
 from vto_pipeline.scan.photos.region import object_region
 from vto_pipeline.scan.upright import upright_from_scan
 
@@ -85,14 +86,15 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
     names = [path.name for path in photos.paths]
     if model is None or model.num_reg_images() < MIN_PHOTOS:
         each = ", ".join(f"{name} {count}" for name, count in zip(names, counts, strict=True))
-        few = f"fewer than {MIN_PHOTOS} of {len(names)} photos could be placed"
+        few = f"fewer than {MIN_PHOTOS} of {len(names)} photos could be placed and tied together by {LEAST_TIES} points"
         problem = f"{few} ({pairs} pairs match); features per photo: {each}"
         raise ScanError(problem, where=str(photos.paths[0].parent), hint=ADVICE)
     model = adjust(model, photos, job)
     cameras, cloud = _upright(*_values(model, names, config))
     cloud = _without_surroundings(cameras, cloud, job)
     if cameras.unregistered:
-        reasons = {name: f"could not be placed ({counts[names.index(name)]} features)" for name in cameras.unregistered}
+        why = f"could not be placed, or fewer than {LEAST_TIES} points tie it to the others"
+        reasons = {name: f"{why} ({counts[names.index(name)]} features)" for name in cameras.unregistered}
         job.measure(left_out_photos=reasons)
         lost = ", ".join(f"{name} ({counts[names.index(name)]} features)" for name in cameras.unregistered)
         job.warn(f"{len(cameras.unregistered)} of {len(names)} photos could not be placed: {lost}. {ADVICE}")

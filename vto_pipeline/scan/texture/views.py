@@ -8,10 +8,10 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from vto_pipeline.geometry.seen.depth_picture import depth_picture
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.camera import CameraSet, Intrinsics
 from vto_pipeline.model.mesh import TriangleMesh
-from vto_pipeline.numerics.rasterise import rasterise
 
 STEP_PX = 6.0
 """Neighbouring pixels whose depths differ by more than this many pixels' width on the surface show two things: a
@@ -65,9 +65,9 @@ def look(
 
     pinhole = camera.without_distortion()
     cam_from_world: FloatArray = np.asarray(np.linalg.inv(world_from_cam), dtype=np.float64)
-    depth = _depth(mesh, pinhole, cam_from_world)
+    depth = depth_picture(mesh, pinhole, cam_from_world)
     if occluder is not None:
-        depth[_depth(occluder, pinhole, cam_from_world) < depth - slack] = np.inf
+        depth[depth_picture(occluder, pinhole, cam_from_world) < depth - slack] = np.inf
     whole = np.isfinite(depth)
     width = STEP_PX * np.where(whole, depth, 0.0) / min(pinhole.fx, pinhole.fy)
     for axis in (0, 1):
@@ -79,16 +79,6 @@ def look(
         whole[far] &= ~jump
     inside = cv2.distanceTransform(whole.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
     return View(pinhole, cam_from_world, depth.astype(np.float32), np.asarray(inside, dtype=np.float32))
-
-
-def _depth(mesh: TriangleMesh, camera: Intrinsics, cam_from_world: FloatArray) -> FloatArray:
-    """Depth of the nearest surface of each pixel [m], shape (H, W); infinite where there is none."""
-    local = mesh.vertices @ cam_from_world[:3, :3].T + cam_from_world[:3, 3]
-    ahead = local[:, 2] > 1e-6
-    z = np.where(ahead, local[:, 2], 1.0)
-    placed = np.column_stack([camera.fx * local[:, 0] / z + camera.cx, camera.fy * local[:, 1] / z + camera.cy, z])
-    faces = mesh.faces[ahead[mesh.faces].all(axis=1)]
-    return np.asarray(rasterise(placed[faces], camera.width, camera.height)[2])
 
 
 @njit(cache=True, parallel=True)

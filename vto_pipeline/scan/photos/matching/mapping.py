@@ -10,6 +10,7 @@ from typing import Any
 from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.job import Job
 from vto_pipeline.scan.library_message import COLMAP_ERRORS, library_message
+from vto_pipeline.scan.photos.matching.ties import untie
 
 MIN_PHOTOS = 3
 """Smaller models are chance."""
@@ -22,6 +23,8 @@ left. Where points are few, a bent lens and a wrong focal length explain them as
 
 def map_photos(database: Path, folder: Path, count: int, job: Job) -> Any | None:
     """Reconstruct with the global mapper; if it leaves photos out, try the incremental one and keep the better model.
+
+    Photos that too few points tie to the others count as not placed.
 
     A lens that bends much is refined only where photos need it; else it keeps what is known of it, or is straight.
 
@@ -64,9 +67,10 @@ def bend(model: Any) -> float:
 
 
 def _explains_as_much(model: Any, other: Any) -> bool:
-    """Return whether a model places as many photos as another, with about as many sightings and no larger error."""
-    if model.num_reg_images() < other.num_reg_images():
-        return False
+    """Return whether a model places more photos than another, or as many with about as many sightings and no larger
+    error."""
+    if model.num_reg_images() != other.num_reg_images():
+        return bool(model.num_reg_images() > other.num_reg_images())
     if model.compute_num_observations() < FEWER * other.compute_num_observations():
         return False
     return bool(model.compute_mean_reprojection_error() <= CLEARLY * other.compute_mean_reprojection_error())
@@ -78,7 +82,8 @@ def _best(database: Path, folder: Path, count: int, job: Job, bent: bool) -> Any
     for name, mapper in (("global", _global), ("incremental", _incremental)):
         if max((model.num_reg_images() for model in models), default=0) < count:
             try:
-                models += mapper(_copy(database, name if bent else f"{name}_straight"), folder, job.seed, bent)
+                found = mapper(_copy(database, name if bent else f"{name}_straight"), folder, job.seed, bent)
+                models += [untie(model) for model in found]
             except COLMAP_ERRORS as error:
                 job.note(f"the {name} mapper failed: {library_message(error)}")
     return max(models, key=_merit, default=None)

@@ -1,0 +1,5 @@
+"""A garment held beside the photos that it was made from.
+
+sightings: where on the mannequin the photos show cloth, and where they show it bare
+parted: cloth that the garment lacks, and whether it makes several openings of one
+"""

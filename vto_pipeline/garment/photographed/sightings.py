@@ -1,0 +1,169 @@
+"""Where on the mannequin the photos show cloth, and where they show it bare."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vto_pipeline.garment.align import PosedPhotos
+from vto_pipeline.garment.color_model import color_evidence
+from vto_pipeline.geometry.sampling import sample_surface
+from vto_pipeline.geometry.seen.depth_picture import depth_picture
+from vto_pipeline.geometry.topology import face_area_vectors, submesh
+from vto_pipeline.io.captures.images import read_image
+from vto_pipeline.io.captures.undistort import undistorted
+from vto_pipeline.model.arrays import ByteArray, FloatArray
+from vto_pipeline.model.camera import Intrinsics
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+
+MAX_PHOTOS, MAX_SIDE = 60, 800
+"""More photos are thinned evenly; larger ones are scaled down to this longer side [px]."""
+SPACING = 0.008
+"""Between points of the mannequin [m]."""
+BORDER_PX = 3
+"""Pixels so near to where one thing hides another may show either."""
+LEAST_COSINE = 0.2
+"""Of the angle between the mannequin's normal and the line of sight."""
+BEHIND = 0.01
+"""A point of the mannequin is hidden where something is nearer by more than this [m]."""
+LEAST_PIXELS = 300
+"""Of garment and of mannequin in a photo whose colours are learnt."""
+SURE = 1.0
+"""Log-likelihood ratio of a colour that tells cloth from mannequin."""
+CLOTH_TOLD, FORM_TOLD = 0.8, 0.4
+"""So much of the garment, and of what shows of the mannequin, its colour must tell in a photo: part of what shows of
+the mannequin may be cloth that the surface lacks."""
+LEAST_VIEWS = 2
+"""Photos that must show a point."""
+MOST = 4.0
+"""One photo counts no more than this log-likelihood ratio."""
+
+
+class Sightings(NamedTuple):
+    """Points of the mannequin that no part of the garment hides, N of them.
+
+    Args:
+        points: Evenly spread [m], shape (N, 3).
+        cloth: Which of them show cloth, shape (N,).
+        area: That each stands for [m²].
+    """
+
+    points: FloatArray
+    cloth: NDArray[np.bool_]
+    area: float
+
+
+def look_at_mannequin(
+    garment: TriangleMesh, observed: NDArray[np.bool_], mannequin: TriangleMesh, photos: PosedPhotos, job: Job
+) -> Sightings | None:
+    """Ask the photos what they show where the garment leaves the mannequin bare.
+
+    In each photo the colours of cloth are those of its observed part, and the mannequin's those of what shows of it;
+    each photo by itself, since exposure and white balance change.
+
+    Args:
+        garment: The finished garment.
+        observed: Which of its vertices a sensor saw, shape (V,).
+        mannequin: In the same frame.
+        photos: With their cameras in that frame.
+        job: Receives what was left out, and how many photos told.
+
+    Returns:
+        What they show; None where cloth and mannequin hardly differ in colour, or too little of either shows.
+    """
+    area = float(np.linalg.norm(face_area_vectors(mannequin), axis=1).sum())
+    count = max(int(area / SPACING**2), 1)
+    points, normals, _ = sample_surface(mannequin, count, job.seed)
+    seen_cloth, _ = submesh(garment, np.all(observed[garment.faces], axis=1))
+    at = {path.name: path for path in photos.paths}
+    usable = [k for k, name in enumerate(photos.cameras.names) if name in at]
+    chosen = np.unique(np.linspace(0, len(usable) - 1, min(len(usable), MAX_PHOTOS)).round().astype(int))
+    score, views, told = np.zeros(count), np.zeros(count, dtype=int), 0
+    for k in (usable[c] for c in chosen):
+        picture, camera = _small(at[photos.cameras.names[k]], photos.cameras.intrinsics[k])
+        pose = photos.cameras.world_from_cam[k]
+        cam_from_world: FloatArray = np.asarray(np.linalg.inv(pose), dtype=np.float64)
+        form = depth_picture(mannequin, camera, cam_from_world)
+        cloth = depth_picture(garment, camera, cam_from_world)
+        observed_cloth = depth_picture(seen_cloth, camera, cam_from_world)
+        evidence = _evidence(
+            picture, _eroded(np.isfinite(cloth) & (observed_cloth <= cloth) & (cloth < form)), _eroded(form < cloth)
+        )
+        if evidence is None:
+            continue
+        told += 1
+        shows, ratio = _read(points, normals, pose, camera, form, evidence)
+        score[shows] += ratio
+        views[shows] += 1
+    if told < LEAST_VIEWS:
+        reason = "in the photos too little of the mannequin shows, or it is of the cloth's colours"
+        job.leave_out("cloth beside the openings", reason)
+        return None
+    enough = views >= LEAST_VIEWS
+    mean = score[enough] / views[enough]
+    job.note(f"{told} of {len(chosen)} photos tell cloth from mannequin by colour")
+    return Sightings(points[enough], mean > SURE, area / count)
+
+
+def _small(path: Path, lens: Intrinsics) -> tuple[ByteArray, Intrinsics]:
+    """Return a photo without distortion, scaled down, and its camera."""
+    import cv2
+
+    picture = undistorted(read_image(path), lens)
+    camera = lens.resized(picture.shape[1], picture.shape[0]).without_distortion()
+    scale = min(1.0, MAX_SIDE / max(picture.shape[:2]))
+    if scale == 1.0:
+        return picture, camera
+    camera = camera.resized(max(round(scale * camera.width), 1), max(round(scale * camera.height), 1))
+    smaller = cv2.resize(picture, (camera.width, camera.height), interpolation=cv2.INTER_AREA)
+    return np.asarray(smaller, dtype=np.uint8), camera
+
+
+def _eroded(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return a mask (H, W) without its border."""
+    import cv2
+
+    side = 2 * BORDER_PX + 1
+    return np.asarray(cv2.erode(mask.astype(np.uint8), np.ones((side, side), np.uint8), borderValue=0)) > 0
+
+
+def _evidence(picture: ByteArray, cloth: NDArray[np.bool_], form: NDArray[np.bool_]) -> NDArray[np.float32] | None:
+    """Return the log-likelihood ratio of cloth against mannequin on what shows of the mannequin, NaN elsewhere, (H, W);
+    None where the photo shows too little of either, or their colours do not tell them apart."""
+    if cloth.sum() < LEAST_PIXELS or form.sum() < LEAST_PIXELS:
+        return None
+    colors = np.vstack([picture[cloth], picture[form]])
+    is_cloth = np.arange(len(colors)) < cloth.sum()
+    ratio = color_evidence(colors, is_cloth, ~is_cloth)
+    if np.mean(ratio[is_cloth] > SURE) < CLOTH_TOLD or np.mean(ratio[~is_cloth] < -SURE) < FORM_TOLD:
+        return None
+    evidence = np.full(cloth.shape, np.float32(np.nan), dtype=np.float32)
+    evidence[form] = np.clip(ratio[~is_cloth], -MOST, MOST)
+    return evidence
+
+
+def _read(
+    points: FloatArray,
+    normals: FloatArray,
+    pose: FloatArray,
+    camera: Intrinsics,
+    depth: FloatArray,
+    evidence: NDArray[np.float32],
+) -> tuple[NDArray[np.int_], FloatArray]:
+    """Return which points (N, 3) a photo shows, shape (K,), and the evidence there, shape (K,)."""
+    local = (points - pose[:3, 3]) @ pose[:3, :3]
+    z = np.where(local[:, 2] > 0.0, local[:, 2], np.inf)
+    away = np.linalg.norm(local, axis=1)
+    facing = -np.einsum("nd,nd->n", points - pose[:3, 3], normals) / away > LEAST_COSINE
+    column = np.rint(camera.fx * local[:, 0] / z + camera.cx).astype(int)
+    row = np.rint(camera.fy * local[:, 1] / z + camera.cy).astype(int)
+    inside = facing & (local[:, 2] > 0.0) & (column >= 0) & (column < camera.width) & (row >= 0) & (row < camera.height)
+    which = np.flatnonzero(inside)
+    there = row[which], column[which]
+    ratio = evidence[there]
+    shows = np.isfinite(ratio) & (z[which] < depth[there] + BEHIND)
+    return which[shows], ratio[shows].astype(float)
