@@ -5,9 +5,10 @@ import pytest
 from cloth_scenes import ball, fabric, tube
 from numpy.testing import assert_allclose
 
-from vto_pipeline.cloth.dynamics.body_motion import VariableSpeedBody, body_travel, run_body_motion
+from vto_pipeline.cloth.dynamics.body_motion import VariableSpeedBody, body_travel, is_jammed, run_body_motion
 from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
 from vto_pipeline.cloth.model.build import at_rest, build_cloth
+from vto_pipeline.errors import IntersectingError
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.mesh import TriangleMesh
@@ -62,3 +63,30 @@ def test_depth_is_that_of_the_deepest_vertex_inside():
     stepper = Stepper(model, [body], np.full(len(ring.vertices), 1e-3), StepConfig(recovery_speed=0.01))
     state = stepper.run(at_rest(ring.vertices), 1 / 60)
     assert 3e-3 < body.depth(0.0, state.positions) < 6.1e-3  # 6 mm in at first, led out slowly
+
+
+@pytest.mark.parametrize(
+    ("left", "jammed"),
+    [
+        ([3900.0, 6300.0], False),  # pushed off at the begin, as a shirt is that starts inside the body
+        ([2100.0, 79.0, 50.0, 91.0, 373.0], False),  # a shirt that is led out of the body
+        ([8000.0, 5000.0, 3000.0], False),  # far from rest, and on its way there
+        ([0.0, 3900.0, 6300.0, 5800.0], True),
+        ([1200.0, 900.0, 1500.0], False),
+    ],
+)
+def test_cloth_is_jammed_where_large_forces_do_not_fall(left, jammed):
+    assert is_jammed(left) is jammed
+
+
+def test_a_body_does_not_grow_into_jammed_cloth(monkeypatch):
+    mesh = tube(0.11, 0.05, 36, 5, base=-0.025)
+    model = build_cloth(mesh, RestShape(mesh.vertices), fabric())
+    body = VariableSpeedBody(swelling(0.1, 0.105), 0.5, 0.3)
+    stepper = Stepper(model, [body], np.full(len(mesh.vertices), 1e-3), StepConfig())
+    looks = []
+    monkeypatch.setattr(stepper, "residual", lambda state: looks.append(state.time) or 5000.0)
+    with pytest.raises(IntersectingError, match="jammed as the body moves, with forces of 5000 times") as caught:
+        run_body_motion(stepper, at_rest(mesh.vertices), body, 5e-4, lambda done: None)
+    assert_allclose(looks, [0.05, 0.1, 0.15])  # it is not waited for
+    assert caught.value.partial["draped"].faces.shape == mesh.faces.shape

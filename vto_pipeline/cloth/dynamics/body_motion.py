@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from vto_pipeline.cloth.collision.body.contacts import BodyCollider
 from vto_pipeline.cloth.dynamics.stepper import Stepper
 from vto_pipeline.cloth.model.build import ClothState
+from vto_pipeline.errors import IntersectingError
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import MovingBody
@@ -20,6 +21,8 @@ _SLOWEST = 0.125  # of full speed
 _BRAKE, _PICK_UP = 0.5, 1.25  # of the speed, where contact is deep and where it is not
 _SHALLOW = 0.25  # of what counts as deep: between the two, the speed is kept
 _BESIDE = 0.15  # m: the body this near the cloth, where it begins or ends, sets the speed
+_JAMMED = 1000.0  # weights left over: cloth that is led about by a body has some hundreds
+_WINDOWS, _FALL = 3, 0.8  # in a row with no less, and the share that it has to fall below meanwhile
 
 
 class VariableSpeedBody(BodyCollider):
@@ -77,17 +80,34 @@ def run_body_motion(
         body: Slowed as need be.
         deep: Cloth deeper in the body than this is behind [m].
         watch: Receives the share of the motion that is done.
+
+    Raises:
+        IntersectingError: the cloth is jammed: what is left over of its forces is far above its weight, and does not
+            fall. Steps take minutes then, and lead nowhere. `partial` holds it there as "draped".
     """
-    speed = 1.0
+    speed, left = 1.0, [0.0]
     while state.time < body.ends - 1e-9:
         state = stepper.run(state, min(_WINDOW, body.ends - state.time))
         watch(state.time / body.ends)
+        left.append(stepper.residual(state))
+        if is_jammed(left):
+            raise IntersectingError(
+                f"the cloth is jammed as the body moves, with forces of {left[-1]:.0f} times its weight",
+                hint="it lies between parts of the body, or its layers are entangled: give it nearer to how it is worn",
+                partial={"draped": TriangleMesh(state.positions, stepper.faces)},
+            )
         depth = body.depth(state.time, state.positions)
         change = _BRAKE if depth > deep else _PICK_UP if depth < _SHALLOW * deep else 1.0
         speed = float(np.clip(speed * change, _SLOWEST, 1.0))
         if state.time < body.ends - 1e-9:
             body.set_speed(state.time, speed)
     return state
+
+
+def is_jammed(left: Sequence[float]) -> bool:
+    """Return whether what is left over of the forces, as shares of weight, after each window, is high and stays so."""
+    last = left[-_WINDOWS:]
+    return len(last) == _WINDOWS and min(last) > _JAMMED and last[-1] >= _FALL * last[0]
 
 
 def body_travel(body: MovingBody, cloth: TriangleMesh) -> float:

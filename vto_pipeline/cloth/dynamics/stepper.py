@@ -189,6 +189,11 @@ class Stepper:
         return relative_residual(self._model, x, touched)
 
     @property
+    def faces(self) -> NDArray[np.int32]:
+        """Triangles of the cloth, shape (F, 3)."""
+        return self._model.faces
+
+    @property
     def contact_memory(self) -> ActiveSet:
         """What is known of the contacts from the last step, as far as the method keeps it; may be set back to it."""
         return self._method.active if isinstance(self._method, Newton) else no_contacts(0)

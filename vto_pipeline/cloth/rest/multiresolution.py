@@ -149,7 +149,7 @@ class _CoarseToFine:
             except IntersectingError as error:
                 if level == 0:
                     raise
-                self._leave_out(model, f"its openings are too coarse: {error.problem}")
+                self._leave_out(model, f"too coarse: {error.problem}")
                 return None
             state = phases.resolve_crossings(grown, first)
             if level > 0 and phases.crossings_left > 0:
@@ -160,7 +160,13 @@ class _CoarseToFine:
         stepper = phases.stepper(model, collider, config.damping)
         stepper.prepare(state.positions)
         job.note(f"{stepper.choice.method}, {stepper.substeps} steps per 1/60 s: {stepper.choice.reason}")
-        state = phases.follow_body(state, stepper, collider, body.final)
+        try:
+            state = phases.follow_body(state, stepper, collider, body.final)
+        except IntersectingError as error:
+            if level == 0:
+                raise
+            self._leave_out(model, f"too coarse: {error.problem}")
+            return None
         before = time.perf_counter() - self._began
         settling = phases.settle_and_clear(
             state, stepper, body.final, deadline, (ROUGH,) if level > 0 else (PLACED, REST)
