@@ -58,14 +58,6 @@ def test_where_a_file_has_arms_go_through_cloth_another_height_is_taken():
     assert any("fewer limbs" in note for note in job.notes)
 
 
-@pytest.mark.parametrize("far", [(0.0, 0.0, 0.0), (0.5, 0.3, 0.2)])
-def test_a_skirt_of_any_origin_is_not_put_where_arms_go_through_it(far):
-    arms = height_of_arms()
-    strayed = moved(skirt(arms + 0.15), *far)
-    top, bottom = top_and_bottom(find_placement(strayed, figure(BELOW), PlaceConfig(), Job()), strayed)
-    assert not bottom < arms < top
-
-
 @pytest.mark.parametrize("top", [2.35, 3.0])
 def test_what_lies_beside_the_body_wherever_the_file_has_it_is_looked_for(top):
     body = figure(BELOW)

@@ -24,7 +24,7 @@ def test_what_is_assumed_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         mesh, audit, trace = None, {}, ()
 
     monkeypatch.setattr(cloth_stages, "drape", lambda *a: Draped())
-    monkeypatch.setattr(cloth_stages, "Garment", lambda *a: None)
+    monkeypatch.setattr(cloth_stages, "Garment", lambda *a, **named: None)
     (tmp_path / name).write_text(FILES[name])
     job = Job()
     (stage,) = [stage for stage in cloth_stages.STAGES if stage.name == "drape"]

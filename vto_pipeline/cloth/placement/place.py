@@ -91,7 +91,7 @@ _AS_IT_STANDS = Placement(1.0, np.eye(3), 1.0, np.zeros(3))
 def find_placement(
     garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig, job: Job, laid_out: bool = False
 ) -> Placement:
-    """Return the placement in which the body fills the garment best, of those in which no limb goes through cloth.
+    """Return the placement that a pattern's file means, or else that in which the body fills the garment best.
 
     Args:
         garment: As it stands, in metres or another unit, with any axis up.
@@ -137,13 +137,6 @@ def find_placement(
     stretch, best = _enlarge_until_body_inside(metres, cubes, best, config)
     if stretch > 1.0:
         job.warn(f"too small: this body needs it {stretch - 1:.0%} larger; it starts stretched by that much")
-    larger = TriangleMesh(stretch * metres.vertices, metres.faces)
-
-    def others() -> list[VoxelPlacement]:
-        fit = VoxelFit(larger, cubes, 1e-3 * config.cube_mm, config.cloth_in_body)
-        return fit.best_placements(best.turn, _HEIGHTS)
-
-    best = _least_pierced(best, others, larger, Thinning(body).limbs_astray, job)
     share = _relative_score(best.score_in_place, best.score)
     if config.place == "auto" and best is stands and scale == 1.0 and share >= config.stands_well:
         job.note(f"garment left where it stands: its place scores {share:.0%} of the best")
