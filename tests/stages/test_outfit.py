@@ -1,5 +1,7 @@
 """Several garments in one document: which rows they get, what they are called, and what is wrong with a document."""
 
+import json
+import re
 from pathlib import Path
 
 import jsonschema
@@ -151,7 +153,8 @@ def test_the_page_shows_all_together_and_judges_each() -> None:
     inputs: dict[str, object] = {"run_record": {"stages": [], "seconds": 1.0}}
     for k, name in enumerate(("trousers", "shirt")):
         mesh = TriangleMesh(corner + k, np.array([[0, 1, 2]], np.int32))
-        inputs |= {f"{name}_draped": mesh, f"{name}_render_mesh": [GlbPart("garment", mesh)]}
+        parts = [GlbPart("garment", mesh), GlbPart("body", TriangleMesh(corner - 9.0, mesh.faces))]
+        inputs |= {f"{name}_draped": mesh, f"{name}_render_mesh": parts}
         inputs[f"{name}_fit_report"] = report(f"Verdict on {name}.")
     inputs["audit"] = {"settled": True, "layer_intersections": 0, "layers": {"trousers": {"secret": 1}}}
     assert set(inputs) - {"run_record"} <= set(page.optional)
@@ -161,6 +164,11 @@ def test_the_page_shows_all_together_and_judges_each() -> None:
         assert f"Verdict on {name}." in html
     assert "layer intersections" in html
     assert "secret" not in html
+    scene = re.search(r'id="scene"[^>]*>(.*?)</script>', html, re.DOTALL)
+    assert scene is not None
+    shown = json.loads(scene[1])
+    low = {layer["name"]: shown["geometries"][layer["geometry"]]["low"] for layer in shown["layers"]}
+    assert (low["Garment"], low["Body"]) == ([0.0, 0.0, 0.0], [-9.0, -9.0, -9.0])  # all wear the same
 
 
 def report(verdict: str) -> dict[str, object]:
