@@ -143,3 +143,14 @@ def test_a_form_that_is_round_is_refused(tmp_path):
     config = AlignConfig(samples=4000, yaw_starts=12, enough_bare=0.5, upright_bare=0.5)
     with pytest.raises(GarmentError, match=r"two places|uncertain"):
         align_to_mannequin(surface, form, config, Job(), photos)
+
+
+def test_close_cloth_does_not_pass_for_a_form_of_another_size(scene, tmp_path):
+    """A vest 4 mm off the trunk, alone in the scan: 2 % larger, a good part of it lies on the form."""
+    middle = scene.form.vertices[scene.form.faces].mean(axis=1)
+    trunk = submesh(scene.form, (middle[:, 1] > 0.2) & (middle[:, 1] < 0.62) & (np.abs(middle[:, 0]) < 0.19))[0]
+    normals = trimesh.Trimesh(trunk.vertices, trunk.faces, process=False).vertex_normals
+    vest = TriangleMesh(trunk.vertices + 0.004 * normals, trunk.faces)
+    surface, photos = in_scan_frame(vest, photographs(tmp_path, scene.form, vest), tmp_path, unit=0.137)
+    found = align_to_mannequin(surface, scene.form, QUICK, Job(), photos)
+    assert_allclose(np.cbrt(np.linalg.det(found[:3, :3])), 0.137, rtol=5e-3, atol=0)

@@ -48,7 +48,7 @@ class AlignConfig(Config):
     widest_band_mm: float = Field(3.0, ge=0.2, le=20, description="Farther out, a point is never bare mannequin [mm]")
     enough_bare: float = Field(0.03, ge=0, le=1, description="Least share of the scan that must lie on bare mannequin")
     upright_bare: float = Field(
-        0.08, ge=0, le=1, description="Below this share, the outline in the photos or other up axes are tried"
+        0.08, ge=0, le=1, description="Below this share, outline or other up axes are tried, where the scale is known"
     )
     most_inside: float = Field(0.02, ge=0, le=1, description="Largest share of the scan inside the mannequin")
     worst_sigma_mm: float = Field(1.0, ge=0.01, le=50, description="Largest placement uncertainty accepted [mm]")
@@ -77,7 +77,7 @@ def align_to_mannequin(
     """Return mannequin_from_surface, shape (4, 4): rigid, or a similarity where the scan has no scale of its own.
 
     What was scanned of the bare mannequin (neck, forearms, stand) tells the placement. Where that is too little, as of
-    a form without texture, its outline in the photos does.
+    a form without texture, or where the scale is unknown as well, its outline in the photos does.
 
     Raises:
         GarmentError: neither settles the placement, and why.
@@ -85,22 +85,25 @@ def align_to_mannequin(
     scan = _Scan(surface, mannequin, config, job)
     if photos is None:
         return scan.on_bare_parts(config.enough_bare, tilted=True)
-    try:
-        return scan.on_bare_parts(config.upright_bare, tilted=False)
-    except GarmentError as error:
-        too_little = error
+    if scan.free:
+        reason = "the scan has no scale of its own, and in another size close cloth may pass for bare mannequin"
+    else:
+        try:
+            return scan.on_bare_parts(config.upright_bare, tilted=False)
+        except GarmentError as error:
+            reason = error.problem
     try:
         found = scan.by_outline(photos)
     except GarmentError as error:
         no_outline = error
     else:
-        job.note(f"the mannequin is placed by its outline in the photos: {too_little.problem}")
+        job.note(f"the mannequin is placed by its outline in the photos: {reason}")
         return found
     try:
         found = scan.on_bare_parts(config.enough_bare, tilted=True)
     except GarmentError as error:
         raise GarmentError(f"{error.problem}; and {no_outline.problem}", hint=no_outline.hint) from None
-    job.warn(f"little bare mannequin tells the placement, and photos do not confirm it: {no_outline.problem}")
+    job.warn(f"bare mannequin alone tells the placement, and photos do not confirm it: {no_outline.problem}")
     return found
 
 

@@ -11,6 +11,14 @@ SLANT_REACH = 1.5
 MAX_SHIFT = 1.0
 """A match that wants to move further than this was wrong [px]."""
 
+SETTLED_PX = 0.02
+"""A step shorter than this is the last one: a fifth of the standard error that is good enough [px]."""
+
+FLAT = 1e-3
+"""A window whose squared brightness adds up to less, about its mean, has no texture."""
+
+_single = np.float32
+
 
 @njit(cache=True, nogil=True)
 def refine_disparity(  # type: ignore[no-untyped-def]  # typed by Numba
@@ -27,7 +35,7 @@ def refine_disparity(  # type: ignore[no-untyped-def]  # typed by Numba
         disparity: Shape (H, W), float32; NaN where unknown.
         shift: Disparity at which the two windows coincide [px].
         radius, widest: Of the first window and of the last [px]; each is twice as wide as the one before.
-        steps: Gauss-Newton steps in each window.
+        steps: Gauss-Newton steps in each window, at most.
         min_correlation: Matches whose last windows correlate less are dropped.
         precision: Standard error of a disparity that is good enough [px].
 
@@ -36,8 +44,9 @@ def refine_disparity(  # type: ignore[no-untyped-def]  # typed by Numba
     """
     height, width = disparity.shape
     refined = np.full((height, width), np.float32(np.nan), dtype=np.float32)
+    grey, cubics = left.astype(np.float32).reshape(-1), _cubics(right).reshape(-1)
     side = 2 * widest + 1
-    a, b, slope = np.empty(side * side), np.empty(side * side), np.empty(side * side)
+    a, b, slope = np.empty(side**2, np.float32), np.empty(side**2, np.float32), np.empty(side**2, np.float32)
     for row in range(radius, height - radius):
         for column in range(radius, width - radius):
             start = disparity[row, column]
@@ -48,17 +57,23 @@ def refine_disparity(  # type: ignore[no-untyped-def]  # typed by Numba
             while best > precision and reach <= min(row, column, height - 1 - row, width - 1 - column):
                 if reach > radius:
                     d, dx, dy = _plane(disparity, row, column, reach)
-                count = (2 * reach + 1) ** 2
+                if dx >= 1.0:
+                    break  # the right view would see it from behind
                 moved, error, correlation = d, np.inf, 0.0
+                half = reach * (1.0 - dx + abs(dy))
                 for step in range(steps + 1):
-                    if not _sample(left, right, row, column, moved - shift, dx, dy, reach, a, b, slope):
+                    offset = moved - shift
+                    if not (column - offset - half >= 1.0 and column - offset + half < width - 2):
                         correlation = 0.0
                         break
-                    change, correlation, error = _solve(a[:count], b[:count], slope[:count])
+                    moments = _moments(grey, cubics, width, row, column, offset, dx, dy, reach, a, b, slope)
+                    change, correlation, error = _solve(moments, (2 * reach + 1) ** 2)
                     if step < steps:
                         moved += change
                         if not abs(moved - start) <= MAX_SHIFT:
                             correlation = 0.0
+                            break
+                        if abs(change) < SETTLED_PX:
                             break
                 if correlation >= min_correlation and error < best:
                     best, refined[row, column] = error, moved
@@ -96,48 +111,66 @@ def _plane(disparity, row, column, radius):  # type: ignore[no-untyped-def]  # t
 
 
 @njit(cache=True, nogil=True)
-def _sample(left, right, row, column, offset, dx, dy, radius, a, b, slope):  # type: ignore[no-untyped-def]  # Numba
-    """Fill the two windows' brightness and the right one's slope (Catmull-Rom); False beyond the picture."""
-    width = right.shape[1]
+def _cubics(picture):  # type: ignore[no-untyped-def]  # typed by Numba
+    """Catmull-Rom coefficients of each row between a pixel and the next, shape (H, W, 4); 0 at the ends."""
+    height, width = picture.shape
+    found = np.zeros((height, width, 4), np.float32)
+    for row in range(height):
+        for k in range(1, width - 2):
+            p0, p1 = float(picture[row, k - 1]), float(picture[row, k])
+            p2, p3 = float(picture[row, k + 1]), float(picture[row, k + 2])
+            found[row, k, 0], found[row, k, 1] = p1, 0.5 * (p2 - p0)
+            found[row, k, 2], found[row, k, 3] = p0 - 2.5 * p1 + 2 * p2 - 0.5 * p3, 0.5 * (p3 - p0) + 1.5 * (p1 - p2)
+    return found
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def _moments(  # type: ignore[no-untyped-def]  # typed by Numba
+    grey, cubics, width, row, column, offset, dx, dy, radius, a, b, slope
+):
+    """Sums over the window of the left brightness a, the right one b, its slope s and their products: a, b, s, aa, ab,
+    bb, as, bs, ss. Both are counted from the left centre, so that single precision is enough.
+
+    Flat arrays, unsigned indices and two passes, because the compiler makes vectors of the second only so.
+    """
+    side, stretch, center = 2 * radius + 1, _single(1.0 - dx), grey[np.uint64(row * width + column)]
     k = 0
     for i in range(-radius, radius + 1):
-        for j in range(-radius, radius + 1):
-            x = column + j - (offset + dx * j + dy * i)
-            first = int(np.floor(x))
-            if first < 1 or first + 2 >= width:
-                return False
-            t = x - first
-            p0, p1 = float(right[row + i, first - 1]), float(right[row + i, first])
-            p2, p3 = float(right[row + i, first + 1]), float(right[row + i, first + 2])
-            c1, c2, c3 = 0.5 * (p2 - p0), p0 - 2.5 * p1 + 2 * p2 - 0.5 * p3, 0.5 * (p3 - p0) + 1.5 * (p1 - p2)
-            a[k] = left[row + i, column + j]
-            b[k] = p1 + t * (c1 + t * (c2 + t * c3))
-            slope[k] = c1 + t * (2 * c2 + t * 3 * c3)
+        x0 = column - offset - dy * i - (1.0 - dx) * radius
+        whole = np.int64(np.floor(x0))
+        into, first, start = _single(x0 - whole), (row + i) * width + whole, (row + i) * width + column - radius
+        for j in range(side):
+            x = into + stretch * _single(j)
+            pixel = np.int32(x)
+            t, p = x - _single(pixel), np.uint64(4 * (first + pixel))
+            c1, c2, c3 = cubics[p + np.uint64(1)], cubics[p + np.uint64(2)], cubics[p + np.uint64(3)]
+            a[k] = grey[np.uint64(start + j)] - center
+            b[k] = cubics[p] - center + t * (c1 + t * (c2 + t * c3))
+            slope[k] = c1 + t * (_single(2) * c2 + t * _single(3) * c3)
             k += 1
-    return True
+    sa = sb = ss = saa = sab = sbb = sas = sbs = sss = _single(0)
+    for k in range(side * side):
+        u, v, w = a[k], b[k], slope[k]
+        sa, sb, ss = sa + u, sb + v, ss + w
+        saa, sab, sbb = saa + u * u, sab + u * v, sbb + v * v
+        sas, sbs, sss = sas + u * w, sbs + v * w, sss + w * w
+    return sa, sb, ss, saa, sab, sbb, sas, sbs, sss
 
 
 @njit(cache=True, nogil=True)
-def _solve(a, b, slope):  # type: ignore[no-untyped-def]  # typed by Numba
+def _solve(moments, count):  # type: ignore[no-untyped-def]  # typed by Numba
     """Change of disparity that brings b, up to gain and offset, to a; how well they correlate now; its standard error
     from what is left over [px]."""
-    ma, mb, ms = a.mean(), b.mean(), slope.mean()
-    aa = ab = bb = bs = ss = rs = 0.0
-    for k in range(len(a)):
-        aa += (a[k] - ma) ** 2
-        bb += (b[k] - mb) ** 2
-        ab += (a[k] - ma) * (b[k] - mb)
-    if aa < 1e-9 or bb < 1e-9:
+    a, b, s, aa, ab, bb, as_, bs, ss = moments
+    a, b, s = float(a), float(b), float(s)
+    aa, ab, bb = aa - a * a / count, ab - a * b / count, bb - b * b / count
+    as_, bs, ss = as_ - a * s / count, bs - b * s / count, ss - s * s / count
+    if aa < FLAT or bb < FLAT:
         return 0.0, 0.0, np.inf
     gain = ab / bb
-    for k in range(len(a)):
-        s, u = gain * (slope[k] - ms), b[k] - mb
-        bs += s * u
-        ss += s * s
-        rs += s * (gain * u - (a[k] - ma))
-    ss -= bs * bs / bb  # the gain is an unknown, too
     correlation = ab / np.sqrt(aa * bb)
-    if ss <= 1e-6 * aa:
+    stiffness = gain * gain * (ss - bs * bs / bb)  # the gain is an unknown, too
+    if stiffness <= 1e-6 * aa:
         return 0.0, correlation, np.inf
-    left_over = aa * (1.0 - correlation * correlation) / (len(a) - 3)
-    return rs / ss, correlation, np.sqrt(left_over / ss)
+    left_over = aa * max(0.0, 1.0 - correlation * correlation) / (count - 3)
+    return gain * (gain * bs - as_) / stiffness, correlation, np.sqrt(left_over / stiffness)
