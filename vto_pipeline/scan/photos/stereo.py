@@ -1,4 +1,4 @@
-"""Dense depth from posed photos: semi-global matching of neighbours, consensus, and a check across photos."""
+"""Dense depth from posed photos: semi-global matching of neighbours, consensus, a check, and a second look."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from pydantic import Field
 
 from vto_pipeline.errors import InputError, ScanError
 from vto_pipeline.io.captures.images import read_image
+from vto_pipeline.io.captures.undistort import undistorted
 from vto_pipeline.model.camera import CameraSet
 from vto_pipeline.model.frames import DepthMaps, PhotoSet
 from vto_pipeline.model.job import Job
@@ -28,6 +29,7 @@ from vto_pipeline.scan.photos.disparity import MatchConfig, match_pair
 from vto_pipeline.scan.photos.neighbours import camera_points, choose_pairs, visibility
 from vto_pipeline.scan.photos.rectify import StereoView, rectify
 from vto_pipeline.scan.photos.region import object_region
+from vto_pipeline.scan.photos.rematch.rematch import RematchConfig, rematch
 
 PAIR_BYTES = 250
 """Working memory of one pair per pixel of a photo, with windows as large as they may be [B]."""
@@ -45,6 +47,7 @@ class StereoConfig(Config):
     check_tolerance: float = Field(0.002, gt=0, le=0.1, description="The same between maps of different photos")
     check_views: int = Field(2, ge=0, le=12, description="Other photos that must have measured the same point")
     match: MatchConfig = Field(default_factory=MatchConfig, description="Settings of the matcher")
+    rematch: RematchConfig = Field(default_factory=RematchConfig, description="Settings of the second look")
 
 
 def estimate_depth_maps(
@@ -85,7 +88,14 @@ def estimate_depth_maps(
     if blind:
         job.warn(f"no depth in {len(blind)} of {len(views)} photos: {', '.join(blind)}")
     job.measure(pairs=len(pairs), depth_pixels=kept, consistent_share=round(kept / measured, 3))
-    return replace(merged, depth=checked)
+    maps = replace(merged, depth=checked)
+    if config.rematch.rounds == 0:
+        return maps
+    try:
+        return rematch([undistorted(view.gray, view.camera) for view in views], maps, config.rematch, job)
+    except ScanError as error:
+        job.note(f"no second look: {error.problem}")
+        return maps
 
 
 def _load(photos: PhotoSet, cameras: CameraSet, max_side: int) -> list[StereoView]:
@@ -226,6 +236,6 @@ def _check(merged: DepthMaps, pairs: list[tuple[int, int]], config: StereoConfig
                 local = rays(merged.intrinsics[i].matrix, *depth.shape) * depth[..., None]
                 pose = merged.world_from_cam[i]
                 checked[i][~region.holds(local @ pose[:3, :3].T + pose[:3, 3])] = 0
-        job.progress(0.9 + 0.1 * (i + 1) / len(checked), f"checking photo {i + 1} of {len(checked)}")
+        job.progress(0.9 + 0.05 * (i + 1) / len(checked), f"checking photo {i + 1} of {len(checked)}")
     checked.flags.writeable = False
     return checked

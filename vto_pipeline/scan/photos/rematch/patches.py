@@ -1,0 +1,128 @@
+"""How well photos agree on small patches of a surface, moved along their normals."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+LEAST_CONTRAST = 1.5
+"""Standard deviation of a patch without texture [grey levels]: noise."""
+
+
+@njit(cache=True, nogil=True)
+def correlations(  # type: ignore[no-untyped-def]  # typed by Numba
+    points, normals, views, pictures, sizes, matrices, cam_from_world, offsets, radius, spacing, held
+):
+    """Correlate each patch between one photo and the others, for each offset along its normal.
+
+    The patch is a square in the tangent plane, so that slant and distance do not matter (Furukawa and Ponce 2010). In
+    some photos something unknown may stand before it. The one that is held against the others is therefore the one
+    that the best of them agree with best.
+
+    Args:
+        points, normals: Middle and unit normal of each patch, shapes (P, 3).
+        views: Photos of each, -1 for none, shape (P, M).
+        pictures: Grey, undistorted, shape (C, H, W), uint8.
+        sizes: Height and width of each, shape (C, 2).
+        matrices, cam_from_world: Of the cameras, shapes (C, 3, 3) and (C, 4, 4).
+        offsets: Tried along the normals [m], shape (O,).
+        radius: Half side of a patch, in samples.
+        spacing: Of the samples [m].
+        held: How many of the others must agree.
+
+    Returns:
+        Normalised correlation with each photo, shape (P, O, M), float32; NaN where a photo does not show the patch, or
+        shows no texture, and for the photo held against the others. Its column, -1 for none, shape (P,).
+    """
+    count, side = views.shape[1], 2 * radius + 1
+    found = np.full((len(points), len(offsets), count), np.float32(np.nan), dtype=np.float32)
+    column = np.full(len(points), -1)
+    patch = np.empty((count, side * side), np.float32)
+    pairs = np.empty((len(offsets), count, count), np.float32)
+    seen = np.empty(count, np.bool_)
+    for p in range(len(points)):
+        n = normals[p]
+        first = np.zeros(3)
+        first[np.argmin(np.abs(n))] = 1.0
+        across = np.cross(n, first)
+        across /= np.sqrt((across * across).sum())
+        along = np.cross(n, across)
+        pairs[:] = np.nan
+        most = -np.inf
+        for o in range(len(offsets)):
+            middle = points[p] + offsets[o] * n
+            for m in range(count):
+                seen[m] = views[p, m] >= 0 and _sampled(patch[m], views[p, m], middle, across, along, pictures, sizes,
+                                                        matrices, cam_from_world, radius, spacing)  # fmt: skip
+            for a in range(count):
+                for b in range(a + 1, count):
+                    if seen[a] and seen[b]:
+                        total = _dot(patch[a], patch[b])
+                        pairs[o, a, b] = pairs[o, b, a] = total
+            for m in range(count):
+                agree = best_mean(pairs[o, m], held)
+                if agree > most:
+                    most, column[p] = agree, m
+        if column[p] >= 0:
+            found[p] = pairs[:, column[p]]
+    return found, column
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def _dot(a, b):  # type: ignore[no-untyped-def]  # typed by Numba
+    total = np.float32(0)
+    for k in range(len(a)):
+        total += a[k] * b[k]
+    return total
+
+
+@njit(cache=True, nogil=True)
+def best_mean(values, held):  # type: ignore[no-untyped-def]  # typed by Numba
+    """Mean of the largest `held` values, NaN left out; minus infinity where there are fewer."""
+    ordered = np.sort(np.where(np.isnan(values), -np.inf, values))  # ascending
+    total = 0.0
+    for k in range(len(ordered) - held, len(ordered)):
+        total += ordered[k]
+    return total / held
+
+
+@njit(cache=True, nogil=True)
+def _sampled(  # type: ignore[no-untyped-def]  # typed by Numba
+    patch, view, middle, across, along, pictures, sizes, matrices, cam_from_world, radius, spacing
+):
+    """Fill the patch with a photo's brightness, mean 0 and length 1; False beyond the photo or without texture."""
+    turn, lens = cam_from_world[view], matrices[view]
+    height, width = sizes[view]
+    corner, right, down = turn[:3, 3].copy(), np.zeros(3), np.zeros(3)
+    for i in range(3):
+        for j in range(3):
+            corner[i] += turn[i, j] * middle[j]
+            right[i] += turn[i, j] * spacing * across[j]
+            down[i] += turn[i, j] * spacing * along[j]
+    k, mean = 0, 0.0
+    for i in range(-radius, radius + 1):
+        for j in range(-radius, radius + 1):
+            x, y = corner[0] + i * right[0] + j * down[0], corner[1] + i * right[1] + j * down[1]
+            z = corner[2] + i * right[2] + j * down[2]
+            if z <= 0.0:
+                return False
+            u, v = lens[0, 0] * x / z + lens[0, 2], lens[1, 1] * y / z + lens[1, 2]
+            if not (0.0 <= u < width - 1 and 0.0 <= v < height - 1):
+                return False
+            column, row = int(u), int(v)
+            s, t = u - column, v - row
+            upper = (1 - s) * pictures[view, row, column] + s * pictures[view, row, column + 1]
+            lower = (1 - s) * pictures[view, row + 1, column] + s * pictures[view, row + 1, column + 1]
+            patch[k] = (1 - t) * upper + t * lower
+            mean += patch[k]
+            k += 1
+    mean /= k
+    squared = 0.0
+    for i in range(k):
+        patch[i] -= mean
+        squared += patch[i] ** 2
+    if squared < k * LEAST_CONTRAST**2:
+        return False
+    for i in range(k):
+        patch[i] /= np.sqrt(squared)
+    return True
