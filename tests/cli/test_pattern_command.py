@@ -76,3 +76,28 @@ def test_a_folder_gives_a_row_for_each_file(vto):
     Path("none").mkdir()
     assert vto("pattern", "none").code == 3
     assert vto("pattern", "all", "-o", "x.svg").code == 2
+
+
+def write_skirt(path: Path) -> None:
+    """Two trapezoids of GarmentCode, 36 cm wide at the waist, 50 cm at the hem, 60 cm long, sewn along their sides."""
+    corners = [[-25, 0], [25, 0], [18, 60], [-18, 60]]
+    edges = [{"endpoints": [k, (k + 1) % 4]} for k in range(4)]
+    panels = {name: {"vertices": corners, "edges": edges} for name in ("front", "back")}
+    stitches = [[{"panel": "front", "edge": a}, {"panel": "back", "edge": 4 - a}] for a in (1, 3)]
+    path.write_text(json.dumps({"pattern": {"panels": panels, "stitches": stitches}, "properties": {}}))
+
+
+def test_flat_measurements_are_printed_where_the_type_is_known(vto):
+    write_skirt(Path("skirt.json"))
+    flat = vto("pattern", "skirt.json", "--json").data["flat"]
+    assert (flat["type"], flat["because"]) == ("skirt", "'skirt' is in its name")
+    measured = {name: one["mm"] for name, one in flat["sizes"][""].items()}
+    assert measured == pytest.approx({"waist": 360, "hem": 500, "hip": 360 + 140 / 3, "length": 600})
+    assert "waist       360.0   upper edge of front, back, half of it" in vto("pattern", "skirt.json").out
+    assert vto("info", "skirt.json", "--json").data["flat_waist_m"] == pytest.approx(0.36)
+    Path("skirt.json").rename("P1043.json")
+    assert "unknown" in vto("pattern", "P1043.json", "--json").data["flat"]
+    assert "state it with --type" in vto("pattern", "P1043.json").out
+    assert vto("pattern", "P1043.json", "--type", "skirt", "--json").data["flat"]["because"] == "as stated"
+    assert vto("pattern", "P1043.json", "--type", "trousers").code == 4
+    assert vto("pattern", "P1043.json", "--type", "skort").code == 2

@@ -22,11 +22,12 @@ if TYPE_CHECKING:
 @click.argument("paths", metavar="PATH...", type=PATH, nargs=-1, required=True)
 @click.option("-o", "--output", type=PATH, metavar="FILE", help="Write the pattern: .dxf, .svg or .json.")
 @click.option("--size", metavar="NAME", help="Take the panels of one size. [default: all]")
+@click.option("--type", "kind", metavar="TYPE", help="Type of garment, or a file of size rules. [default: by name]")
 @click.option("--unit", type=click.Choice(sorted(LENGTH_M)), help="Unit of length, in place of the file's.")
 @message_options
 @pass_session
 def pattern_command(
-    session: Session, paths: tuple[Path, ...], output: Path | None, size: str | None, unit: str | None
+    session: Session, paths: tuple[Path, ...], output: Path | None, size: str | None, kind: str | None, unit: str | None
 ) -> None:
     """Measure a sewing pattern, and write it in another format.
 
@@ -35,12 +36,13 @@ def pattern_command(
 
     \b
     vto pattern tee.json
+    vto pattern P1043.dxf --type trousers
     vto pattern shirt.dxf --size M -o shirt_M.svg
     vto pattern patterns/
     """
     files = _files(paths)
     if len(paths) == 1 and not paths[0].is_dir():
-        _describe(session, files[0], output, size, unit)
+        _describe(session, files[0], output, size, kind, unit)
         return
     if output is not None:
         raise ConfigError(f"--output takes one pattern, and {len(files)} are given")
@@ -68,7 +70,10 @@ def _files(paths: Sequence[Path]) -> list[Path]:
     return found
 
 
-def _describe(session: Session, path: Path, output: Path | None, size: str | None, unit: str | None) -> None:
+def _describe(
+    session: Session, path: Path, output: Path | None, size: str | None, kind: str | None, unit: str | None
+) -> None:
+    from vto_pipeline.cli.commands.pattern.flat_lines import flat_facts, flat_lines
     from vto_pipeline.cli.commands.pattern.lines import pattern_facts, pattern_lines
     from vto_pipeline.io.patterns.read import read_pattern
     from vto_pipeline.io.patterns.write import write_pattern
@@ -80,11 +85,12 @@ def _describe(session: Session, path: Path, output: Path | None, size: str | Non
         if output.resolve() == path.resolve():
             raise ConfigError("the output would overwrite the input", where=str(output))
         write_pattern(output, pattern, job)
-    facts = {"path": str(path), **pattern_facts(pattern), "notes": job.notes}
+    flat = flat_facts(pattern, kind)
+    facts = {"path": str(path), **pattern_facts(pattern), "flat": flat, "notes": job.notes}
     if output is not None:
         facts["written"] = str(output)
-    lines = [f"{path}: {pattern.name}, unit: {pattern.unit}", *pattern_lines(pattern), "", *job.notes]
-    session.answer(facts, [*lines, *([f"written: {output}"] if output else [])])
+    lines = [f"{path}: {pattern.name}, unit: {pattern.unit}", *pattern_lines(pattern), "", *flat_lines(flat), ""]
+    session.answer(facts, [*lines, *job.notes, *([f"written: {output}"] if output else [])])
 
 
 def _sized(pattern: Pattern, size: str | None) -> Pattern:

@@ -1,0 +1,7 @@
+"""Sizes of a sewing pattern.
+
+rules, rules/: per type of garment: which panel is which part, and the steps from size to size
+outline: what each edge of a panel is: shoulder, armhole, side, hem
+flat: flat measurements of a garment
+widths, shoulder_point: how wide panels are at a level; where on a sleeve the shoulder ends
+"""
