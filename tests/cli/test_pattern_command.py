@@ -101,3 +101,17 @@ def test_flat_measurements_are_printed_where_the_type_is_known(vto):
     assert vto("pattern", "P1043.json", "--type", "skirt", "--json").data["flat"]["because"] == "as stated"
     assert vto("pattern", "P1043.json", "--type", "trousers").code == 4
     assert vto("pattern", "P1043.json", "--type", "skort").code == 2
+
+
+def test_sizes_are_written_with_their_chart(vto):
+    write_skirt(Path("skirt.json"))
+    said = vto("pattern", "skirt.json", "--sizes", "L,S", "-o", "run", "--format", "dxf", "--json")
+    assert said.code == 0
+    assert [Path(one).name for one in said.data["written"]] == ["skirt_S.dxf", "skirt_L.dxf", "size_chart.json"]
+    chart = json.loads(Path("run/size_chart.json").read_text())
+    waists = {size: row["flat_mm"]["waist"] for size, row in chart["sizes"].items()}
+    assert waists == pytest.approx({"S": 360 - 40, "L": 360 + 42.5}, abs=0.1)  # EN 13402: bust 86 and 102.5, M 94 cm
+    read = vto("pattern", "run/skirt_L.dxf", "--json").data["flat"]["sizes"]["L"]
+    assert read["waist"]["mm"] == pytest.approx(402.5, abs=0.1)
+    assert "at most 0.0 mm from what the rules ask for" in vto("pattern", "skirt.json", "--sizes", "S,M").out
+    assert vto("pattern", "skirt.json", "--sizes", "S", "-o", "skirt.json").code == 2

@@ -2,6 +2,7 @@
 
 command: the command
 lines, flat_lines: a sewing pattern in tables and as JSON; its flat measurements
+graded: a pattern in other sizes
 """
 
 from vto_pipeline.cli.commands.pattern.command import pattern_command
