@@ -113,5 +113,7 @@ def test_sizes_are_written_with_their_chart(vto):
     assert waists == pytest.approx({"S": 360 - 40, "L": 360 + 42.5}, abs=0.1)  # EN 13402: bust 86 and 102.5, M 94 cm
     read = vto("pattern", "run/skirt_L.dxf", "--json").data["flat"]["sizes"]["L"]
     assert read["waist"]["mm"] == pytest.approx(402.5, abs=0.1)
+    Path("tape.yaml").write_text("measurements: {waist_girth: 79}\n")  # the waist of L is 80.5 cm
+    assert vto("advise", "run/size_chart.json", "--measurements", "tape.yaml", "--json").data["best"] == "L"
     assert "at most 0.0 mm from what the rules ask for" in vto("pattern", "skirt.json", "--sizes", "S,M").out
     assert vto("pattern", "skirt.json", "--sizes", "S", "-o", "skirt.json").code == 2

@@ -62,7 +62,7 @@ def _panel(a: Panel, b: Panel, share: float) -> Panel:
     _check(a, len(a.notches), len(b.notches), "notches")
     _check(a, [len(one.curves) for one in a.lines], [len(one.curves) for one in b.lines], "lines inside")
     _check(a, len(a.cut), len(b.cut), "edges of the cut line")
-    _check(a, np.shape(a.drills), np.shape(b.drills), "drill holes")
+    _check(a, _count(a.drills), _count(b.drills), "drill holes")
     lines = (
         InnerLine(one.kind, _edges(a.name, one.curves, two.curves, share))
         for one, two in zip(a.lines, b.lines, strict=True)
@@ -88,6 +88,10 @@ def _panel(a: Panel, b: Panel, share: float) -> Panel:
 def _check(panel: Panel, one: object, two: object, what: str) -> None:
     if one != two:
         raise InputError(f"panel {panel.name!r}: {one} and {two} {what} in the two patterns")
+
+
+def _count(points: FloatArray | None) -> int:
+    return 0 if points is None else len(points)
 
 
 def _edges(name: str, one: tuple[Edge, ...], two: tuple[Edge, ...], share: float) -> tuple[Edge, ...]:

@@ -31,6 +31,7 @@ class SizeRules(Config):
     panels: dict[str, Part] = Field(description="Name of a panel, with * and ?, -> its part; the first that fits holds")
     sex: Literal["female", "male"] = Field("female", description="Whose letter sizes: EN 13402-3 has two tables")
     allowances: str = Field(description="Kind of garment in the table of wearing ease")
+    may_be_loose: list[str] = Field([], description="Zones that may be any wider than the table says: flared by design")
     girth_shares: dict[Girth, float] = Field({}, description="Step of a girth as a share of the step of the chest")
     lengths_mm: dict[Length, float] = Field({}, description="Step of a length from one size to the next [mm]")
     source: str = Field(description="Where the steps come from")

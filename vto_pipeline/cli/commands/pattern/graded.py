@@ -12,10 +12,9 @@ from vto_pipeline.garment.sizes.grade import SizeRow, grade
 from vto_pipeline.garment.sizes.rules import SizeRules, guess_rules, read_rules
 from vto_pipeline.io.documents import write_json
 from vto_pipeline.io.patterns.write import write_pattern
+from vto_pipeline.io.size_charts import SIZE_CHART
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.pattern import Pattern
-
-CHART = "size_chart.json"
 
 
 def graded_facts(
@@ -52,8 +51,8 @@ def graded_facts(
     written = [output / f"{_file_name(pattern.name)}_{row.size}{suffix}" for row in rows]
     for path, row in zip(written, rows, strict=True):
         write_pattern(path, made.of_size(row.size), job)
-    write_json(output / CHART, chart)
-    return {**chart, "written": [str(path) for path in (*written, output / CHART)]}
+    write_json(output / SIZE_CHART, chart)
+    return {**chart, "written": [str(path) for path in (*written, output / SIZE_CHART)]}
 
 
 def _file_name(name: str) -> str:
@@ -71,7 +70,7 @@ def _chart(name: str, rules: SizeRules, base: str, rows: Sequence[SizeRow]) -> d
         for row in rows
     }
     head = {"schema": 1, "name": name, "type": rules.garment, "allowances": rules.allowances, "base": base}
-    return {**head, "steps": rules.source, "sizes": sizes}
+    return {**head, "may_be_loose": rules.may_be_loose, "steps": rules.source, "sizes": sizes}
 
 
 def chart_lines(chart: dict[str, Any]) -> list[str]:
