@@ -120,5 +120,7 @@ def test_a_parameter_of_a_template_changes_the_measure_it_is_named_after(name, p
 def test_all_templates_of_others_are_measured():
     found = {path.stem: flat(foreign(json.loads(path.read_text()), path.stem)) for path in TEMPLATES}
     assert len(found) == 23
+    # its top seam runs from -10 to 25 units of a third of a centimetre; the cap bulges 1.5 cm beyond
+    assert found["tee"]["sleeve"] == pytest.approx(35 / 300)
     assert all("length" in one and ("chest" in one or "waist" in one) for one in found.values())
     assert all(0.1 < value < 1.5 for one in found.values() for name, value in one.items() if name != "shoulder")
