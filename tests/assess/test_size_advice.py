@@ -66,6 +66,14 @@ def test_tight_counts_twice_as_much_as_loose_and_the_middle_decides_a_tie():
     assert ranked(0.944) == ["S", "M"]
 
 
+def test_a_size_that_does_not_go_round_the_body_comes_last():
+    """By its misfit alone, 1.5 cm counted twice, it would be before one that is loose by 5.5 cm."""
+    run = {"S": {"waist": 0.795}, "M": {"waist": 0.87}}
+    ranked = rank_sizes(run, {"waist": 0.80}, {"waist": Allowance(0.01, 0.015, "")})
+    assert [(one.size, one.wearable) for one in ranked] == [("M", True), ("S", False)]
+    assert ranked[1].misfit < ranked[0].misfit
+
+
 def test_the_reason_is_in_words_and_zones_without_a_bound_only_need_room():
     wanted = {"waist": Allowance(0.02, 0.025, ""), "thigh": Allowance(0.025, None, "")}
     (one,) = rank_sizes(

@@ -13,7 +13,7 @@ from size_shapes import FOREIGN, foreign, tee, with_parameter
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.errors import InputError
 from vto_pipeline.garment.sizes.between import mesh_between, pattern_between
-from vto_pipeline.io.patterns.loops import edges_points
+from vto_pipeline.io.patterns.loops import edges_length, edges_points
 from vto_pipeline.model.body import Measurements
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.pattern import Edge, Notch
@@ -58,6 +58,7 @@ def test_curves_of_different_points_and_angles_across_the_turn():
 
     made = pattern_between(disc(0.1, 40, 3.1), disc(0.2, 60, -3.1), 0.5).panels[0]
     assert np.linalg.norm(edges_points(made.edges[1:], 1e-4), axis=1) == pytest.approx(0.15, rel=2e-3)
+    assert edges_length(made.edges[1:]) == pytest.approx(0.15 * np.pi, rel=2e-3)
     assert abs(made.notches[0].angle) == pytest.approx(np.pi, abs=1e-9)
     arcs = [Edge("arc", np.array([[0, 0], [1.0, 0]]), np.tan(angle / 4)) for angle in (0.4, 1.2)]
     panels = [replace(tee().panels[0], edges=(a, Edge("polyline", a.points[::-1])), notches=()) for a in arcs]
