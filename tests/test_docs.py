@@ -15,6 +15,7 @@ from vto_pipeline.bench.docs.prose import LONGEST, count_words, long_sentences, 
 from vto_pipeline.bench.docs.results import Results
 from vto_pipeline.bench.sample_runs import SAMPLES
 from vto_pipeline.errors import ConfigError, InputError
+from vto_pipeline.garment.sizes.rules import read_rules
 from vto_pipeline.io.bodies.measurements import read_measurements
 from vto_pipeline.io.captures.photos import read_board
 from vto_pipeline.io.fabrics import read_fabric
@@ -190,6 +191,7 @@ def test_examples_are_read_as_they_stand(page, block, tmp_path):
         "instrument": lambda: read_fabric(path),
         "sex": lambda: read_measurements(path),
         "columns": lambda: read_board(path),
+        "garment": lambda: read_rules(str(path)),
         "frames_per_second": lambda: parse_keyframes(str(path)),
     }
     assert kinds[first_key(block)]()

@@ -76,3 +76,44 @@ def test_a_folder_gives_a_row_for_each_file(vto):
     Path("none").mkdir()
     assert vto("pattern", "none").code == 3
     assert vto("pattern", "all", "-o", "x.svg").code == 2
+
+
+def write_skirt(path: Path) -> None:
+    """Two trapezoids of GarmentCode, 36 cm wide at the waist, 50 cm at the hem, 60 cm long, sewn along their sides."""
+    corners = [[-25, 0], [25, 0], [18, 60], [-18, 60]]
+    edges = [{"endpoints": [k, (k + 1) % 4]} for k in range(4)]
+    panels = {name: {"vertices": corners, "edges": edges} for name in ("front", "back")}
+    stitches = [[{"panel": "front", "edge": a}, {"panel": "back", "edge": 4 - a}] for a in (1, 3)]
+    path.write_text(json.dumps({"pattern": {"panels": panels, "stitches": stitches}, "properties": {}}))
+
+
+def test_flat_measurements_are_printed_where_the_type_is_known(vto):
+    write_skirt(Path("skirt.json"))
+    flat = vto("pattern", "skirt.json", "--json").data["flat"]
+    assert (flat["type"], flat["because"]) == ("skirt", "'skirt' is in its name")
+    measured = {name: one["mm"] for name, one in flat["sizes"][""].items()}
+    assert measured == pytest.approx({"waist": 360, "hem": 500, "hip": 360 + 140 / 3, "length": 600})
+    assert "waist       360.0   upper edge of front, back, half of it" in vto("pattern", "skirt.json").out
+    assert vto("info", "skirt.json", "--json").data["flat_waist_m"] == pytest.approx(0.36)
+    Path("skirt.json").rename("P1043.json")
+    assert "unknown" in vto("pattern", "P1043.json", "--json").data["flat"]
+    assert "state it with --type" in vto("pattern", "P1043.json").out
+    assert vto("pattern", "P1043.json", "--type", "skirt", "--json").data["flat"]["because"] == "as stated"
+    assert vto("pattern", "P1043.json", "--type", "trousers").code == 4
+    assert vto("pattern", "P1043.json", "--type", "skort").code == 2
+
+
+def test_sizes_are_written_with_their_chart(vto):
+    write_skirt(Path("skirt.json"))
+    said = vto("pattern", "skirt.json", "--sizes", "L,S", "-o", "run", "--format", "dxf", "--json")
+    assert said.code == 0
+    assert [Path(one).name for one in said.data["written"]] == ["skirt_S.dxf", "skirt_L.dxf", "size_chart.json"]
+    chart = json.loads(Path("run/size_chart.json").read_text())
+    waists = {size: row["flat_mm"]["waist"] for size, row in chart["sizes"].items()}
+    assert waists == pytest.approx({"S": 360 - 40, "L": 360 + 42.5}, abs=0.1)  # EN 13402: bust 86 and 102.5, M 94 cm
+    read = vto("pattern", "run/skirt_L.dxf", "--json").data["flat"]["sizes"]["L"]
+    assert read["waist"]["mm"] == pytest.approx(402.5, abs=0.1)
+    Path("tape.yaml").write_text("measurements: {waist_girth: 79}\n")  # the waist of L is 80.5 cm
+    assert vto("advise", "run/size_chart.json", "--measurements", "tape.yaml", "--json").data["best"] == "L"
+    assert "at most 0.0 mm from what the rules ask for" in vto("pattern", "skirt.json", "--sizes", "S,M").out
+    assert vto("pattern", "skirt.json", "--sizes", "S", "-o", "skirt.json").code == 2

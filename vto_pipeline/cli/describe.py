@@ -93,16 +93,20 @@ def _video(path: Path, job: Job) -> dict[str, Any]:
 
 
 def _pattern(path: Path, job: Job) -> dict[str, Any]:
+    from vto_pipeline.cli.commands.pattern.flat_lines import flat_facts
     from vto_pipeline.cli.commands.pattern.lines import pattern_facts
     from vto_pipeline.io.patterns.read import read_pattern
 
-    facts = pattern_facts(read_pattern(path, job=job))
+    pattern = read_pattern(path, job=job)
+    facts, flat = pattern_facts(pattern), flat_facts(pattern, None)
+    first: dict[str, Any] = next(iter(flat.get("sizes", {}).values()), {})  # vto pattern has all sizes
     return {
         "panels": len(facts["panels"]),
         "seams": len(facts["seams"]),
         "sizes": ", ".join(facts["sizes"]),
         "unit": facts["unit"],
         "cloth_m2": 1e-4 * sum(panel["area_cm2"] for panel in facts["panels"]),
+        **{f"flat_{name}_m": 1e-3 * one["mm"] for name, one in first.items()},
     }
 
 

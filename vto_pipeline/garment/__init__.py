@@ -8,4 +8,5 @@ simulation_mesh: the mesh that is simulated
 photographed/: the garment held beside the photos
 wearable: whether a surface can be a garment at all
 pattern/: sewing patterns as garments
+sizes/: flat measurements of a pattern, and the pattern in other sizes
 """

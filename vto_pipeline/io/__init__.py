@@ -6,6 +6,7 @@ patterns/: sewing patterns in and out
 captures/, bodies/, motion/: what cameras deliver; what is known of a body, and how it moves
 runs/: the artifacts of a run
 animations: moving pictures
+size_charts: flat measurements of each size
 sniff: what a path holds
 sandbox: untrusted bytes are parsed in a limited child process
 files, arrays, documents, text_numbers: what readers and writers share

@@ -1,7 +1,8 @@
 """One file a command.
 
 scan, fit, drape, run, batch: what makes something
-pattern/: a sewing pattern measured, and written in another format
+pattern/: a sewing pattern measured, and written in another format or in other sizes
+between/, advise/: the size between two; which size to take
 motion/: a motion measured, and carried over to an avatar
 status, info, plan, stages, schema, doctor: what only looks
 report, prune, cancel, bench: the page again, room on the disk, an end, measurements

@@ -21,10 +21,19 @@ def chest_range(letter: str, sex: str) -> tuple[float, float]:
     """
     if sex not in _BORDERS_CM:
         raise InputError(f"size {letter} of sex {sex!r}: size letters differ between women and men", hint="set sex:")
+    at = letter_number(letter)
+    low, high = _BORDERS_CM[sex][at : at + 2]
+    return low / 100, high / 100
+
+
+def letter_number(letter: str) -> int:
+    """Return which in the row of letters a size is; one more is the next larger size.
+
+    Raises:
+        InputError: no such letter.
+    """
     written = letter.strip().upper()
     written = _OTHER_WRITING.get(written, written)
     if written not in _LETTERS:
         raise InputError(f"size {letter!r} is not known; expected {', '.join(_LETTERS)}")
-    at = _LETTERS.index(written)
-    low, high = _BORDERS_CM[sex][at : at + 2]
-    return low / 100, high / 100
+    return _LETTERS.index(written)

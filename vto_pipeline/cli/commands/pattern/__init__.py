@@ -1,7 +1,8 @@
 """vto pattern.
 
 command: the command
-lines: a sewing pattern in tables and as JSON
+lines, flat_lines: a sewing pattern in tables and as JSON; its flat measurements
+graded: a pattern in other sizes
 """
 
 from vto_pipeline.cli.commands.pattern.command import pattern_command

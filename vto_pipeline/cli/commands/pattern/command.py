@@ -20,27 +20,46 @@ if TYPE_CHECKING:
 
 @click.command("pattern")
 @click.argument("paths", metavar="PATH...", type=PATH, nargs=-1, required=True)
-@click.option("-o", "--output", type=PATH, metavar="FILE", help="Write the pattern: .dxf, .svg or .json.")
+@click.option("-o", "--output", type=PATH, metavar="PATH", help="Write a .dxf, .svg or .json; with --sizes, a folder.")
 @click.option("--size", metavar="NAME", help="Take the panels of one size. [default: all]")
+@click.option("--type", "kind", metavar="TYPE", help="Type of garment, or a file of size rules. [default: by name]")
+@click.option("--sizes", metavar="S,M,L", help="Grade to these sizes, by the rules of the type.")
+@click.option("--base", default="M", show_default=True, metavar="SIZE", help="The size that others are graded from.")
+@click.option("--format", "form", type=click.Choice(("json", "dxf", "svg")), default="json", help="Of graded sizes.")
 @click.option("--unit", type=click.Choice(sorted(LENGTH_M)), help="Unit of length, in place of the file's.")
 @message_options
 @pass_session
 def pattern_command(
-    session: Session, paths: tuple[Path, ...], output: Path | None, size: str | None, unit: str | None
+    session: Session,
+    paths: tuple[Path, ...],
+    output: Path | None,
+    size: str | None,
+    kind: str | None,
+    sizes: str | None,
+    base: str,
+    form: str,
+    unit: str | None,
 ) -> None:
-    """Measure a sewing pattern, and write it in another format.
+    """Measure a sewing pattern, and write it in another format or in other sizes.
 
     Reads DXF after AAMA and ASTM D6673, SVG, and JSON of GarmentCode. Several files, or a folder, give a table with a
     row for each.
 
     \b
     vto pattern tee.json
+    vto pattern P1043.dxf --type trousers
     vto pattern shirt.dxf --size M -o shirt_M.svg
+    vto pattern tee.json --sizes S,M,L,XL --base M -o tee_sizes/ --format dxf
     vto pattern patterns/
     """
     files = _files(paths)
+    if sizes is not None:
+        if len(files) != 1 or size is not None:
+            raise ConfigError("--sizes takes one pattern, and does not go with --size")
+        _grade(session, files[0], kind, [one.strip() for one in sizes.split(",")], base, form, output, unit)
+        return
     if len(paths) == 1 and not paths[0].is_dir():
-        _describe(session, files[0], output, size, unit)
+        _describe(session, files[0], output, size, kind, unit)
         return
     if output is not None:
         raise ConfigError(f"--output takes one pattern, and {len(files)} are given")
@@ -68,7 +87,31 @@ def _files(paths: Sequence[Path]) -> list[Path]:
     return found
 
 
-def _describe(session: Session, path: Path, output: Path | None, size: str | None, unit: str | None) -> None:
+def _grade(
+    session: Session,
+    path: Path,
+    kind: str | None,
+    sizes: Sequence[str],
+    base: str,
+    form: str,
+    output: Path | None,
+    unit: str | None,
+) -> None:
+    from vto_pipeline.cli.commands.pattern.graded import chart_lines, graded_facts
+    from vto_pipeline.io.patterns.read import read_pattern
+    from vto_pipeline.model.job import Job
+
+    job = Job()
+    pattern = read_pattern(path, unit=unit, job=job)
+    facts = graded_facts(pattern, kind, sizes, base, f".{form}", output, job)
+    lines = [*chart_lines(facts), *job.notes, *(f"written: {one}" for one in facts.get("written", ()))]
+    session.answer({"path": str(path), **facts, "notes": job.notes}, lines)
+
+
+def _describe(
+    session: Session, path: Path, output: Path | None, size: str | None, kind: str | None, unit: str | None
+) -> None:
+    from vto_pipeline.cli.commands.pattern.flat_lines import flat_facts, flat_lines
     from vto_pipeline.cli.commands.pattern.lines import pattern_facts, pattern_lines
     from vto_pipeline.io.patterns.read import read_pattern
     from vto_pipeline.io.patterns.write import write_pattern
@@ -80,11 +123,12 @@ def _describe(session: Session, path: Path, output: Path | None, size: str | Non
         if output.resolve() == path.resolve():
             raise ConfigError("the output would overwrite the input", where=str(output))
         write_pattern(output, pattern, job)
-    facts = {"path": str(path), **pattern_facts(pattern), "notes": job.notes}
+    flat = flat_facts(pattern, kind)
+    facts = {"path": str(path), **pattern_facts(pattern), "flat": flat, "notes": job.notes}
     if output is not None:
         facts["written"] = str(output)
-    lines = [f"{path}: {pattern.name}, unit: {pattern.unit}", *pattern_lines(pattern), "", *job.notes]
-    session.answer(facts, [*lines, *([f"written: {output}"] if output else [])])
+    lines = [f"{path}: {pattern.name}, unit: {pattern.unit}", *pattern_lines(pattern), "", *flat_lines(flat), ""]
+    session.answer(facts, [*lines, *job.notes, *([f"written: {output}"] if output else [])])
 
 
 def _sized(pattern: Pattern, size: str | None) -> Pattern:
