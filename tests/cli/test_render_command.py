@@ -21,7 +21,7 @@ def tent() -> Path:
 
 
 def test_views_are_drawn_beside_a_mesh(vto, tent):
-    said = vto("render", tent, "--views", "front, back,front", "--size", 96, "--json")
+    said = vto("render", tent, "--views", "front, back,front", "--size", 96, "--json", "-q")
     assert said.code == 0
     assert list(said.data["pictures"]) == ["front", "back"]
     for name, one in said.data["pictures"].items():

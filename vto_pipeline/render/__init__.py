@@ -2,5 +2,6 @@
 
 dress, transfer: the render mesh rides on the simulation mesh
 pictures, frames: pictures without a display, and what they frame
+pixels: the kernel that draws them
 shading, shadows, surface_colors, tint, marks: how surfaces look in them
 """

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from vto_pipeline.cli.options import PATH, message_options
+from vto_pipeline.cli.options import PATH, message_options, quiet_option
 from vto_pipeline.cli.session import Session, pass_session
 
 _LARGEST_PX = 4096
@@ -33,6 +33,7 @@ def _names(ctx: click.Context, param: click.Parameter, value: str) -> list[str]:
     "--turntable", type=PATH, metavar="FILE.mp4|gif", help="Also a turn of 72 frames, 24 a second; at most 960 px high."
 )
 @click.option("-o", "folder", type=PATH, help="Where to; RUN/out/pictures, or `pictures` beside FILE.")
+@quiet_option
 @message_options
 @pass_session
 def render_command(
