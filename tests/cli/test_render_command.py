@@ -50,11 +50,11 @@ def test_a_turn_has_all_its_frames(vto, tent, name):
 
 
 def test_a_file_for_web_pages_holds_the_mesh(vto, tent):
-    said = vto("render", tent, "--views", "", "--web", "small.glb", "--json")
+    said = vto("render", tent, "--views", "", "--web", "new/small.glb", "--json")
     assert said.code == 0
     assert (said.data["web"]["triangles"], said.data["web"]["moved_out_of_body"]) == (4, 0)
-    assert Path("small.glb").stat().st_size == pytest.approx(1e6 * said.data["web"]["mb"], abs=500)
-    (left, right) = (read_mesh(one) for one in (tent, Path("small.glb")))
+    assert Path("new/small.glb").stat().st_size == pytest.approx(1e6 * said.data["web"]["mb"], abs=500)
+    (left, right) = (read_mesh(one) for one in (tent, Path("new/small.glb")))
     np.testing.assert_allclose(right.vertices, left.vertices, atol=1e-5)  # half a step of 0.6 m in 65535
 
 
@@ -72,6 +72,16 @@ def test_what_cannot_be_drawn_is_refused(vto, tent, arguments, code, text):
     said = vto("render", *arguments)
     assert (said.code, text in said.err) == (code, True)
     assert not Path("pictures").exists()
+
+
+@pytest.mark.parametrize(("source", "name"), [("tent.glb", "./tent.glb"), (".", "out/tent.glb")])
+def test_what_it_is_made_from_is_not_replaced(vto, source, name):
+    Path("out").mkdir()
+    for path in (Path("tent.glb"), Path("out/tent.glb")):
+        path.write_bytes(b"glTF")
+    said = vto("render", source, "--views", "", "--web", name)
+    assert (said.code, "would replace what it is made from" in said.err) == (2, True)
+    assert Path(name).read_bytes() == b"glTF"
 
 
 def test_a_run_without_a_surface_is_refused(vto):

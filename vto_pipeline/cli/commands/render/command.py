@@ -65,7 +65,7 @@ def render_command(
     if turntable is not None:
         animation_writer(turntable)
     if web is not None:
-        check_name(web)
+        check_name(path, web)
     meshes, beside = meshes_of(path)
     written: dict[str, Any] = draw_views(session, meshes, views, size, folder or beside)
     if turntable is not None:

@@ -8,20 +8,24 @@ from pathlib import Path
 from typing import Any
 
 from vto_pipeline.errors import ConfigError
+from vto_pipeline.io.files import resolved
 from vto_pipeline.model.render import GlbPart
 
 TRIANGLES, SIDE_PX = 100_000, 2048
 """Most triangles of the file, and pixels of a picture's longer side."""
 
 
-def check_name(path: Path) -> None:
-    """Refuse a name that does not end with .glb.
+def check_name(source: Path, path: Path) -> None:
+    """Refuse a name that does not end with .glb, and one that would overwrite what is read.
 
     Raises:
-        ConfigError: it does not.
+        ConfigError: it is such a name.
     """
     if path.suffix.lower() != ".glb":
         raise ConfigError(f"{path.name!r} is not a name for a web page's file", hint="its name ends with .glb")
+    taken = resolved(path)
+    if taken == resolved(source) or taken.parent == resolved(source / "out"):
+        raise ConfigError("the file for web pages would replace what it is made from", where=str(path))
 
 
 def write_web(source: Path, path: Path) -> dict[str, Any]:
@@ -35,6 +39,7 @@ def write_web(source: Path, path: Path) -> dict[str, Any]:
 
     began = time.perf_counter()
     parts, moved = clear_body(thin_parts(_parts(source), TRIANGLES))
+    path.parent.mkdir(parents=True, exist_ok=True)
     quality = write_web_glb(path, shrink_pictures(parts, SIDE_PX))
     return {
         "file": str(path),
