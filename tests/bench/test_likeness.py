@@ -7,8 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.ndimage import gaussian_filter
 
+from vto_pipeline.bench.scan.drawn import draw, draw_vertex_colors, sample
 from vto_pipeline.bench.scan.likeness import likeness, seam_steps
-from vto_pipeline.bench.scan.look import draw, sample
+from vto_pipeline.bench.scan.look import as_row
 from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.texture import TexturedMesh
@@ -49,6 +50,14 @@ def test_only_what_is_asked_for_is_compared() -> None:
     assert found["compared_share"] == 0.5
 
 
+def test_a_row_names_the_bars_that_are_missed() -> None:
+    good, poor = ({"psnr_db": 27.0, "ssim": 0.86, "sharpness": share} for share in (0.9, 0.5))
+    assert as_row("texture", [good], 1.0, {})["missed"] is None
+    row = as_row("texture", [good, poor], 1.0, {})
+    assert row["missed"] == "sharpness 0.7 < 0.8"
+    assert row["sharpness_worst"] == 0.5
+
+
 def square(gap: float) -> TexturedMesh:
     """A square of two triangles before the camera, with its picture upright; the second one's place moved."""
     points = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
@@ -75,3 +84,18 @@ def test_a_square_is_drawn_where_the_camera_sees_it() -> None:
     assert seen.sum() == 400
     expected = 250 * (0.25 + 0.5 * (np.arange(20) + 0.5) / 20)
     assert_allclose(picture[15, 10:30, 0], expected, atol=2)  # half a texel, and bytes
+
+
+def test_colors_of_vertices_are_drawn_as_perspective_has_it() -> None:
+    """On a square tilted away, halfway in the picture is not halfway on the square."""
+    points = np.array([[-1.0, -1, 1], [1, -1, -1], [1, 1, -1], [-1, 1, 1]])
+    ramp = np.repeat(np.array([[0], [240], [240], [0]], np.uint8), 3, axis=1)
+    mesh = TriangleMesh(points, np.array([[0, 1, 2], [0, 2, 3]]), ramp)
+    camera = Intrinsics(40, 40, 40.0, 40.0, 19.5, 19.5)
+    pose = np.diag([1.0, -1.0, -1.0, 1.0])
+    pose[2, 3] = 4.0
+    picture = draw_vertex_colors(mesh, camera, pose)
+    slope = (np.arange(10, 26) - 19.5) / 40  # x / depth, where depth = 4 + x, so x = 4 slope / (1 - slope)
+    expected = 120 * (1 + 4 * slope / (1 - slope))
+    assert_allclose(picture[20, 10:26, 1], expected, atol=1.5)  # bytes, and samples within a pixel
+    assert (picture[20, :6] == 0).all()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from vto_pipeline.io.meshes import write_ply
+from vto_pipeline.io.meshes import read_mesh, write_ply
 from vto_pipeline.model.mesh import TriangleMesh
 
 
@@ -21,7 +21,7 @@ def tent() -> Path:
 
 
 def test_views_are_drawn_beside_a_mesh(vto, tent):
-    said = vto("render", tent, "--views", "front, back,front", "--size", 96, "--json")
+    said = vto("render", tent, "--views", "front, back,front", "--size", 96, "--json", "-q")
     assert said.code == 0
     assert list(said.data["pictures"]) == ["front", "back"]
     for name, one in said.data["pictures"].items():
@@ -49,11 +49,21 @@ def test_a_turn_has_all_its_frames(vto, tent, name):
         assert video.get(cv2.CAP_PROP_FPS) == pytest.approx(24.0)
 
 
+def test_a_file_for_web_pages_holds_the_mesh(vto, tent):
+    said = vto("render", tent, "--views", "", "--web", "new/small.glb", "--json")
+    assert said.code == 0
+    assert (said.data["web"]["triangles"], said.data["web"]["moved_out_of_body"]) == (4, 0)
+    assert Path("new/small.glb").stat().st_size == pytest.approx(1e6 * said.data["web"]["mb"], abs=500)
+    (left, right) = (read_mesh(one) for one in (tent, Path("new/small.glb")))
+    np.testing.assert_allclose(right.vertices, left.vertices, atol=1e-5)  # half a step of 0.6 m in 65535
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "text"),
     [
         (["tent.ply", "--views", "top"], 2, "no view 'top'; allowed: front, side, back, closeup"),
         (["tent.ply", "--turntable", "turn.avi"], 2, "'turn.avi' cannot hold a moving picture"),
+        (["tent.ply", "--web", "small.gltf"], 2, "'small.gltf' is not a name for a web page's file"),
         (["tent.ply", "--size", "10"], 2, "64<=x<=4096"),
         (["none.ply"], 3, "no such file"),
     ],
@@ -64,7 +74,19 @@ def test_what_cannot_be_drawn_is_refused(vto, tent, arguments, code, text):
     assert not Path("pictures").exists()
 
 
+@pytest.mark.parametrize(("source", "name"), [("tent.glb", "./tent.glb"), (".", "out/tent.glb")])
+def test_what_it_is_made_from_is_not_replaced(vto, source, name):
+    Path("out").mkdir()
+    for path in (Path("tent.glb"), Path("out/tent.glb")):
+        path.write_bytes(b"glTF")
+    said = vto("render", source, "--views", "", "--web", name)
+    assert (said.code, "would replace what it is made from" in said.err) == (2, True)
+    assert Path(name).read_bytes() == b"glTF"
+
+
 def test_a_run_without_a_surface_is_refused(vto):
     assert vto("run", "toy.yaml", "-o", "RUN").code == 0
     said = vto("render", "RUN")
+    assert (said.code, "nothing that can be drawn" in said.err) == (3, True)
+    said = vto("render", "RUN", "--views", "", "--web", "small.glb")
     assert (said.code, "nothing that can be drawn" in said.err) == (3, True)

@@ -61,6 +61,23 @@ def test_pictures_of_several_parts_are_one_picture(tmp_path: Path) -> None:
     assert_allclose(mesh.texture[count : 2 * count], parts[1].visual.uv[parts[1].faces], rtol=0, atol=1e-6)
 
 
+def test_a_part_without_places_in_the_picture_has_its_plain_colour(tmp_path: Path) -> None:
+    picture = RNG.integers(0, 256, (32, 48, 3)).astype(np.uint8)
+    bare = part(2.0, None)
+    bare.visual = trimesh.visual.TextureVisuals(material=bare.visual.material)
+    mesh = read_mesh(written(tmp_path / "a.glb", part(0.0, picture), bare), unit="m")
+    assert mesh.texture is None  # for not every corner has a place of its own
+    assert mesh.skin is not None
+    found, count = color_at(mesh.skin.picture, mesh.skin.places), len(bare.faces)
+    assert (found[:count] == color_at(picture, part(0.0, picture).visual.uv[bare.faces])).all()
+    linear = np.array([64, 128, 255]) / 255
+    assert_allclose(found[count:], np.broadcast_to(255 * (1.055 * linear ** (1 / 2.4) - 0.055), (count, 3, 3)), atol=1)
+    painted = part(2.0, None)
+    painted.visual = trimesh.visual.ColorVisuals(painted, vertex_colors=RNG.integers(0, 256, (8, 4)).astype(np.uint8))
+    beside = read_mesh(written(tmp_path / "b.glb", part(0.0, picture), painted), unit="m")
+    assert beside.skin is None  # one plain colour would be wrong
+
+
 def test_one_picture_may_repeat(tmp_path: Path) -> None:
     picture = RNG.integers(0, 256, (16, 16, 3)).astype(np.uint8)
     wide = part(0.0, picture)

@@ -10,7 +10,7 @@ from vto_pipeline.model.mesh import Skin, TriangleMesh
 from vto_pipeline.render.frames import Frame, bounds, frame_box, frame_turn, frame_view
 from vto_pipeline.render.pictures import render_picture
 from vto_pipeline.render.shading import KEY_LIGHT
-from vto_pipeline.render.shadows import ShadowMap
+from vto_pipeline.render.shadows import lit_share, shadow_map
 from vto_pipeline.render.tint import tint
 
 
@@ -57,7 +57,8 @@ def test_the_shadow_of_a_square_has_its_area_and_place() -> None:
     corners = np.array([[-right - up, right - up, right + up], [-right - up, right + up, -right + up]])
     along = np.linspace(-1.5, 1.5, 301)
     places = along[:, None] * right - 0.5 * KEY_LIGHT
-    lit = ShadowMap(corners, KEY_LIGHT).lit(places, np.broadcast_to(KEY_LIGHT, places.shape))
+    shadow = shadow_map(corners, KEY_LIGHT)
+    lit = np.array([lit_share(shadow, *place, *KEY_LIGHT) for place in places])
     dark_width = (1.0 - lit).sum() * (along[1] - along[0])
     assert dark_width == pytest.approx(2.0, abs=0.01)
     assert (lit[np.abs(along) < 0.97] == 0.0).all()
@@ -76,7 +77,8 @@ def test_a_sheet_does_not_shade_itself(tilt_deg: float) -> None:
     )
     s = np.random.default_rng(0).uniform(-0.95, 0.95, (500, 2))
     places = s[:, :1] * right + s[:, 1:] * across
-    assert (ShadowMap(corners, KEY_LIGHT).lit(places, np.broadcast_to(normal, places.shape)) == 1.0).all()
+    shadow = shadow_map(corners, KEY_LIGHT)
+    assert all(lit_share(shadow, *place, *normal) == 1.0 for place in places)
 
 
 def test_what_stands_throws_a_shadow_on_the_ground_only() -> None:

@@ -9,13 +9,18 @@ from numba import njit
 @njit(cache=True)
 def bilinear(picture, x, y, channel):  # type: ignore[no-untyped-def]  # typed by Numba
     """Return a channel of a picture (H, W, D) at a place [px], pixel centres whole; beyond its edge, the edge's."""
-    height, width = picture.shape[:2]
-    x, y = min(max(x, 0.0), width - 1.0), min(max(y, 0.0), height - 1.0)
-    i, j = min(int(y), height - 2), min(int(x), width - 2)
-    v, u = y - i, x - j
+    i, j, v, u = bilinear_cell(picture.shape[0], picture.shape[1], x, y)
     above = (1.0 - u) * picture[i, j, channel] + u * picture[i, j + 1, channel]
     below = (1.0 - u) * picture[i + 1, j, channel] + u * picture[i + 1, j + 1, channel]
     return (1.0 - v) * above + v * below
+
+
+@njit(cache=True)
+def bilinear_cell(height, width, x, y):  # type: ignore[no-untyped-def]  # typed by Numba
+    """Return between which pixels a place lies: the upper row, the left column, and how far it is beyond both [px]."""
+    x, y = min(max(x, 0.0), width - 1.0), min(max(y, 0.0), height - 1.0)
+    i, j = min(int(y), height - 2), min(int(x), width - 2)
+    return i, j, y - i, x - j
 
 
 @njit(cache=True)

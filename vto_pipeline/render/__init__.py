@@ -1,6 +1,8 @@
 """The detailed garment after the drape, and pictures.
 
 dress, transfer: the render mesh rides on the simulation mesh
+web: the render mesh within the limits of a web page
 pictures, frames: pictures without a display, and what they frame
+pixels: the kernel that draws them
 shading, shadows, surface_colors, tint, marks: how surfaces look in them
 """

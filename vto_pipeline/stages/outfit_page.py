@@ -43,15 +43,20 @@ def outfit_page(stage: Stage, names: Sequence[str]) -> Stage:
             maps = list(found["fit_maps"].values())
             parts["fit_maps"] = {key: np.concatenate([one[key] for one in maps]) for key in maps[0]}
         if found["render_mesh"]:
-            every = [(name, part) for name, some in found["render_mesh"].items() for part in some]
-            parts["render_mesh"] = [_named_part(part, name, names) for name, part in every if part.name != BODY]
-            parts["render_mesh"] += [part for _, part in every if part.name == BODY][:1]  # all wear the same
+            parts["render_mesh"] = joined_parts(found["render_mesh"])
         parts["fit_reports"] = found["fit_report"]
         if "audit" in parts:
             parts["audit"] = {name: value for name, value in parts["audit"].items() if name != "layers"}
         return stage.run(parts, settings, job)
 
     return replace(stage, optional=(*_SHARED, *own), run=run)
+
+
+def joined_parts(garments: Mapping[str, Sequence[GlbPart]]) -> list[GlbPart]:
+    """Return the parts of several garments' render meshes, by their names, inner first, and their body once."""
+    names, every = list(garments), [(name, part) for name, some in garments.items() for part in some]
+    parts = [_named_part(part, name, names) for name, part in every if part.name != BODY]
+    return parts + [part for _, part in every if part.name == BODY][:1]  # all wear the same
 
 
 def _named_part(part: GlbPart, name: str, names: Sequence[str]) -> GlbPart:

@@ -2,5 +2,5 @@
 
 captures: capture folders on the command line, a row each
 truth: a scanned garment beside the true one
-look, likeness: a textured garment beside photos that it was not made from
+look, drawn, likeness: a textured garment beside photos that it was not made from
 """

@@ -1,27 +1,29 @@
 """How a textured garment looks beside photos that it was not made from.
 
-`python -m vto_pipeline.bench.scan.look RUN` takes a run from photos and leaves some of them out. It makes the texture
+`python -m vto_pipeline.bench.scan.look RUN...` takes runs from photos and leaves some out. It makes the texture
 again from the others, draws the garment where the left-out photos were taken, and compares. The cameras and the surface
-are the run's own, from all photos. Open3D's `project_images_to_albedo` gets the same surface, charts and photos.
+are the run's own, from all photos. Beside it stand the colours at the scan's vertices, which all photos gave, and
+Open3D's `project_images_to_albedo`, which gets the same surface, charts and photos. All are compared at the same
+pixels.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vto_pipeline.bench.bench import Value
+from vto_pipeline.bench.live_rows import LiveRows
+from vto_pipeline.bench.scan.drawn import draw, draw_vertex_colors, sample
 from vto_pipeline.bench.scan.likeness import likeness, seam_steps
 from vto_pipeline.geometry.rigid import transform_cameras, transform_mesh
-from vto_pipeline.geometry.topology import face_area_vectors
 from vto_pipeline.io.captures.cameras import read_cameras, read_matrix
 from vto_pipeline.io.captures.images import read_image
 from vto_pipeline.io.captures.photos import read_photos
@@ -29,21 +31,25 @@ from vto_pipeline.io.captures.undistort import undistorted
 from vto_pipeline.io.documents import read_json
 from vto_pipeline.io.meshes import read_own_mesh
 from vto_pipeline.io.runs.garments import read_labels
-from vto_pipeline.model.arrays import ByteArray, FloatArray
-from vto_pipeline.model.camera import CameraSet, Intrinsics
+from vto_pipeline.model.arrays import ByteArray
+from vto_pipeline.model.camera import CameraSet
 from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.texture import TexturedMesh
-from vto_pipeline.numerics.rasterise import rasterise
 from vto_pipeline.scan.texture.project import TextureConfig, texture_surface
 from vto_pipeline.scan.texture.views import look
 
-SAMPLES = 3
-"""Per pixel and direction, of a drawn picture."""
+BARS = {"psnr_db": 26.0, "ssim": 0.85, "sharpness": 0.80}
+"""The least likeness that is good enough, on average over the left-out photos."""
 
 CLEAR_PX = 2.0
 """Pixels nearer to the garment's outline are not compared: they show something else in part."""
+
+_COLUMNS = (
+    *("run", "method", "psnr_db", "ssim", "sharpness", "psnr_levelled_db", "wrong_share", "compared_share"),
+    *("seam_step_p95", "seconds", "missed"),
+)
 
 
 class Capture(NamedTuple):
@@ -79,34 +85,56 @@ def read_capture(run: Path) -> Capture:
     return Capture(read_own_mesh(out / "garment.ply"), surface, photos, cameras, form)
 
 
-def measure_look(capture: Capture, held: int, config: TextureConfig, folder: Path | None = None) -> dict[str, Any]:
-    """Return how like the left-out photos the garment is, ours and Open3D's.
+def measure_look(capture: Capture, held: int, config: TextureConfig, folder: Path) -> list[dict[str, Value]]:
+    """Return how like the left-out photos the garment is: with our texture, its vertices' colours, Open3D's texture.
 
     Args:
         capture: What a run made.
         held: How many photos are left out, evenly.
         config: Of the texture.
-        folder: Where each left-out photo is written beside ours and Open3D's, or None.
+        folder: Where each left-out photo is written beside these three.
+
+    Returns:
+        One row for each: "method", "seconds" and the figures of `likeness` and `seam_steps`; "missed" names the bars
+        that it misses.
     """
     count = len(capture.cameras.names)
     out = np.unique(np.rint((np.arange(held) + 0.5) * count / held).astype(int))
     kept = np.setdiff1d(np.arange(count), out)
-    job = Job()
-    began = time.perf_counter(), time.process_time()
+    began = time.perf_counter()
     ours = texture_surface(
-        capture.garment, capture.occluder, capture.photos, choose(capture.cameras, kept), config, job, capture.form
+        capture.garment, capture.occluder, capture.photos, choose(capture.cameras, kept), config, Job(), capture.form
     )
-    spent = time.perf_counter() - began[0], time.process_time() - began[1]
-    found: dict[str, Any] = {"held_out": [capture.cameras.names[k] for k in out], **job.metrics}
-    found["ours"] = {"seconds": spent[0], "cpu_seconds": spent[1], **_compare(capture, ours, out, config)}
-    began = time.perf_counter(), time.process_time()
+    spent = time.perf_counter() - began
+    began = time.perf_counter()
     theirs = _open3d(ours, capture, kept)
-    spent = time.perf_counter() - began[0], time.process_time() - began[1]
-    found["open3d"] = {"seconds": spent[0], "cpu_seconds": spent[1], **_compare(capture, theirs, out, config)}
-    if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)
-        _draw_beside(capture, (ours, theirs), out, folder)
-    return found
+    seconds = {"texture": spent, "open3d": time.perf_counter() - began}
+    found: dict[str, list[dict[str, float]]] = {"texture": [], "vertex_colors": [], "open3d": []}
+    paths = {path.name: path for path in capture.photos.paths}
+    for k in out:
+        name, camera, pose = capture.cameras.names[k], capture.cameras.intrinsics[k], capture.cameras.world_from_cam[k]
+        photo = undistorted(read_image(paths[name]), camera)
+        picture, seen = draw(ours, camera, pose)
+        pictures = {"texture": picture, "vertex_colors": draw_vertex_colors(capture.garment, camera, pose)}
+        pictures["open3d"] = draw(theirs, camera, pose)[0]
+        where = seen & (look(ours.mesh, capture.occluder, camera, pose, 1e-3 * config.slack_mm).inside > CLEAR_PX)
+        for method, drawn in pictures.items():
+            found[method].append(likeness(photo, drawn, where))
+        _write(np.hstack([photo, *pictures.values()]), folder / f"{Path(name).stem}.png")
+    _write(ours.picture, folder / "texture.png")
+    _write(theirs.picture, folder / "open3d.png")
+    steps = {"texture": seam_steps(ours, sample), "open3d": seam_steps(theirs, sample)}
+    return [as_row(method, each, seconds.get(method), steps.get(method, {})) for method, each in found.items()]
+
+
+def as_row(
+    method: str, each: Sequence[dict[str, float]], seconds: float | None, steps: dict[str, float]
+) -> dict[str, Value]:
+    """Return the means over photos, the worst of what has a bar, and which bars the means miss."""
+    mean = {name: float(np.mean([one[name] for one in each])) for name in each[0]}
+    worst = {f"{name}_worst": min(one[name] for one in each) for name in BARS}
+    missed = [f"{name} {mean[name]:.3g} < {bar:g}" for name, bar in BARS.items() if mean[name] < bar]
+    return {"method": method, "seconds": seconds, **mean, **worst, **steps, "missed": "; ".join(missed) or None}
 
 
 def choose(cameras: CameraSet, which: NDArray[np.int64]) -> CameraSet:
@@ -119,73 +147,11 @@ def choose(cameras: CameraSet, which: NDArray[np.int64]) -> CameraSet:
     )
 
 
-def draw(textured: TexturedMesh, camera: Intrinsics, world_from_cam: FloatArray) -> tuple[ByteArray, NDArray[np.bool_]]:
-    """Draw a textured mesh, unlit, as a camera without distortion sees it.
-
-    Returns:
-        sRGB, shape (H, W, 3), and which pixels show the outside, and texels that a photo had shown, shape (H, W).
-    """
-    fine = camera.without_distortion().resized(SAMPLES * camera.width, SAMPLES * camera.height)
-    cam_from_world = np.linalg.inv(world_from_cam)
-    local = textured.mesh.vertices @ cam_from_world[:3, :3].T + cam_from_world[:3, 3]
-    z = np.maximum(local[:, 2], 1e-6)
-    placed = np.column_stack([fine.fx * local[:, 0] / z + fine.cx, fine.fy * local[:, 1] / z + fine.cy, z])
-    face, weight, _ = rasterise(placed[textured.mesh.faces], fine.width, fine.height)
-    shown = face >= 0
-    share = np.column_stack([1.0 - weight[shown].sum(axis=1), weight[shown]])
-    corner = 1.0 / z[textured.mesh.faces[face[shown]]]  # interpolated as perspective has it
-    share = share * corner / (share * corner).sum(axis=1, keepdims=True)
-    assert textured.mesh.texture is not None
-    place = np.einsum("nk,nkd->nd", share, textured.mesh.texture[face[shown]])
-    outside = (
-        face_area_vectors(textured.mesh) * (world_from_cam[:3, 3] - textured.mesh.vertices[textured.mesh.faces[:, 0]])
-    ).sum(axis=1) > 0
-    picture, seen = np.zeros((fine.height, fine.width, 3)), np.zeros((fine.height, fine.width))
-    picture[shown] = sample(textured.picture, place)
-    seen[shown] = sample(np.where(textured.seen, 255, 0).astype(np.uint8)[..., None], place)[:, 0] > 128
-    seen[shown] *= outside[face[shown]]
-    block = (camera.height, SAMPLES, camera.width, SAMPLES)
-    whole = seen.reshape(block).min(axis=(1, 3)) > 0
-    return np.rint(picture.reshape(*block, 3).mean(axis=(1, 3))).astype(np.uint8), whole
-
-
-def sample(picture: ByteArray, place: FloatArray) -> FloatArray:
-    """Return a picture's colours at texture coordinates, v up, bilinearly, shape (N, D)."""
-    import cv2
-
-    height, width = picture.shape[:2]
-    x = (place[:, 0] * width - 0.5).astype(np.float32)
-    y = ((1.0 - place[:, 1]) * height - 0.5).astype(np.float32)
-    rows = -(-len(x) // 30_000)  # cv2 takes no longer columns
-    columns, lines = (np.resize(one, (rows, 30_000)) for one in (x, y))
-    found = cv2.remap(picture, columns, lines, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(found, dtype=np.float64).reshape(rows * 30_000, -1)[: len(x)]
-
-
-def _compare(capture: Capture, textured: TexturedMesh, out: NDArray[np.int64], config: TextureConfig) -> dict[str, Any]:
-    paths = {path.name: path for path in capture.photos.paths}
-    each = []
-    for k in out:
-        camera, pose = capture.cameras.intrinsics[k], capture.cameras.world_from_cam[k]
-        photo = undistorted(read_image(paths[capture.cameras.names[k]]), camera)
-        picture, seen = draw(textured, camera, pose)
-        view = look(textured.mesh, capture.occluder, camera, pose, 1e-3 * config.slack_mm)
-        each.append(likeness(photo, picture, seen & (view.inside > CLEAR_PX)))
-    mean = {name: float(np.mean([one[name] for one in each])) for name in each[0]}
-    worst = {f"{name}_worst": float(min(one[name] for one in each)) for name in ("psnr_db", "ssim", "sharpness")}
-    return {**mean, **worst, **seam_steps(textured, sample)}
-
-
-def _draw_beside(capture: Capture, textured: Sequence[TexturedMesh], out: NDArray[np.int64], folder: Path) -> None:
+def _write(picture: ByteArray, path: Path) -> None:
     from PIL import Image
 
-    paths = {path.name: path for path in capture.photos.paths}
-    for k in out:
-        camera, pose, name = capture.cameras.intrinsics[k], capture.cameras.world_from_cam[k], capture.cameras.names[k]
-        beside = [undistorted(read_image(paths[name]), camera)] + [draw(one, camera, pose)[0] for one in textured]
-        Image.fromarray(np.hstack(beside)).save(folder / f"{Path(name).stem}.png")
-    for one, name in zip(textured, ("ours", "open3d"), strict=True):
-        Image.fromarray(one.picture).save(folder / f"texture_{name}.png")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(picture).save(path)
 
 
 def _open3d(ours: TexturedMesh, capture: Capture, kept: NDArray[np.int64]) -> TexturedMesh:
@@ -211,17 +177,21 @@ def _open3d(ours: TexturedMesh, capture: Capture, kept: NDArray[np.int64]) -> Te
 
 
 def main() -> None:
-    """Read the command line, measure, and put the figures on stdout."""
+    """Read the command line, measure, and print a row for each run and method."""
     parser = argparse.ArgumentParser(prog="python -m vto_pipeline.bench.scan.look", description=__doc__)
-    parser.add_argument("run", type=Path, help="a run of `vto scan` or of a document, from photos")
+    parser.add_argument("run", type=Path, nargs="+", help="runs of `vto scan` or of a document, from photos")
     parser.add_argument("--held-out", type=int, default=4, metavar="N", help="photos that are left out")
     parser.add_argument("--set", nargs="*", default=[], metavar="KEY=VALUE", help="settings of the texture")
-    parser.add_argument("--pictures", type=Path, metavar="DIR", help="for pictures beside the photos")
+    parser.add_argument(
+        "--out", type=Path, default=Path("runs/looks"), metavar="DIR", help="for rows.jsonl, and pictures beside photos"
+    )
     arguments = parser.parse_args()
     config = TextureConfig.model_validate(dict(pair.split("=", 1) for pair in arguments.set))
-    found = measure_look(read_capture(arguments.run), arguments.held_out, config, arguments.pictures)
-    json.dump(found, sys.stdout, indent=1)
-    sys.stdout.write("\n")
+    table = LiveRows(arguments.out, _COLUMNS)
+    for number, run in enumerate(arguments.run):
+        folder = arguments.out / f"{number}_{run.name}"
+        for row in measure_look(read_capture(run), arguments.held_out, config, folder):
+            table.add({"run": str(run), **row})
 
 
 if __name__ == "__main__":

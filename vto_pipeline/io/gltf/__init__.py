@@ -5,4 +5,5 @@ read, skin: triangles of a scene; skeletons at rest
 pictures: base colours of a scene's parts, as one picture
 draco: compressed meshes, unpacked
 write, animate: parts with normals, colours, textures and materials; an avatar that moves
+quantise, web: coordinates in two bytes each; a file within a web page's limits
 """

@@ -29,8 +29,9 @@ _READ = (
     "EXT_texture_webp",
     "KHR_texture_basisu",
     "KHR_draco_mesh_compression",
+    "KHR_mesh_quantization",
 )
-"""Extensions that a file may require: they change no shape, or are unpacked (`io.gltf.draco`)."""
+"""Extensions that a file may require: they change no shape, need no more than accessors, or are unpacked."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +139,7 @@ def open_gltf(path: Path) -> GltfDocument:
         raise FormatError("not glTF 2.0: asset.version is missing or different", where=str(path))
     for name in parsed.get("extensionsRequired", []):
         if not str(name).startswith(_READ):
-            hint = "export without quantization, or compressed by Draco"
+            hint = "export without it, or compressed by Draco"
             raise FormatError(f"the extension {name} is not supported", where=str(path), hint=hint)
     document = GltfDocument(path, parsed, ())
     for image in document.items("images"):

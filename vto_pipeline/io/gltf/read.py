@@ -31,7 +31,8 @@ def parse_gltf(name: str) -> Arrays:
 
     Returns:
         vertices (V, 3), placed by their nodes; faces (F, 3); colors (V, 3) uint8 and texture (F, 3, 2), where every
-        part has them; with it, if there is any, picture (H, W, 3) uint8 and the places there (F, 3, 2); notes.
+        part has them; if there is any, picture (H, W, 3) uint8 and the places there (F, 3, 2), where those without
+        texture coordinates are of one colour; notes.
         Where every part hangs on one skin also joint_names, joints (J, 3), parents (J,), weights (V, J).
 
     Raises:
@@ -40,7 +41,7 @@ def parse_gltf(name: str) -> Arrays:
     document = unpack_draco(open_gltf(Path(name)))
     vertices, faces, notes = [], [], []
     colors: list[np.ndarray] = []
-    textures: list[np.ndarray] = []
+    textures: list[np.ndarray | None] = []
     parts = []
     count = 0
     worlds = dict(_placed_nodes(document))
@@ -67,7 +68,7 @@ def parse_gltf(name: str) -> Arrays:
             vertices.append(points)
             faces.append(triangles + count)
             colors += [] if color is None else [color]
-            textures += [] if texture is None else [texture[triangles]]
+            textures.append(None if texture is None else texture[triangles])
             parts.append(primitive)
             count += len(points)
     if not faces:
@@ -77,10 +78,17 @@ def parse_gltf(name: str) -> Arrays:
     arrays: Arrays = {"vertices": np.concatenate(vertices), "faces": np.concatenate(faces)}
     if len(colors) == len(faces):
         arrays["colors"] = np.concatenate(colors)
-    if len(textures) == len(faces):
-        arrays["texture"] = np.concatenate(textures)
+    placed = [place for place in textures if place is not None]
+    if len(placed) == len(faces):
+        arrays["texture"] = np.concatenate(placed)
+    if placed and all(
+        place is not None or "COLOR_0" not in part["attributes"] for place, part in zip(textures, parts, strict=True)
+    ):
+        every = [
+            np.full((len(f), 3, 2), 0.5) if place is None else place for place, f in zip(textures, faces, strict=True)
+        ]
         try:
-            shown = scene_picture(document, parts, textures)
+            shown = scene_picture(document, parts, every)
             if shown is not None:
                 arrays["picture"], arrays["places"] = shown
         except FormatError as e:  # the shape is whole without it

@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from vto_pipeline.errors import VtoError
+from vto_pipeline.errors import InputError, VtoError
 from vto_pipeline.model.mesh import Skin, TriangleMesh
 from vto_pipeline.model.render import GlbPart
 from vto_pipeline.numerics.srgb import encode_srgb
 from vto_pipeline.render.dress import BODY
 from vto_pipeline.render.tint import SKIN, tint
 from vto_pipeline.stages.entry.outcome import Outcome
+from vto_pipeline.stages.outfit_page import joined_parts
 
 _ALONE = ("garment", "garment_surface", "avatar", "fitted_avatar", "body_surface", "mannequin_surface", "surface")
 """What is shown of a run without a drape: the first of these that it made."""
@@ -47,6 +48,24 @@ def shown_meshes(name: str, value: Any) -> list[TriangleMesh]:
     if isinstance(value, tuple):
         return [_painted(part) for part in value if part.name != BODY]
     return [tint(value.final, SKIN)] if name.endswith("collider") else [value.mesh]
+
+
+def shown_parts(outcome: Outcome) -> list[GlbPart]:
+    """Return the parts of a run's render meshes, of all its garments, and their body once.
+
+    Raises:
+        InputError: it made none.
+    """
+    found = {
+        name.removesuffix("render_mesh").rstrip("_"): outcome.read(name)
+        for name in shown_artifacts(outcome, detailed=True)
+        if name.endswith("render_mesh")
+    }
+    if not found:
+        raise InputError(
+            "this run made no render mesh", where=str(outcome.folder), hint="`want: [render_mesh]`, or a drape"
+        )
+    return list(found[""]) if "" in found else joined_parts(found)
 
 
 def _made(outcome: Outcome) -> Iterator[str]:

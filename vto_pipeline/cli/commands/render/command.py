@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from vto_pipeline.cli.options import PATH, message_options
+from vto_pipeline.cli.options import PATH, message_options, quiet_option
 from vto_pipeline.cli.session import Session, pass_session
 
 _LARGEST_PX = 4096
@@ -32,28 +32,47 @@ def _names(ctx: click.Context, param: click.Parameter, value: str) -> list[str]:
 @click.option(
     "--turntable", type=PATH, metavar="FILE.mp4|gif", help="Also a turn of 72 frames, 24 a second; at most 960 px high."
 )
+@click.option(
+    "--web", type=PATH, metavar="FILE.glb", help="Also a GLB for web pages: 5 MB, 100,000 triangles, 2048 px at most."
+)
 @click.option("-o", "folder", type=PATH, help="Where to; RUN/out/pictures, or `pictures` beside FILE.")
+@quiet_option
 @message_options
 @pass_session
 def render_command(
-    session: Session, path: Path, views: list[str], size: int, turntable: Path | None, folder: Path | None
+    session: Session,
+    path: Path,
+    views: list[str],
+    size: int,
+    turntable: Path | None,
+    web: Path | None,
+    folder: Path | None,
 ) -> None:
     """Draw what a run made, or a mesh, without a display: garments with their textures on the body, soft shadows.
 
-    Pictures are three quarters as wide as they are high. An empty `--views ""` leaves only the turn.
+    Pictures are three quarters as wide as they are high. An empty `--views ""` leaves only the turn or the GLB.
+    Of a run, that holds garments and body, and no vertex of a garment is inside the body.
 
     \b
     vto render runs/demo --views front,closeup
     vto render runs/demo --turntable demo.mp4
+    vto render runs/demo --views "" --web demo.glb
     """
     from vto_pipeline.cli.commands.render.draw import draw_turn, draw_views, meshes_of
+    from vto_pipeline.cli.commands.render.web import check_name, write_web
     from vto_pipeline.io.animations import animation_writer
 
     if turntable is not None:
         animation_writer(turntable)
+    if web is not None:
+        check_name(path, web)
     meshes, beside = meshes_of(path)
     written: dict[str, Any] = draw_views(session, meshes, views, size, folder or beside)
     if turntable is not None:
         written["turntable"] = draw_turn(session, meshes, turntable, size)
     lines = [f"{name:10}{one['file']}  {one['seconds']:.1f} s" for name, one in written.items()]
-    session.answer({"pictures": written}, lines)
+    answer: dict[str, Any] = {"pictures": written}
+    if web is not None:
+        answer["web"] = made = write_web(path, web)
+        lines.append(f"{'web':10}{made['file']}  {made['mb']:.1f} MB, {made['triangles']} triangles")
+    session.answer(answer, lines)
