@@ -8,7 +8,7 @@ from cloth_scenes import ball, fabric
 from ipc_judge import crosses, self_crosses
 from numpy.testing import assert_allclose, assert_array_equal
 
-from vto_pipeline.cloth.drape import drape
+from vto_pipeline.cloth import MeshCollider, simulate
 from vto_pipeline.cloth.moving.follow import follow
 from vto_pipeline.errors import ConfigError, SimulationError
 from vto_pipeline.geometry.topology import submesh
@@ -45,13 +45,14 @@ def turned(angle, points):
 
 @pytest.fixture(scope="module")
 def cap():
-    """A cap on a ball, at rest: 60 degrees from the top."""
+    """A cap on a ball, at rest: about 50 degrees from the top."""
     shell = ball(1.04 * RADIUS, levels=3)
-    up = shell.vertices[:, 1] > 0.5 * RADIUS
+    up = shell.vertices[:, 1] > 0.65 * RADIUS
     mesh = submesh(shell, up[shell.faces].all(axis=1))[0]
-    garment = Garment(mesh, RestShape(mesh.vertices))
-    still = drape(garment, ball(RADIUS, levels=3), fabric(bending=1e-4, friction=0.6), {"target_residual": 0.003})
-    return Garment(still.mesh, garment.rest)
+    body = MeshCollider(ball(RADIUS, levels=3), friction=0.6)
+    still = simulate(mesh, cloth(), colliders=[body], seconds=4.0, settings={"until": "rest", "damping": 5.0})
+    assert still.report["settled"]
+    return Garment(TriangleMesh(still.positions, mesh.faces), RestShape(mesh.vertices))
 
 
 def cloth(friction=0.6):
@@ -66,8 +67,8 @@ def test_a_still_body_leaves_cloth_at_rest(cap):
 
 
 def test_cloth_is_carried_along_and_lies_as_before_when_all_is_still(cap):
-    """Half a metre in a second and to rest again; friction bears at most 6 m/s², and 2.9 are asked for."""
-    way = np.array([0.3, 0.4, 0.0])
+    """0.4 m in a second and to rest again; friction bears about 6 m/s², and 2.3 are asked for."""
+    way = np.array([0.4, 0.0, 0.0])
     motion, found = follow(cap, path(lambda t, x: x + smooth(t) * way, 2.0), cloth(), {"damping": 0.0})
     assert_allclose(motion.frames[-1] - way, cap.mesh.vertices, atol=2e-3)  # it slides by less than 2 %
     middle = motion.frames[15] - smooth(0.5) * way
@@ -97,29 +98,27 @@ def test_what_is_not_held_keeps_its_speed_when_the_body_is_taken_away(cap):
     def gone(t, x):
         return shifted(x, 0.5 * t, -(max(0.0, t) ** 2) * 30.0, 0.0)
 
-    motion, _ = follow(cap, path(gone, 0.2), cloth(), {"damping": 0.0})
+    motion, _ = follow(cap, path(gone, 0.3), cloth(), {"damping": 0.0})
     middle = motion.frames.mean(axis=1)
     speed = np.diff(middle, axis=0) * FPS
-    assert_allclose(np.diff(speed[2:, 1]) * FPS, -9.81, rtol=0.02)  # even steps: backward Euler falls so exactly
-    assert_allclose(speed[2:, 0], speed[2, 0], atol=0.01)
+    assert_allclose(np.diff(speed[3:, 1]) * FPS, -9.81, rtol=0.01)  # even steps: backward Euler falls so exactly
+    assert_allclose(speed[3:, 0], speed[3, 0], atol=0.01)
 
 
-def test_half_the_step_comes_nearer_to_the_limit(cap):
+def test_half_the_step_gives_the_same_motion(cap):
     def swung(t, x):
         return shifted(x, 0.03 * (1 - np.cos(2 * np.pi * t / 0.5)), 0.0, 0.0)
 
     ends = [
-        follow(cap, path(swung, 0.5), cloth(), {"substeps": n, "body_step_mm": 1000.0})[0].frames[-1]
-        for n in (1, 2, 4, 8)
+        follow(cap, path(swung, 0.5), cloth(), {"substeps": n, "body_step_mm": 1000.0})[0].frames[-1] for n in (1, 2, 4)
     ]
     gaps = [np.sqrt(((a - b) ** 2).sum(axis=1).mean()) for a, b in pairwise(ends)]
-    assert gaps[2] < 0.7 * gaps[0]
-    assert gaps[2] < 1e-3  # m
+    assert max(gaps) < 2e-4  # m; in half a step the ball moves by up to 3 mm
 
 
 def test_energy_stays_bounded_while_the_body_shakes(cap):
     """What the body gives is lost again by damping: the cloth never has more than some of its body's speed."""
-    amplitude, period = 0.02, 0.25
+    amplitude, period = 0.005, 0.25  # 3.2 m/s²: friction bears about 6
     top = 2 * np.pi * amplitude / period
 
     def shaken(t, x):
@@ -189,12 +188,14 @@ def test_frames_that_a_crash_left_broken_are_made_again(cap, tmp_path):
     assert FrameLog(tmp_path).frames == []
 
 
-def test_cloth_that_is_caught_ends_with_its_frame_and_keeps_those_before(cap):
+def test_cloth_that_is_caught_ends_with_its_frame_and_keeps_those_before():
+    mesh = ball(1.04 * RADIUS, levels=2)
+
     def torn(t, x):
         return x * (1.0 + 4.0 * np.clip(FPS * t - 3, 0, 1))
 
     with pytest.raises(SimulationError, match="caught in frame 4 of 7, at 0.13 s") as caught:
-        follow(cap, path(torn, 0.2), cloth(), {"attempts": 2})
+        follow(Garment(mesh, RestShape(mesh.vertices)), path(torn, 0.2), cloth(), {"attempts": 2})
     assert len(caught.value.partial["draped_motion"].frames) == 4
     assert caught.value.partial["motion_audit"]["frames"] == 4
 

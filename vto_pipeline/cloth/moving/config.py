@@ -29,5 +29,8 @@ class FollowConfig(StepConfig, Materials):
         4, ge=1, le=20, description="How often a frame is tried while cloth meets the body in it or overstretches"
     )
     stretch_limit: float = Field(
-        1.0, gt=0, le=10, description="Stretch of an edge beyond rest from which on the cloth counts as caught [share]"
+        1.0,
+        gt=0,
+        le=10,
+        description="Further stretch of an edge from which on the cloth counts as caught [share of its length at rest]",
     )

@@ -61,13 +61,12 @@ def follow(
     warm_up()
     model = build_cloth(garment.mesh, garment.rest, fabric, materials=config, job=job)
     stepper = FrameStepper(model, garment, path, fabric, config, job)
-    rest = garment.rest.positions
 
     def keep(*, steps: int, attempts: int, began: float) -> None:
         body, state = stepper.body_at(stepper.now.state.time), stepper.now.state
         found = audit_frame(
             model,
-            rest,
+            stepper.natural,
             state,
             body,
             own_crossings=len(self_intersections(body)),

@@ -20,11 +20,12 @@ from vto_pipeline.cloth.dynamics.stepper import Stepper
 from vto_pipeline.cloth.model.build import ClothModel, ClothState
 from vto_pipeline.cloth.moving.config import FollowConfig
 from vto_pipeline.cloth.moving.path_collider import PathCollider
-from vto_pipeline.cloth.placement.clear_body import longest_stretch
+from vto_pipeline.cloth.moving.frame_audit import stretch_of_edges
 from vto_pipeline.cloth.simulation import default_skin
 from vto_pipeline.errors import DivergedError
 from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.geometry.topology import laid_edge_lengths
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import Garment
@@ -83,14 +84,12 @@ class Reached(NamedTuple):
 
     Args:
         crossing: Pairs of triangles of cloth and body that meet, shape (K, 2).
-        stretch: Greatest length of an edge, times that at rest.
         steps: Taken, in the attempt that was kept.
         attempts: How many there were.
         why: What went wrong in the last of them, in words; empty where nothing did.
     """
 
     crossing: IntArray
-    stretch: float
     steps: int
     attempts: int
     why: str = ""
@@ -109,6 +108,7 @@ class FrameStepper:
 
     Attributes:
         now: Where it is.
+        natural: Lengths of its edges without forces [m], shape (E,).
     """
 
     now: Moment
@@ -117,7 +117,7 @@ class FrameStepper:
         self, model: ClothModel, garment: Garment, path: BodyPath, fabric: Fabric, config: FollowConfig, job: Job
     ) -> None:
         self._model = model
-        self._rest = garment.rest.positions
+        self.natural = laid_edge_lengths(garment.mesh, garment.rest.corners(model.faces))
         self._path = path
         self._config = config
         skin = default_skin(model.edge_length) if config.skin_mm is None else 1e-3 * config.skin_mm
@@ -131,7 +131,8 @@ class FrameStepper:
         self._stepper.prepare(positions)
         job.note(f"{self._stepper.choice.method}: {self._stepper.choice.reason}")
         self._substeps = self._stepper.substeps
-        self._stretched = max(1.0 + config.stretch_limit, 1.5 * longest_stretch(positions, self._rest, model.faces))
+        begins = float(stretch_of_edges(garment.mesh, self.natural).max(initial=0.0))
+        self._stretched = config.stretch_limit + max(0.0, begins)
         self.now = Moment(
             ClothState(positions, np.zeros_like(positions), 0.0, ()),
             self._skin.copy(),
@@ -162,15 +163,16 @@ class FrameStepper:
             except DivergedError as error:
                 why, substeps = error.problem, self._finer(substeps)
                 continue
-            stretch = longest_stretch(state.positions, self._rest, self._model.faces)
-            crossing = intersecting_faces(TriangleMesh(state.positions, self._model.faces), body)
+            cloth = TriangleMesh(state.positions, self._model.faces)
+            stretch = float(stretch_of_edges(cloth, self.natural).max(initial=0.0))
+            crossing = intersecting_faces(cloth, body)
             if stretch > self._stretched:
-                why, substeps = f"an edge has {stretch:.1f} times its length at rest", self._finer(substeps)
+                why, substeps = f"an edge has {1.0 + stretch:.1f} times its length at rest", self._finer(substeps)
                 continue
             if best is None or len(crossing) < best[0]:
                 thinner = self._skin + _KEPT * (skin - self._skin)
                 moment = Moment(state, thinner, self._stepper.contact_memory, self._collider.recollection)
-                reached = Reached(crossing, stretch, self._stepper.steps - before, attempt)
+                reached = Reached(crossing, self._stepper.steps - before, attempt)
                 best = len(crossing), moment, reached
             if len(crossing) == 0:
                 break
@@ -179,7 +181,7 @@ class FrameStepper:
             skin[about] += np.maximum(_THICKEN, _FASTER * skin[about])
         if best is None:
             self.now = begin
-            return Reached(np.empty((0, 2), np.int32), np.inf, 0, tried, why)
+            return Reached(np.empty((0, 2), np.int32), 0, tried, why)
         self.now = best[1]
         return best[2]._replace(attempts=tried)
 

@@ -9,8 +9,8 @@ import numpy as np
 from vto_pipeline.cloth.dynamics.residual import elastic_energy
 from vto_pipeline.cloth.judge.crossings import crossings_between, self_crossings
 from vto_pipeline.cloth.model.build import ClothModel, ClothState
-from vto_pipeline.cloth.placement.clear_body import longest_stretch
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.geometry.topology import laid_edge_lengths
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -45,9 +45,15 @@ class FrameAudit:
     seconds: float
 
 
+def stretch_of_edges(mesh: TriangleMesh, natural: FloatArray) -> FloatArray:
+    """Return the stretch of each edge beyond rest [share], shape (E,), where `natural` is its length there [m]."""
+    length = laid_edge_lengths(mesh, mesh.vertices[mesh.faces])
+    return np.asarray(np.divide(length, natural, out=np.ones_like(length), where=natural > 0.0) - 1.0)
+
+
 def audit_frame(
     model: ClothModel,
-    rest: FloatArray,
+    natural: FloatArray,
     state: ClothState,
     body: TriangleMesh,
     *,
@@ -60,7 +66,7 @@ def audit_frame(
 
     Args:
         model: The cloth.
-        rest: Its shape without forces [m], shape (V, 3).
+        natural: Lengths of its edges without forces [m], shape (E,).
         state: Where it is.
         body: Where that is.
         own_crossings: Of the body, known already.
@@ -74,7 +80,7 @@ def audit_frame(
         self_crossings=len(self_crossings(mesh)),
         own_crossings=own_crossings,
         penetration_mm=1e3 * max(0.0, -nearest),
-        max_stretch=longest_stretch(mesh.vertices, rest, model.faces) - 1.0,
+        max_stretch=float(stretch_of_edges(mesh, natural).max(initial=0.0)),
         elastic_j=elastic_energy(model, state.positions),
         kinetic_j=float(0.5 * np.einsum("i,ij,ij->", model.mass, state.velocities, state.velocities)),
         steps=steps,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from vto_pipeline.cloth.collision.body.contacts import BodyCollider, Recollection
+from vto_pipeline.cloth.collision.contacts import Contacts, ContactSpan
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.job import Job
@@ -25,6 +26,16 @@ class PathCollider(BodyCollider):
     def at(self, time: float) -> FloatArray:
         """Return the body's vertices at a time [s], shape (V, 3) [m]."""
         return self._path.at(time)
+
+    def contacts(self, positions: FloatArray, span: ContactSpan) -> Contacts:
+        """See `Collider.contacts`; each plane is carried as the body carries the vertex that lies a skin above it.
+
+        Friction would else give cloth the way of the skin below, which is shorter where the body turns: a shirt would
+        fall behind by the share that its distance is of the radius.
+        """
+        found = super().contacts(positions, span)
+        lift = span.skin[:, None, None] * found.normal
+        return found._replace(point=found.point + lift, offset=found.offset - span.skin[:, None])
 
     def _changes(self) -> bool:
         return True
