@@ -13,9 +13,13 @@ from vto_pipeline.avatar.motion.retarget import RetargetConfig, retarget
 from vto_pipeline.avatar.motion.timing import hold_last
 from vto_pipeline.cloth.moving.config import FollowConfig
 from vto_pipeline.cloth.moving.follow import follow
+from vto_pipeline.geometry.topology import vertex_normals
+from vto_pipeline.io.gltf.animate import animated_glb
 from vto_pipeline.io.runs.frame_log import FrameLog
 from vto_pipeline.model.garment import Garment
 from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.settings import Config
 from vto_pipeline.pipeline.stage import Stage
 
 Inputs = Mapping[str, Any]
@@ -54,6 +58,14 @@ def _follow(inputs: Inputs, settings: FollowConfig, job: Job) -> Outputs:
     return {"draped_motion": frames, "motion_audit": found}
 
 
+def _animate(inputs: Inputs, settings: Config, job: Job) -> Outputs:
+    avatar, cloth = inputs["avatar"], inputs["draped_motion"]
+    normals = vertex_normals(TriangleMesh(avatar.bind_vertices, avatar.faces))
+    made, error = animated_glb(avatar, normals, inputs["avatar_motion"], cloth)
+    job.measure(cloth_error_mm=1e3 * error)
+    return {"moving_scene": made}
+
+
 STAGES: tuple[Stage, ...] = (
     Stage(
         name="move",
@@ -73,5 +85,13 @@ STAGES: tuple[Stage, ...] = (
         settings=FollowConfig,
         piecewise=True,
         uses=("numba", "libigl"),
+    ),
+    Stage(
+        name="animate",
+        about="avatar and garment in motion, in a file for viewers",
+        needs=("avatar", "avatar_motion", "draped_motion"),
+        makes=("moving_scene",),
+        run=_animate,
+        uses=("pygltflib",),
     ),
 )

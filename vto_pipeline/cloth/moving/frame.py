@@ -19,8 +19,8 @@ from vto_pipeline.cloth.dynamics.methods import FRAME
 from vto_pipeline.cloth.dynamics.stepper import Stepper
 from vto_pipeline.cloth.model.build import ClothModel, ClothState
 from vto_pipeline.cloth.moving.config import FollowConfig
-from vto_pipeline.cloth.moving.path_collider import PathCollider
 from vto_pipeline.cloth.moving.frame_audit import stretch_of_edges
+from vto_pipeline.cloth.moving.path_collider import PathCollider
 from vto_pipeline.cloth.simulation import default_skin
 from vto_pipeline.errors import DivergedError
 from vto_pipeline.geometry.intersections import intersecting_faces

@@ -21,6 +21,7 @@ from vto_pipeline.io.captures.video import read_video
 from vto_pipeline.io.documents import read_json, write_json
 from vto_pipeline.io.fabrics import read_fabric
 from vto_pipeline.io.files import check_file, listed, replacing
+from vto_pipeline.io.gltf.animate import read_glb_bytes, write_glb_bytes
 from vto_pipeline.io.gltf.write import read_glb, write_glb
 from vto_pipeline.io.motion.archive import read_avatar_motion, write_avatar_motion
 from vto_pipeline.io.motion.read import read_motion
@@ -311,6 +312,13 @@ ARTIFACTS: tuple[ArtifactKind, ...] = (
         "the draped garment in motion, frame by frame",
         frame_log.read_cloth_motion,
         frame_log.write_cloth_motion,
+    ),
+    ArtifactKind(
+        "moving_scene",
+        "draped_motion.glb",
+        "avatar and garment in motion, for a viewer",
+        read_glb_bytes,
+        write_glb_bytes,
     ),
     _json("motion_audit", "motion_audit.json", "checks of each frame of the motion"),
     ArtifactKind("trace", "trace.csv", "error against run time", traces.read_trace, traces.write_trace),

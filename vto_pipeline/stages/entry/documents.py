@@ -18,7 +18,7 @@ from vto_pipeline.stages.entry import planning
 
 _CAPTURES = ("photos", "video", "depth", "cloud", "surface")
 _DRAPED = ("draped", "audit", "trace", "render_mesh", "fit_report", "page")
-_MOVED = ("draped_motion", "motion_audit")
+_MOVED = ("draped_motion", "motion_audit", "moving_scene")
 
 
 @dataclass(frozen=True)
