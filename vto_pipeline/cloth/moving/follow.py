@@ -16,7 +16,6 @@ from vto_pipeline.cloth.moving.config import FollowConfig
 from vto_pipeline.cloth.moving.frame import FrameStepper, moment_from
 from vto_pipeline.cloth.moving.frame_audit import audit_frame
 from vto_pipeline.errors import SimulationError
-from vto_pipeline.geometry.intersections import self_intersections
 from vto_pipeline.io.runs.frame_log import FrameLog
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import Garment
@@ -69,7 +68,7 @@ def follow(
             stepper.natural,
             state,
             body,
-            own_crossings=len(self_intersections(body)),
+            own_crossings=stepper.own_crossings(state.time),
             steps=steps,
             attempts=attempts,
             seconds=time.perf_counter() - began,

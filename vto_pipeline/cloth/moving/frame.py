@@ -23,7 +23,7 @@ from vto_pipeline.cloth.moving.frame_audit import stretch_of_edges
 from vto_pipeline.cloth.moving.path_collider import PathCollider
 from vto_pipeline.cloth.simulation import default_skin
 from vto_pipeline.errors import DivergedError
-from vto_pipeline.geometry.intersections import intersecting_faces
+from vto_pipeline.geometry.intersections import intersecting_faces, self_intersections
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import laid_edge_lengths
 from vto_pipeline.model.arrays import FloatArray, IntArray
@@ -120,6 +120,7 @@ class FrameStepper:
         self.natural = laid_edge_lengths(garment.mesh, garment.rest.corners(model.faces))
         self._path = path
         self._config = config
+        self._own: dict[float, int] = {}
         skin = default_skin(model.edge_length) if config.skin_mm is None else 1e-3 * config.skin_mm
         self._skin = np.full(len(model.mass), skin)
         friction = fabric.friction if config.friction is None else config.friction
@@ -144,6 +145,12 @@ class FrameStepper:
         """Return the body at a time [s]."""
         return TriangleMesh(self._path.at(time), self._path.faces)
 
+    def own_crossings(self, time: float) -> int:
+        """Return how many pairs of the body's own triangles meet at a time [s]."""
+        if time not in self._own:
+            self._own = {**dict([*self._own.items()][-1:]), time: len(self_intersections(self.body_at(time)))}
+        return self._own[time]
+
     def go_to(self, time: float) -> Reached:
         """Take the garment to the frame at a time [s], where `now` then is.
 
@@ -151,6 +158,7 @@ class FrameStepper:
         blow it up, it stays where it was, and `why` says so.
         """
         begin, body = self.now, self.body_at(time)
+        self._collider.crosses_itself = self.own_crossings(begin.state.time) + self.own_crossings(time) > 0
         substeps, skin = self._steps_by_travel(begin, time), begin.skin.copy()
         best: tuple[int, Moment, Reached] | None = None
         why, tried = "", 0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from vto_pipeline.cloth.collision.body.contacts import BodyCollider, Recollection
 from vto_pipeline.cloth.collision.contacts import Contacts, ContactSpan
 from vto_pipeline.model.arrays import FloatArray
@@ -17,10 +19,14 @@ class PathCollider(BodyCollider):
         path: Where it is at any time.
         friction: Coulomb coefficient.
         job: For what was repaired.
+
+    Attributes:
+        crosses_itself: Whether parts of the body pass through each other now; to be set from frame to frame.
     """
 
     def __init__(self, path: BodyPath, friction: float, job: Job) -> None:
         self._path = path
+        self.crosses_itself = False
         super().__init__(MovingBody(path.at(0.0)[None], path.faces), float("inf"), friction, job)
 
     def at(self, time: float) -> FloatArray:
@@ -40,11 +46,39 @@ class PathCollider(BodyCollider):
     def _changes(self) -> bool:
         return True
 
+    def _fit(self, span: ContactSpan) -> tuple[FloatArray, FloatArray]:
+        """Return the vertices at start and end of a span, with what can be touched at the start.
+
+        Where parts of the body pass through each other, only their union can be touched, as at rest: cloth that is
+        caught between them is led out of both. Which faces that leaves changes from span to span.
+        """
+        if not self.crosses_itself and self._surface.part is None:
+            return super()._fit(span)
+        before = self.at(span.start)
+        if not np.array_equal(before, self._fitted_to) or (self._surface.part is None) == self.crosses_itself:
+            known = self.recollection
+            self._fitted_to = before
+            self._surface = self._touchable_surface() if self.crosses_itself else self._full_surface()
+            self.recollection = known
+        return before, self.at(span.end)
+
     @property
     def recollection(self) -> Recollection:
-        """What the last search for contacts left for the next; may be set back to it."""
-        return Recollection(self._guess, self._distance, self._flank, self._first)
+        """What the last search for contacts left for the next, by faces of the whole body; may be set back to it."""
+        part = self._surface.part
+        guess, flank = (
+            known if part is None else np.where(known >= 0, part.parent[known], -1).astype(np.int32)
+            for known in (self._guess, self._flank)
+        )
+        return Recollection(guess, self._distance, flank, self._first)
 
     @recollection.setter
     def recollection(self, before: Recollection) -> None:
+        part = self._surface.part
         self._guess, self._distance, self._flank, self._first = before
+        if part is not None:
+            place = np.full(len(self.faces), -1, np.int32)
+            place[part.parent[::-1]] = np.arange(len(part.parent), dtype=np.int32)[::-1]
+            self._guess, self._flank = (
+                np.where(known >= 0, place[known], -1).astype(np.int32) for known in (before.guess, before.flank)
+            )

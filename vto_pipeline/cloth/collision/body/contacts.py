@@ -285,15 +285,21 @@ class BodyCollider:
 
     def _rest_surface(self) -> _Surface:
         """Return the body at rest, without the parts that cannot be touched."""
+        found = self._touchable_surface()
+        if found.part is not None:
+            self._job.note(
+                f"body: {found.part.buried} faces lie inside its other parts and cannot be touched, "
+                f"{int(found.part.passing.sum())} faces pass through others"
+            )
+        return found
+
+    def _touchable_surface(self) -> _Surface:
+        """Return the body where it was last fitted to, without the parts that cannot be touched there."""
         whole = self._full_surface()
         mesh = TriangleMesh(self._fitted_to, whole.faces)
         distance = SurfaceDistance(mesh)
         part = touchable(mesh, distance)
         if part.buried or part.passing.any():
-            self._job.note(
-                f"body: {part.buried} faces lie inside its other parts and cannot be touched, "
-                f"{int(part.passing.sum())} faces pass through others"
-            )
             searched = SurfaceTree(part.vertices, part.faces, bvh.build(part.vertices, part.faces))
             return whole._replace(searched=searched, part=part, judge=distance)
         return whole if self._clean.sealed else whole._replace(judge=distance)
