@@ -80,16 +80,16 @@ def test_friction_turns_cloth_with_the_body_and_without_it_the_cloth_stays(cap):
     def quarter(t, x):
         return turned(smooth(t) * np.pi / 2, x)
 
-    held, _ = follow(cap, path(quarter, 1.0), cloth(0.6), {"damping": 0.0})
+    held, _ = follow(cap, path(quarter, 1.0), cloth(0.6), {"damping": 0.0, "substeps": 4})
     free, _ = follow(cap, path(quarter, 1.0), cloth(0.0), {"damping": 0.0})
-    assert_allclose(held.frames[-1], turned(np.pi / 2, cap.mesh.vertices), atol=2e-3)
+    assert_allclose(held.frames[-1], turned(np.pi / 2, cap.mesh.vertices), atol=5e-4)  # 0.3 mm: it comes to rest
 
     def spun(frame):
         a, b = cap.mesh.vertices[:, ::2] @ [1, 1j], frame[:, ::2] @ [1, 1j]
         return abs(np.angle((a.conj() * b).sum()))
 
     assert spun(free.frames[-1]) < np.deg2rad(30)  # the ball has facets, which push
-    assert spun(held.frames[-1]) > np.deg2rad(85)
+    assert abs(spun(held.frames[-1]) - np.pi / 2) < np.deg2rad(0.2)
 
 
 def test_what_is_not_held_keeps_its_speed_when_the_body_is_taken_away(cap):
@@ -140,6 +140,24 @@ def test_a_jump_of_ten_centimetres_between_frames_is_survived(cap):
     assert len(motion.frames) == 19
     assert np.isfinite(motion.frames).all()
     assert found["frames_crossing_body"] == 0 == found["frames_crossing_itself"]
+
+
+def test_cloth_between_parts_of_the_body_that_close_is_led_out_of_both(cap):
+    """A second ball comes from the side and goes 25 mm deep into the first, at the height of the rim of the cap."""
+    one, other = ball(RADIUS, levels=3), ball(RADIUS, levels=3)
+    faces = np.vstack([one.faces, other.faces + len(one.vertices)])
+
+    def at(t):
+        return np.vstack([one.vertices, shifted(other.vertices, 0.24 - 0.075 * smooth(t / 0.6), 0.055, 0.0)])
+
+    closing = BodyPath(at, faces, 31, 1 / FPS)
+    motion, found = follow(cap, closing, cloth())
+    assert found["per_frame"][0]["own_crossings"] == 0 < found["per_frame"][-1]["own_crossings"]
+    end = found["per_frame"][-1]
+    assert end["body_crossings"] == 0 == end["self_crossings"]
+    assert end["penetration_mm"] == 0.0
+    for center in ([0.0, 0.0, 0.0], [0.165, 0.055, 0.0]):
+        assert np.linalg.norm(motion.frames[-1] - center, axis=1).min() > 0.99 * RADIUS
 
 
 def test_frames_are_judged_as_ipctk_judges_them(cap):

@@ -62,18 +62,19 @@ def follow(
     stepper = FrameStepper(model, garment, path, fabric, config, job)
 
     def keep(*, steps: int, attempts: int, began: float) -> None:
-        body, state = stepper.body_at(stepper.now.state.time), stepper.now.state
+        assert log is not None
+        body, state = stepper.body_at(path.time(len(log.frames))), stepper.now.state
         found = audit_frame(
             model,
             stepper.natural,
             state,
             body,
-            own_crossings=stepper.own_crossings(state.time),
+            own_crossings=stepper.body.own_crossings(len(log.frames)),
+            yields=stepper.body.depth(len(log.frames)),
             steps=steps,
             attempts=attempts,
             seconds=time.perf_counter() - began,
         )
-        assert log is not None
         log.add(state.positions, asdict(found), stepper.now.arrays())
 
     if log.frames:
@@ -84,7 +85,7 @@ def follow(
     while len(log.frames) < path.frames:
         number, began = len(log.frames), time.perf_counter()
         job.progress(number / path.frames, _pace(number, path.frames, log.records))
-        reached = stepper.go_to(path.time(number))
+        reached = stepper.go_to(number)
         if reached.why:
             raise SimulationError(
                 f"cloth is caught in frame {number} of {path.frames}, at {path.time(number):.2f} s: {reached.why}",
@@ -115,6 +116,7 @@ def summary(records: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "most_body_crossings": most("body_crossings"),
         "most_self_crossings": most("self_crossings"),
         "penetration_mm": most("penetration_mm"),
+        "body_yields_mm": most("yields_mm"),
         "max_stretch": most("max_stretch"),
         "seconds_per_frame": float(np.median([record["seconds"] for record in records])),
         "per_frame": [dict(record) for record in records],

@@ -21,6 +21,7 @@ from vto_pipeline.cloth.model.build import ClothModel, ClothState
 from vto_pipeline.cloth.moving.config import FollowConfig
 from vto_pipeline.cloth.moving.frame_audit import stretch_of_edges
 from vto_pipeline.cloth.moving.path_collider import PathCollider
+from vto_pipeline.cloth.moving.yielding import YieldingBody
 from vto_pipeline.cloth.simulation import default_skin
 from vto_pipeline.errors import DivergedError
 from vto_pipeline.geometry.intersections import intersecting_faces, self_intersections
@@ -109,6 +110,7 @@ class FrameStepper:
     Attributes:
         now: Where it is.
         natural: Lengths of its edges without forces [m], shape (E,).
+        body: What it is on.
     """
 
     now: Moment
@@ -118,13 +120,13 @@ class FrameStepper:
     ) -> None:
         self._model = model
         self.natural = laid_edge_lengths(garment.mesh, garment.rest.corners(model.faces))
-        self._path = path
         self._config = config
-        self._own: dict[float, int] = {}
         skin = default_skin(model.edge_length) if config.skin_mm is None else 1e-3 * config.skin_mm
         self._skin = np.full(len(model.mass), skin)
+        self.body = YieldingBody(path, 2.0 * skin)
+        self._path = self.body.path
         friction = fabric.friction if config.friction is None else config.friction
-        self._collider = PathCollider(path, friction, job)
+        self._collider = PathCollider(self._path, friction, job)
         self._stepper = Stepper(
             model, [self._collider], self._skin.copy(), config, damping=config.damping, force_all=job.force_all
         )
@@ -142,23 +144,18 @@ class FrameStepper:
         )
 
     def body_at(self, time: float) -> TriangleMesh:
-        """Return the body at a time [s]."""
+        """Return the body at a time [s], sunken where its parts press on each other."""
         return TriangleMesh(self._path.at(time), self._path.faces)
 
-    def own_crossings(self, time: float) -> int:
-        """Return how many pairs of the body's own triangles meet at a time [s]."""
-        if time not in self._own:
-            self._own = {**dict([*self._own.items()][-1:]), time: len(self_intersections(self.body_at(time)))}
-        return self._own[time]
-
-    def go_to(self, time: float) -> Reached:
-        """Take the garment to the frame at a time [s], where `now` then is.
+    def go_to(self, frame: int) -> Reached:
+        """Take the garment from one frame to the next, this one, where `now` then is.
 
         Where no attempt is clean, the one with the fewest crossings is kept. Where all of them overstretch the cloth or
         blow it up, it stays where it was, and `why` says so.
         """
+        time = self._path.time(frame)
         begin, body = self.now, self.body_at(time)
-        self._collider.crosses_itself = self.own_crossings(begin.state.time) + self.own_crossings(time) > 0
+        self._collider.crosses_itself = len(self_intersections(body)) > 0
         substeps, skin = self._steps_by_travel(begin, time), begin.skin.copy()
         best: tuple[int, Moment, Reached] | None = None
         why, tried = "", 0

@@ -23,7 +23,8 @@ class FrameAudit:
         time_s: When it is [s].
         body_crossings: Pairs of triangles of cloth and body that meet.
         self_crossings: Pairs of triangles of the cloth that meet.
-        own_crossings: Pairs of triangles of the body itself that meet: cloth between them has no room.
+        own_crossings: Pairs of triangles of the body itself that meet as it is posed.
+        yields_mm: How far its skin has then sunk, where it has most [mm]; cloth is held against the sunken skin.
         penetration_mm: Of the deepest vertex in the body [mm], 0 where none is inside.
         max_stretch: Of the edge that is stretched most, beyond rest [share].
         elastic_j, kinetic_j: Energy [J].
@@ -36,6 +37,7 @@ class FrameAudit:
     body_crossings: int
     self_crossings: int
     own_crossings: int
+    yields_mm: float
     penetration_mm: float
     max_stretch: float
     elastic_j: float
@@ -58,6 +60,7 @@ def audit_frame(
     body: TriangleMesh,
     *,
     own_crossings: int,
+    yields: float,
     steps: int,
     attempts: int,
     seconds: float,
@@ -69,7 +72,8 @@ def audit_frame(
         natural: Lengths of its edges without forces [m], shape (E,).
         state: Where it is.
         body: Where that is.
-        own_crossings: Of the body, known already.
+        own_crossings: Of the body as it is posed.
+        yields: How far its skin has sunk [m].
         steps, attempts, seconds: What it took.
     """
     mesh = TriangleMesh(state.positions, model.faces)
@@ -79,6 +83,7 @@ def audit_frame(
         body_crossings=len(crossings_between(mesh, body)),
         self_crossings=len(self_crossings(mesh)),
         own_crossings=own_crossings,
+        yields_mm=1e3 * yields,
         penetration_mm=1e3 * max(0.0, -nearest),
         max_stretch=float(stretch_of_edges(mesh, natural).max(initial=0.0)),
         elastic_j=elastic_energy(model, state.positions),
