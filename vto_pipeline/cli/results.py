@@ -92,6 +92,11 @@ def motion_lines(found: Mapping[str, Any]) -> Iterator[str]:
         f"motion: {found['frames']} frames; the garment crosses the body in {found['frames_crossing_body']} and itself "
         f"in {found['frames_crossing_itself']}"
     )
+    if found["frames_body_crossing_itself"]:
+        yield (
+            f"  the body passes through itself in {found['frames_body_crossing_itself']} frames; its skin gives way "
+            f"there by up to {found['body_yields_mm']:.0f} mm"
+        )
     yield (
         f"  at most {found['penetration_mm']:.1f} mm inside the body, {found['max_stretch']:.0%} stretch of an edge; "
         f"{found['seconds_per_frame']:.1f} s a frame"
