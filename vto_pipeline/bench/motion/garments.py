@@ -72,7 +72,8 @@ def motion_row(
         command += ["--set", one]
     ended = run_vto(command, out / f"{garment.stem}_{Path(motion).stem}.log", limit)
     outcome = "unfinished" if ended.code is None else _OUTCOMES.get(ended.code, "killed")
-    return {"garment": garment.stem, "motion": Path(motion).stem, "outcome": outcome, **_figures(folder)}
+    reached = _figures(folder) if outcome in ("done", "failed") else {}  # else its files are of the run before
+    return {"garment": garment.stem, "motion": Path(motion).stem, "outcome": outcome, **reached}
 
 
 def _figures(folder: Path) -> dict[str, Value]:
