@@ -158,7 +158,7 @@ def test_cloth_between_parts_of_the_body_that_close_comes_free_when_they_open(ca
     closed = [k for k, frame in enumerate(frames) if frame["own_crossings"]]
     assert closed[0] > 5
     assert closed[-1] < 40
-    assert all(frames[k]["yields_mm"] == 0.0 for k in range(46) if k not in closed)
+    assert all(frames[k]["yields_mm"] == 0.0 for k in range(46) if k < closed[0] - 3 or k > closed[-1] + 3)
     assert 5.0 < max(frames[k]["yields_mm"] for k in closed) < 30.0
     assert found["frames_crossing_itself"] == 0
     for k, frame in enumerate(motion.frames):

@@ -34,11 +34,11 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.motion import BodyPath
 
-_BESIDE = 0.15  # m: the body this near the cloth sets the steps
+_BESIDE = 0.15  # m: the body this near the cloth sets the steps, and gives way to itself
 _THICKEN = 1e-3  # m an attempt at least,
 _FASTER = 0.15  # and this share of the skin
 _KEPT = 0.9  # share of what the skin is thicker by that is left after a frame
-_ROOM = 4.0  # skins between parts of the body that press on each other: sleeve and side both lie in an armpit
+_ROOM = 2.0  # skins between parts of the body that come near each other: one for the cloth on either
 _FINER = 2  # times as many steps where the cloth overstretches
 
 
@@ -124,7 +124,8 @@ class FrameStepper:
         self._config = config
         skin = default_skin(model.edge_length) if config.skin_mm is None else 1e-3 * config.skin_mm
         self._skin = np.full(len(model.mass), skin)
-        self.body = YieldingBody(path, _ROOM * skin)
+        beside = SurfaceDistance(garment.mesh).nearest(path.at(0.0)).distance < _BESIDE
+        self.body = YieldingBody(path, _ROOM * skin, np.flatnonzero(beside))
         self._path = self.body.path
         friction = fabric.friction if config.friction is None else config.friction
         self._collider = PathCollider(self._path, friction, job)

@@ -11,7 +11,6 @@ from collections import OrderedDict
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from vto_pipeline.geometry.intersections import self_intersections
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
@@ -20,7 +19,6 @@ from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.motion import BodyPath
 
-_ABOUT = 0.06  # m: skin this near triangles that meet may sink
 _STEP, _STEPS = 3e-3, 10  # m of sinking at a time, and how often: less than 30 mm on either side
 _SMOOTHINGS = 2  # times that sinking is averaged with that of neighbours
 _REMEMBERED = 3  # frames
@@ -32,10 +30,12 @@ class YieldingBody:
     Args:
         path: The body as it is posed.
         room: To leave between parts that press on each other [m].
+        about: Its vertices that may sink, shape (N,). Those that have no room as the motion begins never do: creases.
     """
 
-    def __init__(self, path: BodyPath, room: float) -> None:
+    def __init__(self, path: BodyPath, room: float, about: NDArray[np.int64]) -> None:
         self._posed, self._room = path, room
+        self._about = about[~_pressed(TriangleMesh(path.at(0.0), path.faces), about, room)]
         self._known: OrderedDict[int, tuple[int, FloatArray]] = OrderedDict()
         self.path = BodyPath(self._at, path.faces, path.frames, path.frame_time)
 
@@ -60,38 +60,37 @@ class YieldingBody:
         """Return pairs that meet, and how the skin has moved by sinking [m], shape (V, 3)."""
         if frame not in self._known:
             mesh = TriangleMesh(self._posed.at(self._posed.time(frame)), self._posed.faces)
-            meeting = np.unique(pairs := self_intersections(mesh))
-            self._known[frame] = len(pairs), sunken(mesh, meeting, self._room)
+            self._known[frame] = len(self_intersections(mesh)), sunken(mesh, self._about, self._room)
             if len(self._known) > _REMEMBERED:
                 self._known.popitem(last=False)
         return self._known[frame]
 
 
-def sunken(mesh: TriangleMesh, meeting: NDArray[np.int32], room: float) -> FloatArray:
+def sunken(mesh: TriangleMesh, about: NDArray[np.int64], room: float) -> FloatArray:
     """Return how the skin moves so that its parts leave room between them, as far as that goes [m], shape (V, 3).
 
     Args:
         mesh: A body.
-        meeting: Its faces that pass through each other.
+        about: Its vertices that may sink, shape (N,).
         room: To leave [m].
     """
     moved = np.zeros_like(mesh.vertices)
-    if len(meeting) == 0:
-        return moved
-    places = mesh.vertices[mesh.faces[meeting]].mean(axis=1)
-    about = np.flatnonzero(cKDTree(places).query(mesh.vertices, distance_upper_bound=_ABOUT)[0] < _ABOUT)
     corners = mesh.faces.reshape(-1)
     around = np.roll(mesh.faces, 1, axis=1).reshape(-1)
     count = np.bincount(corners, minlength=len(moved)) + 1.0
     for _ in range(_STEPS):
         now = TriangleMesh(mesh.vertices + moved, mesh.faces)
-        normals = vertex_normals(now)
-        pressed = SurfaceDistance(now).inside(now.vertices[about] + room * normals[about])
-        if not pressed.any():
+        about = about[_pressed(now, about, room)]
+        if len(about) == 0:
             break
         sinks = np.zeros(len(moved))
-        sinks[about[pressed]] = _STEP
+        sinks[about] = _STEP
         for _ in range(_SMOOTHINGS):
             sinks = (sinks + np.bincount(corners, sinks[around], len(moved))) / count
-        moved -= sinks[:, None] * normals
+        moved -= sinks[:, None] * vertex_normals(now)
     return moved
+
+
+def _pressed(mesh: TriangleMesh, about: NDArray[np.int64], room: float) -> NDArray[np.bool_]:
+    """Return which of these vertices have another part of the body within the room above them [m], shape (N,)."""
+    return SurfaceDistance(mesh).inside(mesh.vertices[about] + room * vertex_normals(mesh)[about])
