@@ -8,14 +8,18 @@ from bars import missed
 from ipc_judge import crosses, self_crosses
 
 from vto_pipeline.avatar.model.pose import morph, named_pose
+from vto_pipeline.avatar.motion.path import avatar_path
+from vto_pipeline.avatar.motion.retarget import RetargetConfig, retarget
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.cloth.drape import drape
 from vto_pipeline.cloth.dynamics.body_motion import run_body_motion
 from vto_pipeline.cloth.judge.crossings import crossings_between
+from vto_pipeline.cloth.moving.follow import follow
 from vto_pipeline.cloth.rest import phases
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import boundary_loops, submesh, vertex_normals
 from vto_pipeline.io.fabrics import read_fabric
+from vto_pipeline.io.motion.read import read_motion
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.garment import Garment, RestShape
 from vto_pipeline.model.job import Job
@@ -88,3 +92,24 @@ def test_nothing_passes_through_anything_while_the_arms_go_down_and_up(watched):
     assert SurfaceDistance(body.final).signed(found.mesh.vertices).distance.min() > 0
     assert found.audit["rms_stretch"] < 0.05
     assert "moving along with the body" not in dict(job.left_out)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("preset", ["arms_up", "walking_step"])
+def test_a_shirt_follows_a_motion_and_crosses_nothing_in_any_frame(preset):
+    """By ipctk, which shares no code with the project."""
+    person, fabric = template(0.5), read_fabric("cotton_poplin")
+    mesh = shirt(person)
+    garment = Garment(mesh, RestShape(mesh.vertices))
+    still = drape(garment, TriangleMesh(person.vertices, person.faces), fabric)
+    read = read_motion(preset)
+    config = RetargetConfig(lead_in_s=1.0, frames_per_second=30)
+    path = avatar_path(person, retarget(read.clip, read.joints, person, config)[0])
+    motion, found = follow(Garment(still.mesh, garment.rest), path, fabric)
+    assert len(motion.frames) == path.frames > 30
+    assert np.linalg.norm(np.ptp([path.at(path.time(k)) for k in range(path.frames)], axis=0), axis=1).max() > 0.3
+    bodies = [TriangleMesh(path.at(path.time(k)), path.faces) for k in range(path.frames)]
+    cloth = [TriangleMesh(frame, motion.faces) for frame in motion.frames]
+    assert [k for k, (one, body) in enumerate(zip(cloth, bodies, strict=True)) if crosses(one, body)] == []
+    assert [k for k, one in enumerate(cloth) if self_crosses(one)] == []
+    assert found["max_stretch"] < 0.3

@@ -16,7 +16,7 @@ from vto_pipeline.avatar.template.template import template
 from vto_pipeline.errors import FormatError
 from vto_pipeline.geometry.topology import vertex_normals
 from vto_pipeline.io.bodies.skinned import read_skinned
-from vto_pipeline.io.gltf.animate import write_animated_glb
+from vto_pipeline.io.gltf.animate import animated_glb, write_glb_bytes
 from vto_pipeline.io.motion.archive import read_avatar_motion, write_avatar_motion
 from vto_pipeline.io.motion.gltf_animation import parse_animation
 from vto_pipeline.io.motion.keyframes import parse_keyframes
@@ -184,7 +184,7 @@ def test_a_moving_avatar_comes_back_from_its_glb_and_its_archive(tmp_path):
         1 / 24,
     )
     normals = vertex_normals(TriangleMesh(body.bind_vertices, body.faces))
-    write_animated_glb(tmp_path / "m.glb", body, normals, motion)
+    write_glb_bytes(tmp_path / "m.glb", animated_glb(body, normals, motion)[0])
     found = read_motion(tmp_path / "m.glb")
     assert found.joints.convention == "ours"
     resting = read_skinned(tmp_path / "m.glb")

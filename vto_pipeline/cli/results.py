@@ -81,7 +81,26 @@ def result_lines(outcome: Outcome) -> Iterator[str]:
     """Yield the result of each wanted artifact that has one in words."""
     if "measurements" in outcome.record["wanted"] and outcome.made("measurements"):
         yield from table_lines(("girth", "cm", "± cm (95 %)"), _girths(outcome.read("measurements")))
+    if "motion_audit" in outcome.record["wanted"] and outcome.made("motion_audit"):
+        yield from motion_lines(outcome.read("motion_audit"))
     yield from outcome.verdicts
+
+
+def motion_lines(found: Mapping[str, Any]) -> Iterator[str]:
+    """Yield how a garment followed a motion, from what motion_audit.json holds."""
+    yield (
+        f"motion: {found['frames']} frames; the garment crosses the body in {found['frames_crossing_body']} and itself "
+        f"in {found['frames_crossing_itself']}"
+    )
+    if found["frames_body_crossing_itself"]:
+        yield (
+            f"  the body passes through itself in {found['frames_body_crossing_itself']} frames; its skin gives way "
+            f"there by up to {found['body_yields_mm']:.0f} mm"
+        )
+    yield (
+        f"  at most {found['penetration_mm']:.1f} mm inside the body, {found['max_stretch']:.0%} stretch of an edge; "
+        f"{found['seconds_per_frame']:.1f} s a frame"
+    )
 
 
 def _girths(measured: Measurements) -> Iterator[tuple[str, str, str]]:

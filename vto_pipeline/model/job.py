@@ -20,6 +20,8 @@ class Job:
     Args:
         progress: Called with the finished share (0 to 1) and what is being done.
         scratch: A folder for temporary files, or None when there is none.
+        kept: A folder that the next run with the same inputs and settings finds as it was left, or None: for what is
+            made piece by piece.
         seed: For everything random.
         force_all: Leave nothing out, to compare.
         memory: Budget of the whole process's resident memory [B]. Stages that can, work in less of it at a time.
@@ -30,6 +32,7 @@ class Job:
     seed: int = 0
     force_all: bool = False
     memory: float = math.inf
+    kept: Path | None = None
     metrics: dict[str, object] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)

@@ -28,6 +28,7 @@ class Stage:
         passes: Made artifact -> needed artifact whose file it takes when the stage is skipped.
         final: Runs last, every time, uncached; its inputs also hold "run_record", the dict that run.json holds.
         fits_memory: It works in what `Job.memory_left` says, or refuses in words.
+        piecewise: It keeps what it has made in `Job.kept`, and begins with what is there.
         idle: Settings -> those of the optional artifacts that it has no use for under these.
     """
 
@@ -43,6 +44,7 @@ class Stage:
     passes: Mapping[str, str] = field(default_factory=dict)
     final: bool = False
     fits_memory: bool = False
+    piecewise: bool = False
     idle: Callable[[Any], tuple[str, ...]] = lambda settings: ()
 
     def __post_init__(self) -> None:

@@ -62,6 +62,12 @@ def garment_names(document: Document) -> tuple[str, ...]:
     if not isinstance(given, Mapping) or "garments" not in given:
         return ()
     garments, where = given["garments"], document.where(("given", "garments"))
+    if "motion" in given:
+        raise ConfigError(
+            "given.motion: only one garment can follow a motion",
+            where=document.where(("given", "motion")),
+            hint="give garment instead of garments",
+        )
     if "garment" in given:
         raise ConfigError("given.garment and given.garments: give one or the other", where=where)
     if not isinstance(garments, Mapping) or not garments:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from vto_pipeline.errors import InputError
@@ -83,3 +85,18 @@ def _brought_to(motion: AvatarMotion, avatar: Avatar) -> tuple[FloatArray, Float
     places = (motion.translations + pivot) @ swing.T
     places += (avatar.translation + pivot - places[0]) * [1.0, 0.0, 1.0]
     return poses, places - pivot
+
+
+def hold_last(motion: AvatarMotion, seconds: float) -> AvatarMotion:
+    """Return a motion whose last pose is held for so long [s]."""
+    count = round(seconds / motion.frame_time)
+
+    def held(values: NDArray[Any]) -> NDArray[Any]:
+        return np.concatenate([values, np.repeat(values[-1:], count, axis=0)])
+
+    return replace(
+        motion,
+        poses=held(motion.poses),
+        translations=held(motion.translations),
+        planted=held(motion.planted),
+    )

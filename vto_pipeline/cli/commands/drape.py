@@ -38,6 +38,11 @@ from vto_pipeline.cli.session import Session, pass_session
     metavar="NAME|FILE",
     help="Preset or fabric file: one for all garments, or one per garment.",
 )
+@click.option(
+    "--motion",
+    metavar="FILE|NAME",
+    help="Carry the draped garment through a motion: BVH, glTF, SMPL poses, YAML, or a preset such as walking_step.",
+)
 @click.option("--regraded", is_flag=True, help="Show how it looks in the customer's size, not whether it fits.")
 @drape_options
 @pass_session
@@ -48,6 +53,7 @@ def drape_command(
     measurements: Path | None,
     source_body: Path | None,
     fabrics: tuple[str, ...],
+    motion: str | None,
     regraded: bool,
     **options: Any,
 ) -> None:
@@ -57,9 +63,10 @@ def drape_command(
     vto drape --garment shirt.ply --source-body form.ply --measurements customer.yaml --fabric denim
     vto drape --garment shirt.ply --source-body form.ply --body customer.ply --regraded -o runs/shirt
     vto drape --garment trousers.ply --fabric denim --garment shirt.ply --fabric cotton_poplin --body customer.ply
+    vto drape --garment shirt.ply --body runs/customer/out/avatar.npz --motion walk.bvh -o runs/walk
     """
     from vto_pipeline.cli.results import perform
     from vto_pipeline.stages.entry.documents import drape_order
 
-    order = drape_order(garments, fabrics, body, measurements, source_body, regraded, "the command line")
+    order = drape_order(garments, fabrics, body, measurements, source_body, regraded, "the command line", motion)
     perform(session, order, **options)

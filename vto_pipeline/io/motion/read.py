@@ -75,6 +75,8 @@ def read_motion(
     """
     job = job or Job()
     path = presets().get(str(path), Path(path))
+    if not path.suffix and not path.exists():
+        raise InputError(f"no file and no preset has the name {path}", hint=f"presets: {', '.join(presets())}")
     if unit is not None and unit not in LENGTH_M:
         raise InputError(f"unit is {unit!r}; expected one of {', '.join(LENGTH_M)}", where=str(path))
     if up is not None and up not in UP_AXES:

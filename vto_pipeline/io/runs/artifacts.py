@@ -21,10 +21,13 @@ from vto_pipeline.io.captures.video import read_video
 from vto_pipeline.io.documents import read_json, write_json
 from vto_pipeline.io.fabrics import read_fabric
 from vto_pipeline.io.files import check_file, listed, replacing
+from vto_pipeline.io.gltf.animate import read_glb_bytes, write_glb_bytes
 from vto_pipeline.io.gltf.write import read_glb, write_glb
+from vto_pipeline.io.motion.archive import read_avatar_motion, write_avatar_motion
+from vto_pipeline.io.motion.read import read_motion
 from vto_pipeline.io.patterns.read import read_pattern
 from vto_pipeline.io.patterns.write import write_pattern
-from vto_pipeline.io.runs import garments, textures, traces
+from vto_pipeline.io.runs import frame_log, garments, textures, traces
 from vto_pipeline.model.artifact import ArtifactKind
 from vto_pipeline.model.body import Avatar
 from vto_pipeline.model.job import Job
@@ -295,6 +298,29 @@ ARTIFACTS: tuple[ArtifactKind, ...] = (
     ),
     _mesh("draped", "draped.ply", "the simulation mesh at rest"),
     _json("audit", "audit.json", "checks of the drape, independent of the solver"),
+    _leaf(
+        "motion",
+        "how the avatar moves: a file, or the name of a preset",
+        read_motion,
+        receive=_job_by_position(read_motion),
+        inline=read_motion,
+    ),
+    ArtifactKind("avatar_motion", "motion.npz", "the avatar in motion", read_avatar_motion, write_avatar_motion),
+    ArtifactKind(
+        "draped_motion",
+        "draped_motion.npz",
+        "the draped garment in motion, frame by frame",
+        frame_log.read_cloth_motion,
+        frame_log.write_cloth_motion,
+    ),
+    ArtifactKind(
+        "moving_scene",
+        "draped_motion.glb",
+        "avatar and garment in motion, for a viewer",
+        read_glb_bytes,
+        write_glb_bytes,
+    ),
+    _json("motion_audit", "motion_audit.json", "checks of each frame of the motion"),
     ArtifactKind("trace", "trace.csv", "error against run time", traces.read_trace, traces.write_trace),
     ArtifactKind("render_mesh", "render_mesh.glb", "garment and avatar to look at", read_glb, write_glb),
     _json("fit_report", "fit_report.json", "ease, strain and contact per zone"),

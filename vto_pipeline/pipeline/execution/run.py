@@ -175,7 +175,10 @@ class _Run:
         """Read the inputs, call the stage, write what it returns."""
         name, meter = step.stage.name, Meter()
         with self.store.making(name) as unfinished, self.store.making(name) as scratch:
+            if name in self.renewed:
+                self.store.discard_kept(name, record.key)
             job = Job(self.listener.progress, scratch, self.request.seed, self.force_all, self.memory)
+            job.kept = self.store.kept(name, record.key) if step.stage.piecewise else None
             try:
                 with self._unchanged(step):
                     outputs, reason = self._call(step, job)

@@ -22,6 +22,7 @@ from vto_pipeline.pipeline.execution.digest import digest_file
 
 MANIFEST = "manifest.json"
 _UNFINISHED = ".unfinished-"
+_KEPT = ".kept"
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,19 @@ class Store:
             os.close(held)
             shutil.rmtree(folder, ignore_errors=True)
 
+    def kept(self, stage: str, key: str) -> Path:
+        """Return where a stage may keep what it has made so far, for a run that goes on from there; made if need be.
+
+        It is gone once the result is finished.
+        """
+        folder = self.folder / stage / f"{key}{_KEPT}"
+        folder.mkdir(parents=True, exist_ok=True)
+        return folder
+
+    def discard_kept(self, stage: str, key: str) -> None:
+        """Remove what an interrupted run kept of a stage."""
+        shutil.rmtree(self.folder / stage / f"{key}{_KEPT}", ignore_errors=True)
+
     def finish(
         self, unfinished: Path, stage: str, key: str, outputs: Mapping[str, str], record: Mapping[str, Any]
     ) -> Result:
@@ -100,6 +114,7 @@ class Store:
         folder.parent.mkdir(exist_ok=True)
         shutil.rmtree(folder, ignore_errors=True)  # what `find` did not accept
         os.replace(unfinished, folder)
+        self.discard_kept(stage, key)
         return Result(folder, dict(outputs), digests, dict(record))
 
     def remove_others(self, keys: Collection[tuple[str, str]], dry_run: bool = False) -> tuple[int, int]:
@@ -116,7 +131,8 @@ class Store:
         for folder in sorted(self.folder.glob("*/*")):
             if not folder.is_dir() or folder.parent.name.startswith(".") or (folder.parent.name, folder.name) in keys:
                 continue
-            with (folder.parent / f".{folder.name}.lock").open("w") as lock, suppress(BlockingIOError):
+            key = folder.name.removesuffix(_KEPT)
+            with (folder.parent / f".{key}.lock").open("w") as lock, suppress(BlockingIOError):
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 count, size = count + 1, size + sum(p.stat().st_size for p in folder.rglob("*") if p.is_file())
                 if not dry_run:

@@ -88,6 +88,7 @@ def drape(
     source_body: Path | str | None = None,
     fabric: str | Sequence[str] = "cotton_poplin",
     regraded: bool = False,
+    motion: Path | str | None = None,
     output: Path | str | None = None,
     settings: Settings | None = None,
     listener: Listener | None = None,
@@ -101,6 +102,7 @@ def drape(
         source_body: Avatar or mesh that the garment was scanned on; None: it is placed automatically.
         fabric: Preset or file; or one for each garment.
         regraded: Show how it looks in the customer's size, not whether it fits.
+        motion: Motion file or name of a preset, through which the draped garment is carried.
         output, settings, listener: As for `scan`; None: runs/drape_NAME.
 
     Raises:
@@ -108,7 +110,9 @@ def drape(
     """
     garments = [Path(garment)] if isinstance(garment, str | Path) else [Path(one) for one in garment]
     fabrics = [fabric] if isinstance(fabric, str) else list(fabric)
-    order = drape_order(garments, fabrics, _path(body), _path(measurements), _path(source_body), regraded, "drape")
+    order = drape_order(
+        garments, fabrics, _path(body), _path(measurements), _path(source_body), regraded, "drape", motion
+    )
     return run_order(order, output, _overrides(settings), listener=listener)
 
 

@@ -18,6 +18,7 @@ from vto_pipeline.stages.entry import planning
 
 _CAPTURES = ("photos", "video", "depth", "cloud", "surface")
 _DRAPED = ("draped", "audit", "trace", "render_mesh", "fit_report", "page")
+_MOVED = ("draped_motion", "motion_audit", "moving_scene")
 
 
 @dataclass(frozen=True)
@@ -122,6 +123,7 @@ def drape_order(
     source_body: Path | None,
     regraded: bool,
     name: str,
+    motion: Path | str | None = None,
 ) -> Order:
     """Return the order of a drape.
 
@@ -133,10 +135,18 @@ def drape_order(
         source_body: Avatar or mesh that the garments were scanned on.
         regraded: Whether the garment is shown in the customer's size, not whether it fits.
         name: Stands where a file's name stands in messages.
+        motion: File, or name of a preset, through which the draped garment is carried; None: it rests.
 
     Raises:
         ConfigError: arguments that do not go together.
     """
+    if motion is not None and len(garments) > 1:
+        raise ConfigError("a motion is only possible with one garment", hint="drape the layers one at a time")
+    if motion is not None and body is not None and not _is_avatar(body):
+        raise ConfigError(
+            f"a motion needs a body with joints, and {body} is a plain mesh or another model's body",
+            hint="fit an avatar to it with `vto fit --scan FILE`, and give that as the body",
+        )
     if (body is None) == (measurements is None):
         raise ConfigError("give either a body or measurements")
     given = {
@@ -144,8 +154,10 @@ def drape_order(
         f"mannequin.{'avatar' if _is_avatar(source_body) else 'surface'}": source_body,
         f"body.{'avatar' if _is_avatar(body) else 'mesh'}": body,
         "body.measurements": measurements,
+        "motion": motion,
     }
-    document = _document(name, given, _DRAPED, {"grade": {"mode": "regraded"}} if regraded else {})
+    wanted = _DRAPED if motion is None else (*_DRAPED, *_MOVED)
+    document = _document(name, given, wanted, {"grade": {"mode": "regraded"}} if regraded else {})
     return Order(document, Path("runs") / f"drape_{'_'.join(resolved(garment).stem for garment in garments)}")
 
 

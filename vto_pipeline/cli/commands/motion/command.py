@@ -50,7 +50,7 @@ def motion_command(
     from vto_pipeline.cli.commands.motion.lines import FRAMES_LOOKED_AT, motion_facts, motion_lines
     from vto_pipeline.geometry.topology import vertex_normals
     from vto_pipeline.io.bodies.avatars import receive_avatar
-    from vto_pipeline.io.gltf.animate import write_animated_glb
+    from vto_pipeline.io.gltf.animate import animated_glb, write_glb_bytes
     from vto_pipeline.io.motion.archive import write_avatar_motion
     from vto_pipeline.io.motion.read import read_motion
     from vto_pipeline.model.job import Job
@@ -73,7 +73,7 @@ def motion_command(
         written = [output / "motion.npz", output / "motion.glb"]
         write_avatar_motion(written[0], motion)
         normals = vertex_normals(TriangleMesh(body.bind_vertices, body.faces))
-        write_animated_glb(written[1], body, normals, motion)
+        write_glb_bytes(written[1], animated_glb(body, normals, motion)[0])
     data = {"path": source, **facts, "notes": job.notes, "warnings": job.warnings, "written": list(map(str, written))}
     said = [*job.notes, *(f"warning: {text}" for text in job.warnings), *(f"written: {path}" for path in written)]
     session.answer(data, [*motion_lines(facts), "", *said])

@@ -52,6 +52,21 @@ class _Surface(NamedTuple):
         return found if self.part is None else self.part.on_body(found)
 
 
+class Recollection(NamedTuple):
+    """What a search for contacts leaves for the next, of each vertex of the cloth.
+
+    Args:
+        guess, flank: Nearest face of the body, and of the other flank of a crease; -1 for none, shape (V,).
+        distance: To the body, negative inside [m], shape (V,).
+        first: Normal of the first of its planes, shape (V, 3).
+    """
+
+    guess: NDArray[np.int32]
+    distance: FloatArray
+    flank: NDArray[np.int32]
+    first: FloatArray
+
+
 class BodyCollider:
     """A moving body: keyframes spread evenly over `seconds`, then at rest.
 
@@ -83,9 +98,8 @@ class BodyCollider:
         self._distance: FloatArray = np.empty(0)
         self._flank: np.ndarray = np.empty(0, np.int32)
         self._first: FloatArray = np.empty((0, 3))
-        self._moves = len(self._frames) > 1 and bool(np.ptp(self._frames, axis=0).any())
         self._fitted_to = self.at(0.0)
-        self._at_rest = not self._moves
+        self._at_rest = not self._changes()
         self._surface = self._rest_surface() if self._at_rest else self._full_surface()
         if self._at_rest and not self._job.force_all:
             self._job.leave_out("refitting the body's tree", "the body is at rest")
@@ -98,6 +112,10 @@ class BodyCollider:
         place = max(time, 0.0) / self._seconds * (len(frames) - 1)
         first = int(place)
         return frames[first] + (place - first) * (frames[first + 1] - frames[first])
+
+    def _changes(self) -> bool:
+        """Return whether it moves at all."""
+        return len(self._frames) > 1 and bool(np.ptp(self._frames, axis=0).any())
 
     @property
     def faces(self) -> IntArray:
@@ -267,15 +285,21 @@ class BodyCollider:
 
     def _rest_surface(self) -> _Surface:
         """Return the body at rest, without the parts that cannot be touched."""
+        found = self._touchable_surface()
+        if found.part is not None:
+            self._job.note(
+                f"body: {found.part.buried} faces lie inside its other parts and cannot be touched, "
+                f"{int(found.part.passing.sum())} faces pass through others"
+            )
+        return found
+
+    def _touchable_surface(self) -> _Surface:
+        """Return the body where it was last fitted to, without the parts that cannot be touched there."""
         whole = self._full_surface()
         mesh = TriangleMesh(self._fitted_to, whole.faces)
         distance = SurfaceDistance(mesh)
         part = touchable(mesh, distance)
         if part.buried or part.passing.any():
-            self._job.note(
-                f"body: {part.buried} faces lie inside its other parts and cannot be touched, "
-                f"{int(part.passing.sum())} faces pass through others"
-            )
             searched = SurfaceTree(part.vertices, part.faces, bvh.build(part.vertices, part.faces))
             return whole._replace(searched=searched, part=part, judge=distance)
         return whole if self._clean.sealed else whole._replace(judge=distance)

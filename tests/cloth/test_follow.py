@@ -1,0 +1,240 @@
+"""A garment that is carried through its body's motion: frames of reference, friction, steps, interruptions."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from cloth_scenes import ball, fabric
+from ipc_judge import crosses, self_crosses
+from numpy.testing import assert_allclose, assert_array_equal
+
+from vto_pipeline.cloth import MeshCollider, simulate
+from vto_pipeline.cloth.moving.follow import follow
+from vto_pipeline.errors import ConfigError, SimulationError
+from vto_pipeline.geometry.topology import submesh
+from vto_pipeline.io.runs.frame_log import FrameLog, read_cloth_motion, write_cloth_motion
+from vto_pipeline.model.garment import Garment, RestShape
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.motion import BodyPath, ClothMotion
+
+RADIUS = 0.1
+FPS = 30
+
+
+def smooth(share):
+    """From 0 to 1 with no jump of the acceleration: 6 s⁵ - 15 s⁴ + 10 s³."""
+    s = np.clip(share, 0.0, 1.0)
+    return s**3 * (10 + s * (6 * s - 15))
+
+
+def path(moved, seconds):
+    """A ball; moved: time, its vertices at rest -> where they are."""
+    body = ball(RADIUS, levels=3)
+    return BodyPath(lambda t: np.array(moved(t, body.vertices)), body.faces, round(seconds * FPS) + 1, 1 / FPS)
+
+
+def shifted(points, x, y, z):
+    return points + np.array([x, y, z])
+
+
+def turned(angle, points):
+    c, s = np.cos(angle), np.sin(angle)
+    return points @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]).T
+
+
+@pytest.fixture(scope="module")
+def cap():
+    """A cap on a ball, at rest: about 50 degrees from the top."""
+    shell = ball(1.04 * RADIUS, levels=3)
+    up = shell.vertices[:, 1] > 0.65 * RADIUS
+    mesh = submesh(shell, up[shell.faces].all(axis=1))[0]
+    body = MeshCollider(ball(RADIUS, levels=3), friction=0.6)
+    still = simulate(mesh, cloth(), colliders=[body], seconds=4.0, settings={"until": "rest", "damping": 5.0})
+    assert still.report["settled"]
+    return Garment(TriangleMesh(still.positions, mesh.faces), RestShape(mesh.vertices))
+
+
+def cloth(friction=0.6):
+    return fabric(bending=1e-4, friction=friction)
+
+
+def test_a_still_body_leaves_cloth_at_rest(cap):
+    motion, found = follow(cap, path(lambda t, x: x, 1.0), cloth())
+    assert motion.frames.shape == (31, len(cap.mesh.vertices), 3)
+    assert np.abs(motion.frames - cap.mesh.vertices).max() < 5e-4
+    assert found["frames_crossing_body"] == 0 == found["frames_crossing_itself"]
+
+
+def test_cloth_is_carried_along_and_lies_as_before_when_all_is_still(cap):
+    """0.4 m in a second and to rest again; friction bears about 6 m/s², and 2.3 are asked for."""
+    way = np.array([0.4, 0.0, 0.0])
+    motion, found = follow(cap, path(lambda t, x: x + smooth(t) * way, 2.0), cloth(), {"damping": 0.0})
+    assert_allclose(motion.frames[-1] - way, cap.mesh.vertices, atol=2e-3)  # it slides by less than 2 %
+    middle = motion.frames[15] - smooth(0.5) * way
+    assert_allclose(middle, cap.mesh.vertices, atol=2e-3)
+    assert found["frames_crossing_body"] == 0
+
+
+def test_friction_turns_cloth_with_the_body_and_without_it_the_cloth_stays(cap):
+    def quarter(t, x):
+        return turned(smooth(t) * np.pi / 2, x)
+
+    held, _ = follow(cap, path(quarter, 1.0), cloth(0.6), {"damping": 0.0, "substeps": 4})
+    free, _ = follow(cap, path(quarter, 1.0), cloth(0.0), {"damping": 0.0})
+    assert_allclose(held.frames[-1], turned(np.pi / 2, cap.mesh.vertices), atol=5e-4)  # 0.3 mm: it comes to rest
+
+    def spun(frame):
+        a, b = cap.mesh.vertices[:, ::2] @ [1, 1j], frame[:, ::2] @ [1, 1j]
+        return abs(np.angle((a.conj() * b).sum()))
+
+    assert spun(free.frames[-1]) < np.deg2rad(30)  # the ball has facets, which push
+    assert abs(spun(held.frames[-1]) - np.pi / 2) < np.deg2rad(0.2)
+
+
+def test_what_is_not_held_keeps_its_speed_when_the_body_is_taken_away(cap):
+    """In free fall beside a body that has gone down faster, the centre of mass follows g t² / 2 from its own speed."""
+
+    def gone(t, x):
+        return shifted(x, 0.5 * t, -(max(0.0, t) ** 2) * 30.0, 0.0)
+
+    motion, _ = follow(cap, path(gone, 0.3), cloth(), {"damping": 0.0})
+    middle = motion.frames.mean(axis=1)
+    speed = np.diff(middle, axis=0) * FPS
+    assert_allclose(np.diff(speed[3:, 1]) * FPS, -9.81, rtol=0.01)  # even steps: backward Euler falls so exactly
+    assert_allclose(speed[3:, 0], speed[3, 0], atol=0.01)
+
+
+def test_half_the_step_gives_the_same_motion(cap):
+    def swung(t, x):
+        return shifted(x, 0.03 * (1 - np.cos(2 * np.pi * t / 0.5)), 0.0, 0.0)
+
+    ends = [
+        follow(cap, path(swung, 0.5), cloth(), {"substeps": n, "body_step_mm": 1000.0})[0].frames[-1] for n in (1, 2, 4)
+    ]
+    gaps = [np.sqrt(((a - b) ** 2).sum(axis=1).mean()) for a, b in pairwise(ends)]
+    assert max(gaps) < 2e-4  # m; in half a step the ball moves by up to 3 mm
+
+
+def test_energy_stays_bounded_while_the_body_shakes(cap):
+    """What the body gives is lost again by damping: the cloth never has more than some of its body's speed."""
+    amplitude, period = 0.005, 0.25  # 3.2 m/s²: friction bears about 6
+    top = 2 * np.pi * amplitude / period
+
+    def shaken(t, x):
+        return shifted(x, amplitude * np.sin(2 * np.pi * t / period) * smooth(4 * t), 0.0, 0.0)
+
+    _, found = follow(cap, path(shaken, 2.0), cloth())
+    mass = 0.2 * 2 * np.pi * (1.04 * RADIUS) ** 2 * 0.5
+    energy = [record["kinetic_j"] for record in found["per_frame"]]
+    assert max(energy) < 4 * 0.5 * mass * top**2
+    assert max(energy[30:]) < 1.5 * max(energy[:30]) + 1e-6
+    assert found["frames_crossing_body"] == 0
+
+
+def test_a_jump_of_ten_centimetres_between_frames_is_survived(cap):
+    def jump(t, x):
+        return shifted(x, 0.1 * np.clip(FPS * t - 5, 0, 1), 0.0, 0.0)
+
+    motion, found = follow(cap, path(jump, 0.6), cloth())
+    assert len(motion.frames) == 19
+    assert np.isfinite(motion.frames).all()
+    assert found["frames_crossing_body"] == 0 == found["frames_crossing_itself"]
+
+
+def test_cloth_between_parts_of_the_body_that_close_comes_free_when_they_open(cap):
+    """A second ball comes from the side, 20 mm deep into the first at the rim of the cap, and goes away again."""
+    one, other = ball(RADIUS, levels=3), ball(RADIUS, levels=3)
+    faces = np.vstack([one.faces, other.faces + len(one.vertices)])
+
+    def center(t):
+        return np.array([0.24 - 0.07 * (smooth(t / 0.5) - smooth((t - 0.8) / 0.5)), 0.055, 0.0])
+
+    def at(t):
+        return np.vstack([one.vertices, other.vertices + center(t)])
+
+    motion, found = follow(cap, BodyPath(at, faces, 46, 1 / FPS), cloth())
+    frames = found["per_frame"]
+    closed = [k for k, frame in enumerate(frames) if frame["own_crossings"]]
+    assert closed[0] > 5
+    assert closed[-1] < 40
+    assert all(frames[k]["yields_mm"] == 0.0 for k in range(46) if k < closed[0] - 3 or k > closed[-1] + 3)
+    assert 5.0 < max(frames[k]["yields_mm"] for k in closed) < 30.0
+    assert found["frames_crossing_itself"] == 0
+    for k, frame in enumerate(motion.frames):
+        deepest = max(RADIUS - np.linalg.norm(frame - c, axis=1).min() for c in (np.zeros(3), center(k / FPS)))
+        assert deepest < 1e-3 * (frames[k]["yields_mm"] + 1.0)
+    assert [k for k in range(closed[-1] + 2, 46) if frames[k]["body_crossings"] or frames[k]["penetration_mm"]] == []
+
+
+def test_frames_are_judged_as_ipctk_judges_them(cap):
+    def nodding(t, x):
+        return shifted(turned(0.5 * np.sin(4 * t), x), 0.05 * np.sin(6 * t), 0.02 * np.sin(9 * t), 0.0)
+
+    moving = path(nodding, 1.0)
+    motion, found = follow(cap, moving, cloth())
+    for k in range(0, len(motion.frames), 5):
+        mesh, body = TriangleMesh(motion.frames[k], motion.faces), TriangleMesh(moving.at(k / FPS), moving.faces)
+        assert crosses(mesh, body) == bool(found["per_frame"][k]["body_crossings"])
+        assert self_crosses(mesh) == bool(found["per_frame"][k]["self_crossings"])
+
+
+class Interrupted(Exception):
+    pass
+
+
+def test_an_interrupted_motion_goes_on_from_its_last_frame_to_the_same_end(cap, tmp_path):
+    def swung(t, x):
+        return shifted(x, 0.1 * smooth(2 * t), 0.0, 0.0)
+
+    whole, found = follow(cap, path(swung, 0.5), cloth())
+
+    def stop(done, text):
+        if done > 0.5:
+            raise Interrupted
+
+    with pytest.raises(Interrupted):
+        follow(cap, path(swung, 0.5), cloth(), None, Job(progress=stop), FrameLog(tmp_path))
+    kept = FrameLog(tmp_path)
+    assert len(kept.frames) == 9
+    job = Job()
+    rest, again = follow(cap, path(swung, 0.5), cloth(), None, job, kept)
+    assert "9 frames of an interrupted run are kept" in job.notes
+    assert_array_equal(rest.frames[:9], whole.frames[:9])
+    assert_array_equal(rest.frames, whole.frames)
+    assert [r["time_s"] for r in again["per_frame"]] == [r["time_s"] for r in found["per_frame"]]
+
+
+def test_frames_that_a_crash_left_broken_are_made_again(cap, tmp_path):
+    log = FrameLog(tmp_path)
+    log.add(cap.mesh.vertices, {"time_s": 0.0}, {"time": 0.0})
+    assert len(FrameLog(tmp_path).frames) == 1
+    (tmp_path / "frame_000000.npz").write_bytes(b"PK")
+    assert FrameLog(tmp_path).frames == []
+
+
+def test_cloth_that_is_caught_ends_with_its_frame_and_keeps_those_before():
+    mesh = ball(1.04 * RADIUS, levels=2)
+
+    def torn(t, x):
+        return x * (1.0 + 4.0 * np.clip(FPS * t - 3, 0, 1))
+
+    with pytest.raises(SimulationError, match="caught in frame 4 of 7, at 0.13 s") as caught:
+        follow(Garment(mesh, RestShape(mesh.vertices)), path(torn, 0.2), cloth(), {"attempts": 2})
+    assert len(caught.value.partial["draped_motion"].frames) == 4
+    assert caught.value.partial["motion_audit"]["frames"] == 4
+
+
+def test_unknown_settings_are_refused(cap):
+    with pytest.raises(ConfigError, match="frames_a_second"):
+        follow(cap, path(lambda t, x: x, 0.1), cloth(), {"frames_a_second": 3})
+
+
+def test_the_file_holds_frames_times_and_faces(cap, tmp_path):
+    motion = ClothMotion(np.stack([cap.mesh.vertices] * 3), cap.mesh.faces, 1 / 24)
+    write_cloth_motion(tmp_path / "draped_motion.npz", motion)
+    with np.load(tmp_path / "draped_motion.npz") as arrays:
+        assert arrays["frames"].shape == (3, len(cap.mesh.vertices), 3)
+        assert_allclose(arrays["times_s"], [0, 1 / 24, 2 / 24], rtol=1e-15)
+        assert_array_equal(arrays["faces"], cap.mesh.faces)
+    assert read_cloth_motion(tmp_path / "draped_motion.npz").frame_time == 1 / 24

@@ -1,0 +1,100 @@
+"""`python -m vto_pipeline.bench.motion.garments` carries garments through motions, each by `vto drape --motion`.
+
+Each run is a process of its own, so that one that fails costs no other; its row is written as soon as it ends.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from vto_pipeline.avatar.template.template import template
+from vto_pipeline.bench.bench import Value
+from vto_pipeline.bench.live_rows import LiveRows
+from vto_pipeline.bench.own_process import run_vto
+from vto_pipeline.io.bodies.avatars import write_avatar
+from vto_pipeline.io.documents import read_json
+from vto_pipeline.io.runs.frame_log import read_cloth_motion
+
+_COLUMNS = (
+    "garment",
+    "motion",
+    "vertices",
+    "outcome",
+    "frames",
+    "crossing_body",
+    "most_pairs",
+    "crossing_itself",
+    "body_in_itself",
+    "yields_mm",
+    "inside_mm",
+    "stretch",
+    "s_per_frame",
+)
+_OUTCOMES = {0: "done", 1: "crashed", 2: "refused", 3: "refused", 4: "failed", 5: "refused"}
+
+
+def main() -> None:
+    """Read the command line, run, and print a row each."""
+    parser = argparse.ArgumentParser(prog="python -m vto_pipeline.bench.motion.garments", description=__doc__)
+    parser.add_argument("--garment", type=Path, nargs="+", required=True, help="mesh or pattern files")
+    parser.add_argument("--motion", nargs="+", required=True, help="motion files, or names of presets")
+    parser.add_argument("--limit", type=float, default=3600.0, metavar="SECONDS", help="of a run")
+    parser.add_argument("--set", dest="settings", nargs="*", default=[], metavar="STAGE.KEY=VALUE", help="of the runs")
+    parser.add_argument("--out", type=Path, default=Path("runs/garment_motion"), metavar="DIR", help="for the runs")
+    arguments = parser.parse_args()
+    body = arguments.out / "mean_body.npz"
+    body.parent.mkdir(parents=True, exist_ok=True)
+    write_avatar(body, template())
+    table = LiveRows(arguments.out, _COLUMNS)
+    for garment in arguments.garment:
+        for motion in arguments.motion:
+            table.add(motion_row(garment, motion, body, arguments.out, arguments.settings, arguments.limit))
+
+
+def motion_row(
+    garment: Path, motion: str, body: Path, out: Path, settings: Sequence[str], limit: float
+) -> dict[str, Value]:
+    """Return what became of one run; figures that it did not reach are None.
+
+    Args:
+        garment: Mesh or pattern file.
+        motion: File, or name of a preset.
+        body: Avatar.
+        out: For the run.
+        settings: As `--set` takes them.
+        limit: Wall time after which the run is ended, with all that it has started [s].
+    """
+    folder = out / garment.stem  # one for all motions, so that it is draped once
+    command = ["drape", "--garment", str(garment), "--body", str(body), "--motion", motion, "-o", str(folder)]
+    for one in settings:
+        command += ["--set", one]
+    ended = run_vto(command, out / f"{garment.stem}_{Path(motion).stem}.log", limit)
+    outcome = "unfinished" if ended.code is None else _OUTCOMES.get(ended.code, "killed")
+    reached = _figures(folder) if outcome in ("done", "failed") else {}  # else its files are of the run before
+    return {"garment": garment.stem, "motion": Path(motion).stem, "outcome": outcome, **reached}
+
+
+def _figures(folder: Path) -> dict[str, Value]:
+    """Return the figures of a run's files, as far as it has got."""
+    for made in (folder / "out", folder / "out" / "partial"):
+        if (made / "motion_audit.json").exists():
+            found = read_json(made / "motion_audit.json")
+            return {
+                "vertices": read_cloth_motion(made / "draped_motion.npz").frames.shape[1],
+                "frames": found["frames"],
+                "crossing_body": found["frames_crossing_body"],
+                "most_pairs": found["most_body_crossings"],
+                "crossing_itself": found["frames_crossing_itself"],
+                "body_in_itself": found["frames_body_crossing_itself"],
+                "yields_mm": found["body_yields_mm"],
+                "inside_mm": found["penetration_mm"],
+                "stretch": found["max_stretch"],
+                "s_per_frame": found["seconds_per_frame"],
+            }
+    return {}
+
+
+if __name__ == "__main__":
+    main()

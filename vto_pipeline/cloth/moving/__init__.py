@@ -1,0 +1,9 @@
+"""A draped garment on a body that moves.
+
+follow: frame by frame: the way in
+frame: one frame: steps, and what is done where it fails
+path_collider: the body, posed when it is asked for
+yielding: a body that gives way where its own parts press on each other
+frame_audit: what each frame is judged by
+config: settings
+"""

@@ -1,0 +1,140 @@
+"""A draped garment carried through the motion of its body, frame by frame."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from vto_pipeline.cloth.dynamics.warm_up import warm_up
+from vto_pipeline.cloth.model.build import build_cloth
+from vto_pipeline.cloth.model.settings import checked
+from vto_pipeline.cloth.moving.config import FollowConfig
+from vto_pipeline.cloth.moving.frame import FrameStepper, moment_from
+from vto_pipeline.cloth.moving.frame_audit import audit_frame
+from vto_pipeline.errors import SimulationError
+from vto_pipeline.io.runs.frame_log import FrameLog
+from vto_pipeline.model.fabric import Fabric
+from vto_pipeline.model.garment import Garment
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.motion import BodyPath, ClothMotion
+
+_LATEST = 20  # frames whose time says how long the rest will take
+_SHOWN = 5
+
+
+def follow(
+    garment: Garment,
+    path: BodyPath,
+    fabric: Fabric,
+    settings: FollowConfig | Mapping[str, object] | None = None,
+    job: Job | None = None,
+    log: FrameLog | None = None,
+) -> tuple[ClothMotion, dict[str, Any]]:
+    """Carry a garment through the motion of its body.
+
+    Each frame starts from positions and velocities of the last, so that cloth swings on when the body stops. Contacts,
+    friction and internal friction are those of a drape.
+
+    Args:
+        garment: At rest on the body as the path begins.
+        path: The body.
+        fabric: What the garment is made of.
+        settings: Keys of `FollowConfig`.
+        job: For progress, findings and what was left out.
+        log: Frames of an earlier run that was interrupted, and where new ones are kept.
+
+    Returns:
+        The frames, and what was found in each, as JSON values.
+
+    Raises:
+        ConfigError: an unknown setting or a value out of range.
+        SimulationError: cloth is caught in a frame. `partial` holds the frames before as "draped_motion", and what was
+            found in them as "motion_audit".
+    """
+    config, job, log = checked(FollowConfig, settings), job or Job(), log or FrameLog()
+    job.progress(0.0, "compiling the kernels")
+    warm_up()
+    model = build_cloth(garment.mesh, garment.rest, fabric, materials=config, job=job)
+    stepper = FrameStepper(model, garment, path, fabric, config, job)
+
+    def keep(*, steps: int, attempts: int, began: float) -> None:
+        assert log is not None
+        body, state = stepper.body_at(path.time(len(log.frames))), stepper.now.state
+        found = audit_frame(
+            model,
+            stepper.natural,
+            state,
+            body,
+            own_crossings=stepper.body.own_crossings(len(log.frames)),
+            yields=stepper.body.depth(len(log.frames)),
+            steps=steps,
+            attempts=attempts,
+            seconds=time.perf_counter() - began,
+        )
+        log.add(state.positions, asdict(found), stepper.now.arrays())
+
+    if log.frames:
+        job.note(f"{len(log.frames)} frames of an interrupted run are kept")
+        stepper.now = moment_from(log.state)
+    else:
+        keep(steps=0, attempts=0, began=time.perf_counter())
+    while len(log.frames) < path.frames:
+        number, began = len(log.frames), time.perf_counter()
+        job.progress(number / path.frames, _pace(number, path.frames, log.records))
+        reached = stepper.go_to(number)
+        if reached.why:
+            raise SimulationError(
+                f"cloth is caught in frame {number} of {path.frames}, at {path.time(number):.2f} s: {reached.why}",
+                hint="a body that jumps or closes on the cloth leaves it no way: look at the motion there, or slow it",
+                partial={
+                    "draped_motion": ClothMotion(np.array(log.frames), model.faces, path.frame_time),
+                    "motion_audit": summary(log.records),
+                },
+            )
+        keep(steps=reached.steps, attempts=reached.attempts, began=began)
+    found = summary(log.records)
+    job.measure(**{name: value for name, value in found.items() if name != "per_frame"})
+    _warn(found, job)
+    return ClothMotion(np.array(log.frames), model.faces, path.frame_time), found
+
+
+def summary(records: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the worst of all frames, then each, as JSON values."""
+
+    def most(name: str) -> float:
+        return max(record[name] for record in records)
+
+    return {
+        "frames": len(records),
+        "frames_crossing_body": sum(record["body_crossings"] > 0 for record in records),
+        "frames_crossing_itself": sum(record["self_crossings"] > 0 for record in records),
+        "frames_body_crossing_itself": sum(record["own_crossings"] > 0 for record in records),
+        "most_body_crossings": most("body_crossings"),
+        "most_self_crossings": most("self_crossings"),
+        "penetration_mm": most("penetration_mm"),
+        "body_yields_mm": most("yields_mm"),
+        "max_stretch": most("max_stretch"),
+        "seconds_per_frame": float(np.median([record["seconds"] for record in records])),
+        "per_frame": [dict(record) for record in records],
+    }
+
+
+def _warn(found: Mapping[str, Any], job: Job) -> None:
+    for kind, name in (("body", "body_crossings"), ("itself", "self_crossings")):
+        places = [k for k, record in enumerate(found["per_frame"]) if record[name]]
+        if places:
+            shown = ", ".join(map(str, places[:_SHOWN])) + (" ..." if len(places) > _SHOWN else "")
+            job.warn(f"the garment crosses {'the ' if kind == 'body' else ''}{kind} in {len(places)} frames: {shown}")
+
+
+def _pace(number: int, frames: int, records: Sequence[Mapping[str, Any]]) -> str:
+    """Return which frame is next, and how long the rest will take."""
+    latest = [record["seconds"] for record in records[1:][-_LATEST:]]
+    if not latest:
+        return f"frame {number} of {frames}"
+    left = (frames - number) * sum(latest) / len(latest)
+    return f"frame {number} of {frames}, about {left:.0f} s left"

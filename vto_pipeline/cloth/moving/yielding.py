@@ -1,0 +1,96 @@
+"""A body that gives way where its own parts press on each other.
+
+Skinned bodies pass through themselves in armpits, groins and bent elbows, where flesh would be pressed flat. Cloth in
+between has no room, and is caught (Baraff, Witkin & Kass 2003, "Untangling cloth", section 5). So in each frame the
+skin about such places sinks in along its normals, on both sides alike, until cloth fits between.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vto_pipeline.geometry.intersections import self_intersections
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.geometry.topology import vertex_normals
+from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.motion import BodyPath
+
+_STEP, _STEPS = 3e-3, 10  # m of sinking at a time, and how often: less than 30 mm on either side
+_SMOOTHINGS = 2  # times that sinking is averaged with that of neighbours
+_REMEMBERED = 3  # frames
+
+
+class YieldingBody:
+    """A body on its path, which gives way to itself.
+
+    Args:
+        path: The body as it is posed.
+        room: To leave between parts that press on each other [m].
+        about: Its vertices that may sink, shape (N,). Those that have no room as the motion begins never do: creases.
+    """
+
+    def __init__(self, path: BodyPath, room: float, about: NDArray[np.int64]) -> None:
+        self._posed, self._room = path, room
+        self._about = about[~_pressed(TriangleMesh(path.at(0.0), path.faces), about, room)]
+        self._known: OrderedDict[int, tuple[int, FloatArray]] = OrderedDict()
+        self.path = BodyPath(self._at, path.faces, path.frames, path.frame_time)
+
+    def own_crossings(self, frame: int) -> int:
+        """Return how many pairs of triangles of the posed body meet in a frame."""
+        return self._frame(frame)[0]
+
+    def depth(self, frame: int) -> float:
+        """Return how far the skin has sunk in a frame where it has most [m]."""
+        return float(np.linalg.norm(self._frame(frame)[1], axis=1).max(initial=0.0))
+
+    def _at(self, time: float) -> FloatArray:
+        place = min(max(time / self._posed.frame_time, 0.0), float(self._posed.frames - 1))
+        first = int(place)
+        share = place - first
+        sunk = (1.0 - share) * self._frame(first)[1]
+        if share > 0.0:
+            sunk = sunk + share * self._frame(min(first + 1, self._posed.frames - 1))[1]
+        return self._posed.at(time) + sunk
+
+    def _frame(self, frame: int) -> tuple[int, FloatArray]:
+        """Return pairs that meet, and how the skin has moved by sinking [m], shape (V, 3)."""
+        if frame not in self._known:
+            mesh = TriangleMesh(self._posed.at(self._posed.time(frame)), self._posed.faces)
+            self._known[frame] = len(self_intersections(mesh)), sunken(mesh, self._about, self._room)
+            if len(self._known) > _REMEMBERED:
+                self._known.popitem(last=False)
+        return self._known[frame]
+
+
+def sunken(mesh: TriangleMesh, about: NDArray[np.int64], room: float) -> FloatArray:
+    """Return how the skin moves so that its parts leave room between them, as far as that goes [m], shape (V, 3).
+
+    Args:
+        mesh: A body.
+        about: Its vertices that may sink, shape (N,).
+        room: To leave [m].
+    """
+    moved = np.zeros_like(mesh.vertices)
+    corners = mesh.faces.reshape(-1)
+    around = np.roll(mesh.faces, 1, axis=1).reshape(-1)
+    count = np.bincount(corners, minlength=len(moved)) + 1.0
+    for _ in range(_STEPS):
+        now = TriangleMesh(mesh.vertices + moved, mesh.faces)
+        about = about[_pressed(now, about, room)]
+        if len(about) == 0:
+            break
+        sinks = np.zeros(len(moved))
+        sinks[about] = _STEP
+        for _ in range(_SMOOTHINGS):
+            sinks = (sinks + np.bincount(corners, sinks[around], len(moved))) / count
+        moved -= sinks[:, None] * vertex_normals(now)
+    return moved
+
+
+def _pressed(mesh: TriangleMesh, about: NDArray[np.int64], room: float) -> NDArray[np.bool_]:
+    """Return which of these vertices have another part of the body within the room above them [m], shape (N,)."""
+    return SurfaceDistance(mesh).inside(mesh.vertices[about] + room * vertex_normals(mesh)[about])
