@@ -16,8 +16,8 @@ from vto_pipeline.geometry.remeshing.ears import clip_ears
 from vto_pipeline.geometry.remeshing.fold import fold_to, triangle_normal
 from vto_pipeline.model.arrays import FloatArray, IntArray
 
-LONGEST = 1000
-"""Points of the longest loop that is triangulated at its best, in about 2 s: the work grows with the third power."""
+LONGEST = 2000
+"""Points of the longest loop that is triangulated at its best, in about 16 s: the work grows with the third power."""
 
 MOST = 10_000
 """Points of the longest loop that is shortened to that by ears: chords that are taken need the square in bytes."""
