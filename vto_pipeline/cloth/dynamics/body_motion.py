@@ -70,7 +70,12 @@ class VariableSpeedBody(BodyCollider):
 
 
 def run_body_motion(
-    stepper: Stepper, state: ClothState, body: VariableSpeedBody, deep: float, watch: Callable[[float], None]
+    stepper: Stepper,
+    state: ClothState,
+    body: VariableSpeedBody,
+    deep: float,
+    watch: Callable[[float], None],
+    only_grows: bool = False,
 ) -> ClothState:
     """Return the cloth when the body's motion is over; where cloth is deep in the body, that waits for it.
 
@@ -80,19 +85,20 @@ def run_body_motion(
         body: Slowed as need be.
         deep: Cloth deeper in the body than this is behind [m].
         watch: Receives the share of the motion that is done.
+        only_grows: Whether jammed cloth will not come free, as it does when arms that pressed on it go up again.
 
     Raises:
-        IntersectingError: the cloth is jammed: what is left over of its forces is far above its weight, and does not
-            fall. Steps take minutes then, and lead nowhere. `partial` holds it there as "draped".
+        IntersectingError: the body only grows and the cloth is jammed: what is left over of its forces is far above its
+            weight, and does not fall. Steps take minutes then, and lead nowhere. `partial` holds it there as "draped".
     """
     speed, left = 1.0, [0.0]
     while state.time < body.ends - 1e-9:
         state = stepper.run(state, min(_WINDOW, body.ends - state.time))
         watch(state.time / body.ends)
         left.append(stepper.residual(state))
-        if is_jammed(left):
+        if only_grows and is_jammed(left):
             raise IntersectingError(
-                f"the cloth is jammed as the body moves, with forces of {left[-1]:.0f} times its weight",
+                f"the cloth is jammed as the body grows, with forces of {left[-1]:.0f} times its weight",
                 hint="it lies between parts of the body, or its layers are entangled: give it nearer to how it is worn",
                 partial={"draped": TriangleMesh(state.positions, stepper.faces)},
             )

@@ -123,7 +123,12 @@ class Phases:
         collider = self.collider(growth.body, growth.garment)
         stepper = self.stepper(without_gravity(self._model), collider, _CALM)
         grown = run_body_motion(
-            stepper, state, collider, self._skin, lambda done: self._job.progress(0.05 + 0.25 * done, what)
+            stepper,
+            state,
+            collider,
+            self._skin,
+            lambda done: self._job.progress(0.05 + 0.25 * done, what),
+            only_grows=True,
         )
         return at_rest(grown.positions)
 

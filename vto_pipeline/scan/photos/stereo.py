@@ -89,10 +89,11 @@ def estimate_depth_maps(
         job.warn(f"no depth in {len(blind)} of {len(views)} photos: {', '.join(blind)}")
     job.measure(pairs=len(pairs), depth_pixels=kept, consistent_share=round(kept / measured, 3))
     maps = replace(merged, depth=checked)
+    del merged  # as large as what is kept
     if config.rematch.rounds == 0:
         return maps
     try:
-        return rematch([undistorted(view.gray, view.camera) for view in views], maps, config.rematch, job)
+        return rematch((undistorted(view.gray, view.camera) for view in views), maps, config.rematch, job)
     except ScanError as error:
         job.note(f"no second look: {error.problem}")
         return maps
