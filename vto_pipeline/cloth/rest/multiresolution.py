@@ -156,7 +156,8 @@ class _CoarseToFine:
                 left = f"{phases.crossings_left} pairs of triangles still intersect"
                 self._leave_out(model, f"too coarse to clear the body: {left}")
                 return None
-        collider = phases.collider(body, TriangleMesh(state.positions, model.faces))
+        cloth = TriangleMesh(state.positions, model.faces)
+        collider = phases.collider(phases.give_way(body, cloth), cloth)
         stepper = phases.stepper(model, collider, config.damping)
         stepper.prepare(state.positions)
         job.note(f"{stepper.choice.method}, {stepper.substeps} steps per 1/60 s: {stepper.choice.reason}")
