@@ -17,7 +17,7 @@ def two_balls(gaps):
     """Two balls on the x axis, with these gaps between them from keyframe to keyframe [m]."""
     one = ball(RADIUS)
     frames = [
-        np.concatenate([one.vertices - (RADIUS + 0.5 * gap, 0, 0), one.vertices + (RADIUS + 0.5 * gap, 0, 0)])
+        np.concatenate([one.vertices + np.array([side * (RADIUS + 0.5 * gap), 0.0, 0.0]) for side in (-1, 1)])
         for gap in gaps
     ]
     return MovingBody(np.array(frames), np.concatenate([one.faces, one.faces + len(one.vertices)]))
