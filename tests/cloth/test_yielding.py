@@ -56,6 +56,9 @@ def test_where_a_motion_ends_the_body_is_as_it_was_given():
     found, deepest = give_way(given, SKIN, everywhere(given))
     assert deepest == 0.0
     assert found is given
+    asked, deepest = give_way(given, SKIN, everywhere(given), at_end=True)
+    assert deepest > 0.0
+    assert gap_between(asked.keyframes[-1]) >= ROOM
 
 
 def test_only_what_is_asked_about_gives_way_and_creases_of_the_first_keyframe_never_do():

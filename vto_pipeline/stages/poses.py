@@ -13,14 +13,18 @@ from vto_pipeline.assess.fit import FitConfig
 from vto_pipeline.assess.poses import openings_slide, stretch_by_part, verdict
 from vto_pipeline.avatar.model.pose import clear_pose, morph
 from vto_pipeline.avatar.template.regions import part_names
+from vto_pipeline.cloth.collision.body.yielding import give_way
 from vto_pipeline.cloth.drape import drape
 from vto_pipeline.cloth.drape_config import DrapeConfig
+from vto_pipeline.cloth.dynamics.body_motion import beside
 from vto_pipeline.cloth.model.settings import checked
 from vto_pipeline.cloth.rest_shape.edge_length_embedding import lengths_in_space
+from vto_pipeline.cloth.simulation import default_skin
 from vto_pipeline.errors import SimulationError
+from vto_pipeline.geometry.topology import laid_edge_lengths
 from vto_pipeline.io.runs.frame_log import FrameLog
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.model.body import Avatar
+from vto_pipeline.model.body import Avatar, MovingBody
 from vto_pipeline.model.garment import Garment
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -53,19 +57,28 @@ class PosesConfig(DrapeConfig):
 def _poses(inputs: Inputs, settings: PosesConfig, job: Job) -> Outputs:
     log, scene = FrameLog(job.kept), []
     for number, name in enumerate(settings.poses):
-        target = clear_pose(inputs["avatar"], name)
+        body = _posed(inputs, name, settings)
         if number == len(log.frames):
-            log.add(*_in_pose(inputs, target, number, settings, job), {})
+            log.add(*_in_pose(inputs, body, number, settings, job), {})
         if log.records[number]["reached"]:
             draped = TriangleMesh(log.frames[number], inputs["draped"].faces)
-            scene += _shown(inputs, draped, target, number, name)
+            scene += _shown(inputs, draped, body.final, number, name)
         else:
             job.warn(log.records[number]["verdict"])
     return {"pose_report": {"schema": 1, "poses": [dict(record) for record in log.records]}, "posed_scene": scene}
 
 
+def _posed(inputs: Inputs, name: str, settings: PosesConfig) -> MovingBody:
+    """Return the body on its way to a pose; it gives way, as flesh does, where its parts would press on the cloth."""
+    avatar, cloth = inputs["avatar"], inputs["draped"]
+    body = morph(avatar, clear_pose(avatar, name), settings.keyframes)
+    edges = laid_edge_lengths(cloth, inputs["worn_rest"].corners(cloth.faces))
+    skin = default_skin(float(np.median(edges))) if settings.skin_mm is None else 1e-3 * settings.skin_mm
+    return give_way(body, skin, beside(avatar.vertices, cloth), at_end=True)[0]
+
+
 def _in_pose(
-    inputs: Inputs, target: Avatar, number: int, settings: PosesConfig, job: Job
+    inputs: Inputs, body: MovingBody, number: int, settings: PosesConfig, job: Job
 ) -> tuple[FloatArray, dict[str, Any]]:
     """Return where the garment is when its body has taken a pose, and what is to be said of it there."""
     name, count = settings.poses[number], len(settings.poses)
@@ -75,7 +88,6 @@ def _in_pose(
         job.progress((number + share) / count, f"{words}: {text}")
 
     part = Job(progress, job.scratch, job.seed, job.force_all, job.memory)
-    body = morph(inputs["avatar"], target, settings.keyframes)
     config = settings.model_dump(exclude={"poses", "keyframes"})
     try:
         found = drape(Garment(inputs["draped"], inputs["worn_rest"]), body, inputs["fabric"], config, part)
@@ -84,29 +96,29 @@ def _in_pose(
         return inputs["draped"].vertices, {"pose": name, "reached": False, "verdict": why}
     job.notes += [f"{words}: {text}" for text in (*part.notes, *part.warnings)]
     record = {"pose": name, "reached": True, "settled": found.audit["settled"], "error_mm": part.metrics["error_mm"]}
-    return found.mesh.vertices, {**record, "seconds": part.metrics["seconds"], **_fit(inputs, found.mesh, target, name)}
+    return found.mesh.vertices, {**record, "seconds": part.metrics["seconds"], **_fit(inputs, found.mesh, body, name)}
 
 
-def _fit(inputs: Inputs, draped: TriangleMesh, target: Avatar, name: str) -> dict[str, Any]:
+def _fit(inputs: Inputs, draped: TriangleMesh, body: MovingBody, name: str) -> dict[str, Any]:
     """Return where the garment is tight in a pose, and what has slid, beside how it was draped."""
     before: Avatar = inputs["avatar"]
     limit, parts = checked(FitConfig, None).stretch_limit, part_names(before)
     rest = lengths_in_space(inputs["worn_rest"], inputs["draped"])
     standing = stretch_by_part(inputs["draped"], rest, before.mesh, parts, limit)
-    posed = stretch_by_part(draped, rest, target.mesh, parts, limit)
-    slides = openings_slide(inputs["draped"], before.mesh, draped, target.mesh)
+    posed = stretch_by_part(draped, rest, body.final, parts, limit)
+    slides = openings_slide(inputs["draped"], before.mesh, draped, body.final)
     words = verdict(name, standing, posed, slides, limit)
     return {"stretch_limit": limit, "parts": posed, "parts_before": standing, "openings": slides, "verdict": words}
 
 
-def _shown(inputs: Inputs, draped: TriangleMesh, target: Avatar, number: int, name: str) -> list[GlbPart]:
+def _shown(inputs: Inputs, draped: TriangleMesh, body: TriangleMesh, number: int, name: str) -> list[GlbPart]:
     """Return the parts to look at: the garment in detail and its body, beside those of the poses before."""
     config, quiet = checked(DressConfig, None), Job()
     parts = deform_render_mesh(most_detailed(inputs), inputs["sim_mesh"], draped, config, quiet)
     shift = np.array([_BESIDE * number, 0.0, 0.0])
     return [
         replace(part, name=f"{name} {part.name}", mesh=replace(part.mesh, vertices=part.mesh.vertices + shift))
-        for part in (*parts, body_part(target.mesh, config))
+        for part in (*parts, body_part(body, config))
     ]
 
 

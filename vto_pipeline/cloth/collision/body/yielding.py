@@ -69,18 +69,21 @@ class YieldingBody:
         return self._known[frame]
 
 
-def give_way(body: MovingBody, skin: float, about: NDArray[np.int64]) -> tuple[MovingBody, float]:
+def give_way(
+    body: MovingBody, skin: float, about: NDArray[np.int64], *, at_end: bool = False
+) -> tuple[MovingBody, float]:
     """Return the body, its skin sunken between its first and last keyframe, and how far it sinks at most [m].
 
     Args:
         body: The keyframes.
         skin: Distance that cloth keeps from it [m].
         about: Its vertices that may sink, shape (N,). Those that have no room as the motion begins never do: creases.
+        at_end: Whether it gives way in its last keyframe, too.
     """
     frames, room = body.keyframes.copy(), _ROOM * skin
     about = about[~_pressed(TriangleMesh(frames[0], body.faces), about, room)]
     deepest = 0.0
-    for frame in frames[1:-1]:
+    for frame in frames[1 : None if at_end else -1]:
         sunk = sunken(TriangleMesh(frame, body.faces), about, room)
         frame += sunk
         deepest = max(deepest, float(np.linalg.norm(sunk, axis=1).max(initial=0.0)))
