@@ -133,7 +133,9 @@ def results() -> dict[Path, int]:
 
 
 def squares(rows: int) -> list[str]:
-    return [Path(f"out/rows/row_{offset}/out/squared.txt").read_text() for offset in range(1, rows + 1)]
+    digits = len(str(rows))  # names are padded, so that they sort
+    names = [f"row_{offset:0{digits}d}" for offset in range(1, rows + 1)]
+    return [Path(f"out/rows/{name}/out/squared.txt").read_text() for name in names]
 
 
 def expected(rows: int) -> list[str]:

@@ -87,7 +87,7 @@ def batch_command(
             count = workers or default_workers(1e3 * memory)
             limits = {"seconds": time_limit, "memory_mb": 1e3 * memory, "retries": retries}
             tasks = [_task(one, folder, force_all, count, limits) for one in missing]
-            results = run_rows(tasks, count, scheduler, folder / "workers") if tasks else ()
+            results = run_rows(tasks, count, scheduler, folder / "workers", session.say) if tasks else ()
             left = TimeLeft({task.name: expected[task.name] for task in tasks}, count)
             if tasks and left.seconds() is not None:
                 session.say(f"{len(tasks)} rows to run: about {left.seconds():.0f} s, by earlier runs")

@@ -13,7 +13,8 @@ import vto_pipeline
 from vto_pipeline.errors import InputError
 from vto_pipeline.pipeline.given import Given
 
-_SOURCE = {".py", ".yaml", ".html", ".js", ".css", ".csv", ".npz"}
+SOURCE = {".py", ".yaml", ".html", ".js", ".css", ".csv", ".npz"}
+"""Endings of the files of the package that decide what it computes."""
 
 
 def digest_file(path: Path) -> str:
@@ -62,7 +63,7 @@ def code_identity() -> str:
     package = Path(vto_pipeline.__file__).parent
     if not (package.parent / "pyproject.toml").is_file():
         return vto_pipeline.__version__
-    files = sorted(p for p in package.rglob("*") if p.suffix in _SOURCE)
+    files = sorted(p for p in package.rglob("*") if p.suffix in SOURCE)
     return digest_value({p.relative_to(package).as_posix(): digest_file(p) for p in files})
 
 
