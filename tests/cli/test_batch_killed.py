@@ -102,6 +102,7 @@ def new_cluster(tmp_path) -> Iterator[Callable[[], Cluster]]:
     yield new
     for process in reversed(started):
         process.terminate()
+    for process in reversed(started):
         with suppress(subprocess.TimeoutExpired):
             process.wait(PATIENCE / 4)
         process.kill()
