@@ -12,7 +12,7 @@ from stalled_folder import stalled_folder
 from vto_pipeline.errors import InputError
 from vto_pipeline.io import stalls
 from vto_pipeline.io.stalls import answered, check_answers
-from vto_pipeline.pipeline.execution.digest import digest_path
+from vto_pipeline.pipeline.execution.digest import digest_file, digest_path
 
 FILES = {"left.txt": b"3", "large.bin": bytes(range(256)) * 12_000}
 
@@ -72,6 +72,13 @@ def test_a_folder_that_answers_is_read_and_one_that_does_not_is_refused(tmp_path
         check_answers(far.path / "left.txt")  # it has answered this process before
         with pytest.raises(InputError, match="no answer has come for 1 s"):
             check_answers(far.path / "right.txt")
+
+
+def test_each_block_of_a_file_counts_as_an_answer(tmp_path):
+    (tmp_path / "large.bin").write_bytes(bytes(5 << 20))
+    beats: list[None] = []
+    digest_file(tmp_path / "large.bin", lambda: beats.append(None))
+    assert len(beats) == 5  # of 1 MiB
 
 
 @pytest.mark.usefixtures("impatient")

@@ -93,6 +93,8 @@ def test_another_minute_is_told_from_how_the_error_fell():
     assert error_after(seconds, falling, 60.0) == pytest.approx(expected, rel=1e-9)  # the closed form itself
     early = [math.inf, 0.5, *falling[2:]]  # the first half does not count, nor what is not known
     assert error_after(seconds, early, 60.0) == pytest.approx(expected, rel=1e-9)
+    gap = [math.inf if k == 15 else value for k, value in enumerate(falling)]
+    assert error_after(seconds, gap, 60.0) == pytest.approx(expected, rel=1e-9)
     noisy = [value * (1.2 if k % 2 else 1 / 1.2) for k, value in enumerate(falling)]
     assert error_after(seconds, noisy, 60.0) == pytest.approx(expected / 1.2, rel=0.3)
     assert error_after(seconds, falling[::-1], 60.0) is None

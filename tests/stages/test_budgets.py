@@ -95,8 +95,8 @@ def test_the_outcome_says_what_the_budget_bought():
 
 
 def test_the_outcome_says_what_another_minute_would_buy(tmp_path):
-    rows = [TraceRow(float(t), t, 8.0 * math.exp(-t / 30.0), 1.0) for t in range(31)]
-    rows[:0] = [TraceRow(0.0, 0, 99.0, 1.0, level=1)]  # of a coarser mesh
+    rows = [TraceRow(float(t), t, 5.0, 1.0, level=1) for t in range(60)]  # of a coarser mesh
+    rows += [TraceRow(60.0 + t, t, 8.0 * math.exp(-max(0, t - 15) / 15.0), 1.0) for t in range(31)]
     (tmp_path / "out").mkdir()
     write_trace(tmp_path / "out" / "trace.csv", rows)
 
@@ -106,7 +106,7 @@ def test_the_outcome_says_what_another_minute_would_buy(tmp_path):
         return [line for line in outcome_lines(Outcome(tmp_path, record, catalogue())) if "another minute" in line]
 
     reached = 8.0 * math.exp(-1.0)
-    assert said(error_mm=reached, settled=False) == ["  another minute for drape: about 0.4 mm instead of 2.9"]
+    assert said(error_mm=reached, settled=False) == ["  another minute for drape: about 0.054 mm instead of 2.9"]
     assert said(error_mm=0.01, settled=True) == []
     write_trace(tmp_path / "out" / "trace.csv", [replace(row, error_mm=5.0 + row.seconds) for row in rows])
     assert said(error_mm=35.0, settled=False) == [

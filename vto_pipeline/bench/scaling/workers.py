@@ -12,13 +12,14 @@ from pathlib import Path
 from vto_pipeline.bench.bench import Value
 from vto_pipeline.bench.live_rows import LiveRows
 from vto_pipeline.bench.own_process import run_vto
-from vto_pipeline.errors import ComputationError
+from vto_pipeline.errors import ComputationError, VtoError
 from vto_pipeline.io.documents import write_json
 from vto_pipeline.pipeline.batch.ledger import read_ledger
 from vto_pipeline.pipeline.execution.store import MANIFEST
 
 _COARSE = {"simulation_mesh": {"edge_mm": 30.0}, "drape": {"target_error_mm": 5.0}}
 _DRESSED, _BARE = ["draped", "fit_report", "page"], ["avatar", "page"]
+_FABRIC = "cotton_poplin"
 _LIMIT = 24 * 3600.0  # s
 _COLUMNS = ("workers", "rows", "done", "failed", "seconds", "share_of_first", "made")
 
@@ -34,7 +35,9 @@ def order(garments: Sequence[Path], bodies: Sequence[Path], measurements: Sequen
     every = {f"given.body.{kind}": [str(path.absolute()) for path in customers]}
     if garments:
         every = {"given.garment.mesh": [str(path.absolute()) for path in garments], **every}
-    run = {"schema": 1, "given": {}, "want": _DRESSED if garments else _BARE, "stages": _COARSE if garments else {}}
+    run: dict[str, object] = {"schema": 1, "given": {}, "want": _BARE}
+    if garments:
+        run |= {"given": {"fabric": _FABRIC}, "want": _DRESSED, "stages": _COARSE}
     return {"schema": 1, "run": run, "every": every}
 
 
@@ -74,7 +77,7 @@ def rows(document: Mapping[str, object], counts: Sequence[int], folder: Path) ->
         }
 
 
-def main() -> None:
+def main() -> int:
     """Read the command line, and print a row for each number of workers."""
     parser = argparse.ArgumentParser(prog="python -m vto_pipeline.bench.scaling.workers", description=__doc__)
     parser.add_argument("garments", nargs="*", type=Path, metavar="GARMENT", help="meshes")
@@ -85,12 +88,16 @@ def main() -> None:
     parser.add_argument("-o", "--out", type=Path, default=Path("runs/workers"), help="folder for the batches")
     arguments = parser.parse_args()
     os.environ["NUMBA_NUM_THREADS"] = "1"  # a row takes the same work beside others as alone
-    table = LiveRows(arguments.out, _COLUMNS)
     document = order(arguments.garments, arguments.body, arguments.measurements)
-    for row in rows(document, arguments.workers, arguments.out):
-        table.add(row)
-    sys.stdout.flush()
+    table = LiveRows(arguments.out, _COLUMNS)
+    try:
+        for row in rows(document, arguments.workers, arguments.out):
+            table.add(row)
+    except VtoError as error:
+        sys.stderr.write(f"{error}\n")
+        return error.exit_code
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
