@@ -26,7 +26,9 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("wheel")
     if not (ROOT / ".git").exists():
         pytest.skip("no checkout")
-    listed = call("git", "ls-files", "-co", "--exclude-standard", "--", "vto_pipeline", "*.md", "*.toml", "LICENSE", cwd=ROOT)
+    listed = call(
+        "git", "ls-files", "-co", "--exclude-standard", "--", "vto_pipeline", "*.md", "*.toml", "LICENSE", cwd=ROOT
+    )
     for name in filter(lambda name: (ROOT / name).is_file(), listed.split("\n")):
         (folder / "source" / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / "source" / name).write_bytes((ROOT / name).read_bytes())

@@ -58,7 +58,9 @@ def test_all_that_python_loads_for_a_bench_is_among_its_sources(name):
     """But for what the table of all benches loads."""
     listing = "import sys; print(*(n for n in sys.modules if n.startswith('vto_pipeline.')))"
     loaded = [
-        set(subprocess.run([sys.executable, "-c", f"{first}; {listing}"], capture_output=True, text=True).stdout.split())
+        set(
+            subprocess.run([sys.executable, "-c", f"{first}; {listing}"], capture_output=True, text=True).stdout.split()
+        )
         for first in ("import vto_pipeline.bench", f"import {BENCHES[name].module}")
     ]
     names = {module.replace(".", "/") for module in loaded[1] - loaded[0]}

@@ -52,7 +52,9 @@ def changed_sources(document: Mapping[str, Any], root: Path = ROOT) -> list[str]
     kept = document.get("sources")
     if kept is None:
         return None
-    return [name for name, content in kept.items() if not (root / name).is_file() or content_name(root / name) != content]
+    return [
+        name for name, content in kept.items() if not (root / name).is_file() or content_name(root / name) != content
+    ]
 
 
 def content_name(path: Path) -> str:

@@ -16,7 +16,6 @@ from vto_pipeline.units import LENGTH_M, MEMORY_B, TIME_S
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-
 class _AnsweringPath(click.Path):
     """A path whose folder answers; the engine checks the rest, so that all commands complain in the same words."""
 

@@ -9,6 +9,7 @@ import os
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -64,7 +65,11 @@ def check_answers(path: Path) -> None:
     Raises:
         InputError: it does not.
     """
-    for folder in (os.path.dirname(os.path.abspath(path)), os.path.abspath(path)):
-        if folder not in _ANSWERED:
-            answered(Path(folder), lambda beat, folder=folder: os.path.lexists(folder))
-            _ANSWERED.add(folder)
+    for one in (os.path.dirname(os.path.abspath(path)), os.path.abspath(path)):
+        if one not in _ANSWERED:
+            answered(Path(one), partial(_is_there, one))
+            _ANSWERED.add(one)
+
+
+def _is_there(name: str, beat: Beat) -> bool:
+    return os.path.lexists(name)
