@@ -79,8 +79,8 @@ def test_the_pages_are_what_sources_and_results_say_and_read_well():
 def test_every_page_names_its_figures_with_command_and_file(project):
     assert "It takes 0.35 s for 1 m." in (project / "docs/benchmarks/toy.md").read_text()
     assert (
-        "| 0.35 | hang 32, newton: seconds | [toy.json](../results/toy.json) | `vto bench toy` |"
-        in (project / FIGURES).read_text()
+        "| 0.35 | hang 32, newton: seconds | [toy.json](../results/toy.json) | 2026-11-23, `0123456789ab` | "
+        "`vto bench toy` |" in (project / FIGURES).read_text()
     )
     assert list(faults(project)) == []
 

@@ -111,14 +111,32 @@ def test_known_rows_are_not_measured_again(bench_of, tmp_path):
     assert forced.measured == [0, 1, 2, 3]
 
 
-@pytest.mark.parametrize("changed", ["code", "cpu", "threads", "numba"])
-def test_rows_of_another_machine_or_code_do_not_count(bench_of, tmp_path, monkeypatch, changed):
+@pytest.mark.parametrize("changed", ["cpu", "threads", "numba"])
+def test_rows_of_another_machine_do_not_count(bench_of, tmp_path, monkeypatch, changed):
     run(bench_of, tmp_path, Counted())
     other = {**this_machine(), changed: "other"}
     monkeypatch.setattr(record_module, "this_machine", lambda: other)
     again = Counted()
     run(bench_of, tmp_path, again)
     assert again.measured == [0, 1, 2, 3]
+
+
+def test_rows_count_as_long_as_the_files_that_the_bench_drives_are_the_same(bench_of, tmp_path, monkeypatch):
+    sources = {"solver.py": "1"}
+    monkeypatch.setattr(record_module, "sources_of", lambda modules: dict(sources))
+    with pytest.raises(KeyboardInterrupt):
+        run(bench_of, tmp_path, Counted(interrupted_before=2))
+    after = Counted()
+    assert run(bench_of, tmp_path, after)["sources"] == sources
+    assert after.measured == [2, 3]  # what the journal has counts
+    monkeypatch.setattr(record_module, "this_machine", lambda: {**this_machine(), "code": "of a page, say"})
+    same = Counted()
+    run(bench_of, tmp_path, same)
+    assert same.measured == []
+    sources["solver.py"] = "2"
+    other = Counted()
+    run(bench_of, tmp_path, other)
+    assert other.measured == [0, 1, 2, 3]
 
 
 def test_load_is_a_state_and_not_the_machine():

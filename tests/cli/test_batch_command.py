@@ -72,14 +72,17 @@ def test_a_batch_does_what_can_be_done_and_only_the_rest_again(ordered, tmp_path
     assert made == 1  # three rows need it
 
     Path("table.csv").write_text(TABLE.replace("true", ""))
-    again = ordered("batch", "order.yaml", "-o", "november")
+    again = ordered("batch", "order.yaml", "-o", "november", "--log", "log.jsonl")
     assert again.code == 0, again.err
     assert "2 of 3 rows are done and unchanged" in again.err
     assert "[1/1] c: done" in again.err
+    row, done = (json.loads(line) for line in Path("log.jsonl").read_text().splitlines())
+    assert (row["event"], row["name"], row["status"], row["done"], row["count"]) == ("row", "c", "done", 1, 1)
+    assert (done["event"], done["counts"]) == ("done", {"done": 3})
     assert squared("c") == str((2 * 3 + 2 * 4) ** 2)
 
-    third = ordered("batch", "order.yaml", "-o", "november", "--json")
-    assert third.code == 0
+    third = ordered("batch", "order.yaml", "-o", "november", "--json", "-q")
+    assert (third.code, third.err) == (0, "")
     assert third.data["counts"] == {"done": 3}
 
     status = ordered("status", "november")

@@ -102,6 +102,7 @@ def new_cluster(tmp_path) -> Iterator[Callable[[], Cluster]]:
     yield new
     for process in reversed(started):
         process.terminate()
+    for process in reversed(started):
         with suppress(subprocess.TimeoutExpired):
             process.wait(PATIENCE / 4)
         process.kill()
@@ -133,7 +134,9 @@ def results() -> dict[Path, int]:
 
 
 def squares(rows: int) -> list[str]:
-    return [Path(f"out/rows/row_{offset}/out/squared.txt").read_text() for offset in range(1, rows + 1)]
+    digits = len(str(rows))  # names are padded, so that they sort
+    names = [f"row_{offset:0{digits}d}" for offset in range(1, rows + 1)]
+    return [Path(f"out/rows/{name}/out/squared.txt").read_text() for name in names]
 
 
 def expected(rows: int) -> list[str]:

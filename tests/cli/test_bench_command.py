@@ -10,6 +10,7 @@ import pytest
 import vto_pipeline.bench as benches
 from vto_pipeline.bench import sample_runs
 from vto_pipeline.bench.bench import Bench, Row, Watch
+from vto_pipeline.bench.sources import ROOT, contents_of
 from vto_pipeline.bench.timing import Timing
 from vto_pipeline.errors import MissingDependencyError
 
@@ -121,3 +122,20 @@ def test_what_got_worse_is_listed(vto, tmp_path):
     data = vto("bench", "--compare", tmp_path / "old", "--out", tmp_path / "new", "--json").data
     assert [change["verdict"] for change in data[0]["changes"]] == ["worse"]
     assert vto("bench", "--compare", tmp_path, "--out", tmp_path / "new").code == 3
+
+
+def test_results_older_than_their_code_are_listed(vto, tmp_path):
+    own = contents_of([ROOT / "vto_pipeline/errors.py"])
+    heads = {"fresh": own, "old": {**own, "vto_pipeline/units.py": "0" * 40}, "older": None}
+    for name, sources in heads.items():
+        kept = {} if sources is None else {"sources": sources}
+        (tmp_path / f"{name}.json").write_text(json.dumps({"date": "2026-11-24", "commit": "abc", **kept}))
+    said = vto("bench", "--stale", "--out", tmp_path)
+    assert (said.code, [line.split()[0] for line in said.out.splitlines()[2:]]) == (0, ["fresh", "old", "older"])
+    fresh, old, older = said.out.splitlines()[2:]
+    assert fresh.endswith("1, all as they were")
+    assert old.endswith("1 of 2 changed: vto_pipeline/units.py")
+    assert older.endswith("not kept: measured by an earlier version")
+    data = vto("bench", "--stale", "--out", tmp_path, "--json").data
+    assert [one["changed"] for one in data] == [[], ["vto_pipeline/units.py"], None]
+    assert vto("bench", "--stale", "--out", tmp_path / "nowhere").code == 3

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import replace
 
@@ -10,6 +11,7 @@ from pydantic import Field
 from toy_tables import GIVEN, KINDS, TOY, AddConfig
 
 from vto_pipeline.pipeline.catalogue import Catalogue
+from vto_pipeline.pipeline.execution.budget import error_after
 from vto_pipeline.pipeline.execution.run import run
 from vto_pipeline.pipeline.plan import make_plan
 
@@ -82,3 +84,20 @@ def test_a_budget_that_is_spent_is_a_warning(budgeted):
     assert 0.0 < left < 0.01
     add = next(stage for stage in record["stages"] if stage["name"] == "add")
     assert add["warnings"] == ["nothing is left for it of the time budget of 1.5 s"]
+
+
+def test_another_minute_is_told_from_how_the_error_fell():
+    seconds = [2.0 * k for k in range(21)]
+    falling = [8.0 * math.exp(-t / 50.0) for t in seconds]
+    expected = 8.0 * math.exp(-(40.0 + 60.0) / 50.0)
+    assert error_after(seconds, falling, 60.0) == pytest.approx(expected, rel=1e-9)  # the closed form itself
+    early = [math.inf, 0.5, *falling[2:]]  # the first half does not count, nor what is not known
+    assert error_after(seconds, early, 60.0) == pytest.approx(expected, rel=1e-9)
+    gap = [math.inf if k == 15 else value for k, value in enumerate(falling)]
+    assert error_after(seconds, gap, 60.0) == pytest.approx(expected, rel=1e-9)
+    noisy = [value * (1.2 if k % 2 else 1 / 1.2) for k, value in enumerate(falling)]
+    assert error_after(seconds, noisy, 60.0) == pytest.approx(expected / 1.2, rel=0.3)
+    assert error_after(seconds, falling[::-1], 60.0) is None
+    assert error_after(seconds[:3], falling[:3], 60.0) is None
+    assert error_after([], [], 60.0) is None
+    assert error_after([1.0, 2.0], [math.inf, math.nan], 60.0) is None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -10,6 +12,8 @@ import pytest
 from vto_pipeline.cli.options import Quantity
 from vto_pipeline.cli.results import outcome_lines
 from vto_pipeline.errors import ConfigError
+from vto_pipeline.io.runs.traces import write_trace
+from vto_pipeline.model.cloth import TraceRow
 from vto_pipeline.stages.entry import commands
 from vto_pipeline.stages.entry.documents import drape_order, fit_order
 from vto_pipeline.stages.entry.outcome import Outcome
@@ -88,3 +92,23 @@ def test_the_outcome_says_what_the_budget_bought():
         "budget" in line
         for line in outcome_lines(Outcome(Path("nowhere"), {**record, "time_budget_s": None}, catalogue()))
     )
+
+
+def test_the_outcome_says_what_another_minute_would_buy(tmp_path):
+    rows = [TraceRow(float(t), t, 5.0, 1.0, level=1) for t in range(60)]  # of a coarser mesh
+    rows += [TraceRow(60.0 + t, t, 8.0 * math.exp(-max(0, t - 15) / 15.0), 1.0) for t in range(31)]
+    (tmp_path / "out").mkdir()
+    write_trace(tmp_path / "out" / "trace.csv", rows)
+
+    def said(**metrics: object) -> list[str]:
+        stage = {"name": "drape", "status": "ran", "seconds": 30.0, "metrics": metrics, "warnings": []}
+        record = {"seconds": 30.0, "wanted": ["draped"], "time_budget_s": 30.0, "stages": [stage]}
+        return [line for line in outcome_lines(Outcome(tmp_path, record, catalogue())) if "another minute" in line]
+
+    reached = 8.0 * math.exp(-1.0)
+    assert said(error_mm=reached, settled=False) == ["  another minute for drape: about 0.054 mm instead of 2.9"]
+    assert said(error_mm=0.01, settled=True) == []
+    write_trace(tmp_path / "out" / "trace.csv", [replace(row, error_mm=5.0 + row.seconds) for row in rows])
+    assert said(error_mm=35.0, settled=False) == [
+        "  another minute for drape: not known, as its error did not fall lately"
+    ]

@@ -1,6 +1,7 @@
 """Sample data with truth, measuring against it, and the benches of `vto bench`.
 
 bench, record, timing, machine, provenance: what a bench is, how it is carried out, and on what
+sources: the files that figures depend on, and which have changed since
 measures: what several benches read off a cloth
 own_process, live_rows: commands that are run one by one, and their rows
 sample_runs: the sample documents, run and held against the truth

@@ -18,6 +18,7 @@ from vto_pipeline.pipeline.execution.digest import code_identity
 
 _HARDWARE = ("cpu", "cores", "threads", "memory_gb")
 _STATE = ("load_at_start", "niceness")  # how the machine happened to be, not what it is
+_CODE = "code"  # of the whole package: most benches drive only a part of it
 
 
 def this_machine() -> dict[str, Any]:
@@ -40,7 +41,7 @@ def this_machine() -> dict[str, Any]:
 
 
 def same_machine(one: dict[str, Any], other: dict[str, Any]) -> bool:
-    """Return whether rows measured on both may stand in one table: the same hardware, software and code."""
+    """Return whether rows measured on both may stand in one table, if the sources are the same, too."""
     return _identity(one) == _identity(other)
 
 
@@ -50,7 +51,7 @@ def same_hardware(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
 
 
 def _identity(machine: dict[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in machine.items() if name not in _STATE}
+    return {name: value for name, value in machine.items() if name not in (*_STATE, _CODE)}
 
 
 def _cpu() -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
@@ -12,6 +12,7 @@ from vto_pipeline.bench.bench import Bench, Row, Watch
 from vto_pipeline.bench.cloth.comparison import compare, level_as_json
 from vto_pipeline.bench.machine import same_machine, this_machine
 from vto_pipeline.bench.provenance import provenance
+from vto_pipeline.bench.sources import sources_of
 from vto_pipeline.io.documents import write_json
 from vto_pipeline.io.files import replacing
 
@@ -23,7 +24,7 @@ class Files:
     Args:
         document: All rows, written when the bench is complete.
         picture: The plot of it.
-        journal: Rows so far, one a line, while it runs; gone when it is complete.
+        journal: Machine and sources, and the rows so far, one a line, while it runs; gone when it is complete.
     """
 
     document: Path
@@ -46,7 +47,7 @@ def run_bench(
     peers: Sequence[Row] = (),
     say: Callable[[str], None] = lambda text: None,
 ) -> dict[str, Any]:
-    """Measure what is not yet measured on this machine with this code, and write document and picture.
+    """Measure what is not yet measured on this machine with these sources, and write document and picture.
 
     Args:
         name: Of the bench.
@@ -58,16 +59,16 @@ def run_bench(
         say: Takes one line of progress.
 
     Returns:
-        The document: {"bench", "command", "commit", "date", "machine", "quick", "rows"}; with peers also "peers" and
-        "levels", see `comparison`.
+        The document: {"bench", "command", "commit", "date", "machine", "sources", "quick", "rows"}; with peers also
+        "peers" and "levels", see `comparison`.
     """
     files = Files.of(name, folder)
-    machine = this_machine()
-    known = [] if force else known_rows(files, machine)
+    head = {"machine": this_machine(), "sources": sources_of([bench.module])}
+    known = [] if force else known_rows(files, head)
     rows: dict[str, Row] = {}
     written = {row.key for row in known}
     with replacing(files.journal) as beside, beside.open("w", encoding="utf-8") as journal:
-        _write_line(journal, machine)
+        _write_line(journal, head)
         for row in known:
             _write_line(journal, row.as_json())
     with files.journal.open("a", encoding="utf-8") as journal:
@@ -77,7 +78,7 @@ def run_bench(
                 _write_line(journal, row.as_json())
     measured = [row.as_json() for row in rows.values()]
     command = f"vto bench {name}{' --quick' if quick else ''}"
-    document = {"bench": name, "quick": quick, **provenance(command), "machine": machine, "rows": measured}
+    document = {"bench": name, "quick": quick, **provenance(command), **head, "rows": measured}
     if peers:
         document["peers"] = [row.as_json() for row in peers]
         document["levels"] = [level_as_json(level) for level in compare(rows.values(), peers)]
@@ -93,11 +94,16 @@ def draw(bench: Bench, document: dict[str, Any], picture: Path) -> None:
         beside.write_bytes(bench.draw(document))
 
 
-def known_rows(files: Files, machine: dict[str, Any]) -> list[Row]:
-    """Return the rows of an earlier run, whole or interrupted, on this machine with this code."""
+def known_rows(files: Files, head: Mapping[str, Any]) -> list[Row]:
+    """Return the rows of an earlier run, whole or interrupted, on the same machine with the same sources.
+
+    Args:
+        files: Where an earlier run has written.
+        head: What such a run says of itself: "machine" and "sources".
+    """
     found: dict[str, Row] = {}
     for before, rows in (_read_document(files.document), _read_journal(files.journal)):
-        if same_machine(before, machine):
+        if before.get("sources") == head["sources"] and same_machine(before["machine"], head["machine"]):
             found.update((row.key, row) for row in (Row.from_json(plain) for plain in rows))
     return list(found.values())
 
@@ -106,7 +112,7 @@ def _read_document(path: Path) -> tuple[dict[str, Any], Iterable[dict[str, Any]]
     if not path.is_file():
         return {}, []
     document = json.loads(path.read_text(encoding="utf-8"))
-    return document["machine"], document["rows"]
+    return document, document["rows"]
 
 
 def _read_journal(path: Path) -> tuple[dict[str, Any], Iterable[dict[str, Any]]]:

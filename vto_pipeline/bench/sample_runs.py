@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -11,13 +11,16 @@ from vto_pipeline.bench.bench import Row, Value
 from vto_pipeline.bench.demo import measure_demo
 from vto_pipeline.bench.machine import this_machine
 from vto_pipeline.bench.provenance import provenance
+from vto_pipeline.bench.sources import contents_of, sources_of
 from vto_pipeline.io.documents import load_yaml, write_json
 from vto_pipeline.pipeline.execution.listener import Listener
 from vto_pipeline.pipeline.stage import Stage
 from vto_pipeline.stages.entry.commands import run_order
 from vto_pipeline.stages.entry.documents import Order
+from vto_pipeline.stages.entry.planning import catalogue
 
 _STAGES = "stages"
+_DRIVEN = ("vto_pipeline.bench.demo", "vto_pipeline.pipeline.execution.run")
 
 SAMPLES = (
     *("demo", "garment_from_depth", "garment_from_cloud"),
@@ -49,9 +52,16 @@ def run_sample(
     found = measure_demo(order.folder, Path("sample_data"))
     rows = [row.as_json() for row in _rows(name, found)]
     head = {"bench": name, "quick": False, **provenance(f"vto bench {name}")}
-    written = {**head, "machine": this_machine(), "rows": rows}
+    written = {**head, "machine": this_machine(), "sources": _sources(found[_STAGES], document), "rows": rows}
     write_json(folder / f"{name}.json", written)
     return written
+
+
+def _sources(stages: Collection[str], document: Path) -> dict[str, str]:
+    """Return the contents of all that a sample's figures depend on: of its stages but the page, and of its data."""
+    modules = [one.run.__module__ for one in catalogue().stages if one.name in stages and not one.final]
+    data = [document, *(path for path in Path("sample_data").rglob("*") if path.is_file())]
+    return {**sources_of([*_DRIVEN, *modules]), **contents_of(data, Path())}
 
 
 class _Teller(Listener):

@@ -17,6 +17,7 @@ from vto_pipeline import __version__
 from vto_pipeline.cli.interrupts import Interrupts
 from vto_pipeline.cli.session import Session
 from vto_pipeline.errors import ConfigError, InputError, MissingDependencyError, VtoError
+from vto_pipeline.io.stalls import STALLED
 
 COMMANDS = {
     "scan": "Reconstruct a garment or a body from photos, depth frames, a cloud or a mesh.",
@@ -50,7 +51,7 @@ ADVICE = {
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT), "make room; the same command again resumes where this one stopped"),
     **dict.fromkeys(
         (errno.EIO, errno.ESTALE, errno.ETIMEDOUT, errno.EHOSTDOWN, errno.ENOTCONN),
-        "is the disk or the network folder still there?",
+        STALLED,
     ),
     errno.EMFILE: "raise the limit of open files: ulimit -n",
 }

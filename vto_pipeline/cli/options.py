@@ -15,8 +15,23 @@ from vto_pipeline.units import LENGTH_M, MEMORY_B, TIME_S
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-PATH = click.Path(path_type=Path)
-"""A path that the engine checks, so that all commands complain in the same words."""
+
+class _AnsweringPath(click.Path):
+    """A path whose folder answers; the engine checks the rest, so that all commands complain in the same words."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the path.
+
+        Raises:
+            InputError: its folder does not answer.
+        """
+        from vto_pipeline.io.stalls import check_answers
+
+        check_answers(Path(value))  # first, as click looks at the file
+        return super().convert(value, param, ctx)
+
+
+PATH = _AnsweringPath(path_type=Path)
 
 
 def _set_json(ctx: click.Context, _: click.Parameter, value: bool) -> None:

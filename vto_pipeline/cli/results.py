@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from itertools import chain
 from typing import Any
 
+from vto_pipeline.cli.budgets import budget_lines
 from vto_pipeline.cli.progress import show_progress
 from vto_pipeline.cli.session import Session
 from vto_pipeline.cli.tables import table_lines
@@ -44,30 +45,9 @@ def outcome_lines(outcome: Outcome) -> Iterator[str]:
     width = max(len(artifact) for artifact in record["wanted"])
     for artifact in record["wanted"]:
         yield f"  {artifact:<{width}}  {outcome.path(artifact) if outcome.made(artifact) else 'as given'}"
-    if record.get("time_budget_s"):
-        yield f"  of the time budget of {record['time_budget_s']:g} s: {', '.join(_bought(record['stages']))}"
-    if record.get("memory_budget_mb"):
-        yield f"  of the memory budget of {record['memory_budget_mb'] / 1e3:g} GB: {_largest(record)}"
+    yield from budget_lines(outcome)
     for name, text in outcome.warnings:
         yield f"  warning from {name.replace('_', ' ')}: {text}"
-
-
-def _bought(stages: Iterable[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield what each stage that ran took of a time budget, the longest first, and the error reached for it."""
-    for stage in sorted((one for one in stages if one["status"] == "ran"), key=lambda one: -one["seconds"]):
-        error = stage["metrics"].get("error_mm")
-        reached = "" if error is None else f" ({error:.2g} mm of motion left)"
-        yield f"{stage['name']} {stage['seconds']:.1f} s{reached}"
-
-
-def _largest(record: Mapping[str, Any]) -> str:
-    """Return the largest memory that a stage of this run took, and whether that is more than the budget, in words."""
-    ran = [stage for stage in record["stages"] if stage["status"] == "ran"]
-    if not ran:
-        return "nothing ran"
-    most = max(ran, key=lambda stage: stage["peak_mb"])
-    over = ", which is over it" if most["peak_mb"] > record["memory_budget_mb"] else ""
-    return f"at most {most['peak_mb'] / 1e3:.2g} GB, in {most['name']}{over}"
 
 
 def stage_counts(record: Mapping[str, Any]) -> str:

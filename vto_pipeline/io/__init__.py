@@ -10,5 +10,6 @@ size_charts: flat measurements of each size
 sniff: what a path holds
 sandbox: untrusted bytes are parsed in a limited child process
 files, arrays, documents, text_numbers: what readers and writers share
+stalls: folders that do not answer
 lengths: the unit of a file without one
 """

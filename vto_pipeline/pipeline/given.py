@@ -12,6 +12,7 @@ from typing import Any
 from vto_pipeline.errors import ConfigError, InputError, VtoError
 from vto_pipeline.io.documents import Document
 from vto_pipeline.io.files import resolved
+from vto_pipeline.io.stalls import check_answers
 from vto_pipeline.model.artifact import ArtifactKind
 from vto_pipeline.model.job import Job
 from vto_pipeline.pipeline.catalogue import Catalogue
@@ -53,7 +54,8 @@ def find_given(data: Mapping[str, Any], document: Document, base: Path, catalogu
 
     Raises:
         ConfigError: a value stands where only a path will do.
-        InputError: a file does not exist, or a value in the document is not what it should be.
+        InputError: a file does not exist, its folder does not answer, or a value in the document is not what it should
+            be.
     """
     found: dict[str, Given] = {}
     for key, artifact in catalogue.given.items():
@@ -77,6 +79,7 @@ def resolve(key: str, value: Any, base: Path, kind: ArtifactKind, where: str) ->
         ConfigError, InputError: as `find_given`.
     """
     if isinstance(value, str):
+        check_answers(base / Path(value).expanduser())
         path = resolved(base / Path(value).expanduser())
         if path.is_dir() and not (kind.in_folder and kind.in_folder(path)):
             wanted = "a file was wanted" if kind.in_folder is None else f"it does not hold {kind.about}"
@@ -123,6 +126,7 @@ def _resolve_inside(key: str, value: Any, base: Path, where: str) -> Any:
         return {name: _resolve_inside(f"{key}.{name}", item, base, where) for name, item in value.items()}
     if isinstance(value, str):
         path = base / Path(value).expanduser()
+        check_answers(path)
         if path.is_file():
             return resolved(path)
         if _FILE.fullmatch(value):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import wraps
 from typing import Any
 
 from vto_pipeline.errors import ComputationError
@@ -37,6 +38,7 @@ def for_each_role(
         def bare(inputs: Mapping[str, Any]) -> dict[str, Any]:
             return {key.removeprefix(prefix): value for key, value in inputs.items()}
 
+        @wraps(run)
         def bound(inputs: Mapping[str, Any], settings: Any, job: Job) -> dict[str, Any]:
             try:
                 made = run(bare(inputs), settings, job)

@@ -55,6 +55,7 @@ def _fill(source: Path, results: Results) -> str:
         figure=results.figure,
         rows=results.rows,
         source=results.source,
+        day=lambda name: results.document(name)["date"],
         chosen=lambda text: text,
     )
     try:
@@ -71,11 +72,18 @@ def _figure_lines(quoted: Mapping[str, list[Quoted]]) -> Iterator[str]:
     yield "# Every figure, its command and its file"
     yield ""
     yield "Each row is a measured figure on a page. Its file has it in full, with machine, date and commit."
+    yield "`vto bench --stale --out docs/results` lists the files that are older than the code that they measure."
     for page, figures in quoted.items():
         if not figures:
             continue
         link = os.path.relpath(page, Path(FIGURES).parent)
-        yield from ("", f"## [{page}]({link})", "", "| figure | of | file | command |", "|---|---|---|---|")
+        yield from (
+            "",
+            f"## [{page}]({link})",
+            "",
+            "| figure | of | file | measured | command |",
+            "|---|---|---|---|---|",
+        )
         for one in dict.fromkeys(figures):
             name = f"[{one.source}]({os.path.relpath(f'{RESULTS}/{one.source}', Path(FIGURES).parent)})"
-            yield f"| {one.text} | {one.what} | {name} | `{one.command}` |"
+            yield f"| {one.text} | {one.what} | {name} | {one.version} | `{one.command}` |"

@@ -26,12 +26,14 @@ class Quoted:
         text: As it is written there.
         what: The rows and the name of the figure.
         source: The results file.
+        version: Day and commit of the code that it is a figure of.
         command: What measures it again.
     """
 
     text: str
     what: str
     source: str
+    version: str
     command: str
 
 
@@ -207,8 +209,9 @@ class Selection:
 
     def _note(self, key: str, text: str) -> str:
         document = self.results.document(self.name)
+        version = f"{document['date']}, `{document['commit']}`"
         self.results.quoted.append(
-            Quoted(text, f"{self._what()}: {key}", f"{self.name}.json", str(document["command"]))
+            Quoted(text, f"{self._what()}: {key}", f"{self.name}.json", version, str(document["command"]))
         )
         return text
 

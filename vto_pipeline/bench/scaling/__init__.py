@@ -3,6 +3,6 @@
 sizes: at equal error from 1k vertices up
 throughput, roofline: inner kernels beside what the machine can do
 overhead: what threads cost
-batches: what a row of a batch costs besides its work
+batches, workers: what a row of a batch costs besides its work; rows side by side
 direct_solvers: our Cholesky beside MKL PARDISO and SuperLU
 """

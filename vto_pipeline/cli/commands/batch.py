@@ -5,12 +5,13 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from vto_pipeline.cli.options import PATH, force_option, message_options
+from vto_pipeline.cli.options import PATH, force_option, log_option, message_options, quiet_option
 from vto_pipeline.cli.session import Session, pass_session
 from vto_pipeline.errors import BatchError
 
@@ -36,6 +37,8 @@ PROGRAM = (sys.executable, "-c", "import sys; from vto_pipeline.cli.main import 
 @click.option("--retries", type=click.IntRange(0, 10), default=1, show_default=True, help="After a crash of a row.")
 @click.option("--root", type=PATH, metavar="FOLDER", help="Refuse files outside it, for batches from strangers.")
 @force_option
+@log_option
+@quiet_option
 @message_options
 @pass_session
 def batch_command(
@@ -87,7 +90,7 @@ def batch_command(
             count = workers or default_workers(1e3 * memory)
             limits = {"seconds": time_limit, "memory_mb": 1e3 * memory, "retries": retries}
             tasks = [_task(one, folder, force_all, count, limits) for one in missing]
-            results = run_rows(tasks, count, scheduler, folder / "workers") if tasks else ()
+            results = run_rows(tasks, count, scheduler, folder / "workers", session.say) if tasks else ()
             left = TimeLeft({task.name: expected[task.name] for task in tasks}, count)
             if tasks and left.seconds() is not None:
                 session.say(f"{len(tasks)} rows to run: about {left.seconds():.0f} s, by earlier runs")
@@ -98,6 +101,7 @@ def batch_command(
                     words, shown = _shown(open_run(folder / "rows" / result.name), folder)
                 ledger.enter(result, words, shown)
                 left.ended(result.name)
+                session.enter("row", done=done, count=len(tasks), left_s=left.seconds(), **asdict(result), result=words)
                 session.say(
                     f"[{done}/{len(tasks)}] {result.name}: {result.status} after {result.seconds:.1f} s"
                     f"{': ' if result.problem or words else ''}{result.problem or words}"
@@ -207,6 +211,7 @@ def _answer(session: Session, folder: Path, ledger: Ledger) -> None:
 
     for line in failure_lines(failures(ledger.rows.values())):
         session.say(line)
+    session.enter("done", batch=str(folder), counts=ledger.counts())
     done = ledger.counts().get("done", 0)
     if done < len(ledger.rows):
         others = ", ".join(f"{count} {status}" for status, count in sorted(ledger.counts().items()) if status != "done")

@@ -14,6 +14,9 @@ from vto_pipeline.cli.session import Session, pass_session
 if TYPE_CHECKING:
     from vto_pipeline.bench.record import Files
 
+_NAMED = 3
+"""Changed files that a line names."""
+
 
 @click.command("bench")
 @click.argument("names", metavar="NAME...", nargs=-1)
@@ -34,6 +37,7 @@ if TYPE_CHECKING:
 @click.option(
     "--compare", "earlier", type=PATH, metavar="OLD", help="Measure nothing: say what in DIR changed since folder OLD."
 )
+@click.option("--stale", is_flag=True, help="Measure nothing: say which results in DIR are older than their code.")
 @message_options
 @pass_session
 def bench_command(
@@ -44,16 +48,19 @@ def bench_command(
     force: bool,
     against: Path | None,
     earlier: Path | None,
+    stale: bool,
 ) -> None:
     """Measure error against run time and plot it.
 
-    Rows already measured on this machine with this code are reused, even from an interrupted run. `all` stands for
-    every bench, and for the sample documents in configs/, which are run as they stand and held against their truth.
+    Rows already measured on this machine are reused, even from an interrupted run, unless a file that the bench drives
+    has changed. `all` stands for every bench, and for the sample documents in configs/, which are run as they stand and
+    held against their truth.
 
     \b
     vto bench solvers --quick
     vto bench all --out docs/results
     vto bench --compare old/results --out docs/results
+    vto bench --stale --out docs/results
     """
     from vto_pipeline.bench import BENCHES
     from vto_pipeline.bench.cloth.comparison import read_peers
@@ -63,10 +70,13 @@ def bench_command(
 
     every = (*BENCHES, *SAMPLES)
     unknown = [name for name in names if name not in (*every, "all")]
-    if unknown or not (names or earlier):
+    if unknown or not (names or earlier or stale):
         problem = f"no such bench: {', '.join(unknown)}" if unknown else "which bench?"
         raise ConfigError(problem, hint=f"all, or one of {', '.join(every)}")
     wanted = every if "all" in names else tuple(dict.fromkeys(names))
+    if stale:
+        _tell_stale(session, folder, wanted)
+        return
     if earlier is not None:
         _tell_changes(session, earlier, folder, () if "all" in names else wanted)
         return
@@ -123,6 +133,38 @@ def _tell_changes(session: Session, earlier: Path, folder: Path, names: tuple[st
     session.answer(
         [asdict(one) for one in found], [*lines, *(table_lines(heads, rows) if rows else ["nothing changed"])]
     )
+
+
+def _tell_stale(session: Session, folder: Path, names: tuple[str, ...]) -> None:
+    """Print which results files are older than the code that they measure."""
+    from vto_pipeline.bench.sources import changed_sources
+    from vto_pipeline.cli.tables import table_lines
+    from vto_pipeline.errors import InputError
+    from vto_pipeline.io.documents import read_json
+
+    found = names or sorted(path.stem for path in folder.glob("*.json"))
+    if not found:
+        raise InputError("no results files", where=str(folder), hint="vto bench --stale --out docs/results")
+    data = []
+    for name in found:
+        document = read_json(folder / f"{name}.json")
+        kept, changed = document.get("sources", {}), changed_sources(document)
+        facts = {key: document.get(key) for key in ("command", "date", "commit")}
+        data.append({"results": name, **facts, "sources": len(kept), "changed": changed})
+    rows = [(one["results"], one["date"] or "", _staleness(one, session.verbose)) for one in data]
+    session.answer(data, table_lines(("results", "measured", "files it depends on"), rows))
+
+
+def _staleness(one: Mapping[str, Any], verbose: bool) -> str:
+    """Return whether results are of the code as it is, in words."""
+    changed = one["changed"]
+    if changed is None:
+        return "not kept: measured by an earlier version"
+    if not changed:
+        return f"{one['sources']}, all as they were"
+    shown = changed if verbose else changed[:_NAMED]
+    rest = f" and {len(changed) - len(shown)} more (-v)" if len(changed) > len(shown) else ""
+    return f"{len(changed)} of {one['sources']} changed: {', '.join(shown)}{rest}"
 
 
 def _figure(value: float | str | bool | None) -> str:

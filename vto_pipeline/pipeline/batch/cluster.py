@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import logging
 import os
+import time
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,10 @@ from vto_pipeline.errors import BatchError, ConfigError, MissingDependencyError
 from vto_pipeline.pipeline.batch.row import RowResult, RowTask, run_row
 
 _GONE = "the scheduler is gone"
+_ALONE = "the scheduler has had no worker for {:.0f} s"
+_PATIENCE = 300.0  # s without any worker: machines that are started on demand take minutes
+_LOOK = 0.1  # s between looks at whether a row has ended
+_COUNT = 1.0  # s between questions for the workers
 _EACH = 3  # rows that a worker has or waits for
 _LEAST_WINDOW = 4  # also before the first worker has come
 _SHARE_OF_MEMORY = 0.8  # of the machine's that rows may take together
@@ -30,7 +35,13 @@ def default_workers(memory_mb: float) -> int:
     return max(1, min(cores, int(_SHARE_OF_MEMORY * present / memory_mb)))
 
 
-def run_rows(tasks: Sequence[RowTask], workers: int, scheduler: str | None, scratch: Path) -> Iterator[RowResult]:
+def run_rows(
+    tasks: Sequence[RowTask],
+    workers: int,
+    scheduler: str | None,
+    scratch: Path,
+    say: Callable[[str], None] = lambda text: None,
+) -> Iterator[RowResult]:
     """Run all rows, and yield what becomes of each as soon as it ends.
 
     Args:
@@ -38,6 +49,7 @@ def run_rows(tasks: Sequence[RowTask], workers: int, scheduler: str | None, scra
         workers: How many run at once on this machine, where there is no scheduler.
         scheduler: Address of one, whose workers have this package and see the same folders; None: this machine.
         scratch: Folder for the workers' own files.
+        say: Takes a line where the rows wait for a worker.
 
     Raises:
         MissingDependencyError: no dask.distributed; ConfigError: no scheduler answers; BatchError: the workers here do
@@ -83,6 +95,9 @@ def run_rows(tasks: Sequence[RowTask], workers: int, scheduler: str | None, scra
                     return
                 futures[future] = task
                 ended.add(future)
+            if not _has_ended(ended, client, say):
+                yield from (_lost(task, _ALONE.format(_PATIENCE)) for task in [*futures.values(), *waiting])
+                return
             future = next(ended)
             result = _result(future, futures.pop(future))
             yield result
@@ -91,11 +106,36 @@ def run_rows(tasks: Sequence[RowTask], workers: int, scheduler: str | None, scra
                 return
 
 
+def _has_ended(ended: Any, client: Any, say: Callable[[str], None]) -> bool:
+    """Wait until a row has ended, or return False where there has been no worker to run one for too long."""
+    since, asked = time.monotonic(), 0.0
+    is_told = False
+    while not ended.has_ready():
+        now = time.monotonic()
+        if now - asked >= _COUNT:
+            asked = now
+            if _slots(client) != 0:
+                since = now
+            elif not is_told:
+                start = f"dask worker {client.scheduler.address}"
+                say(f"the scheduler has no worker; waiting up to {_PATIENCE:.0f} s for one: `{start}` starts it")
+                is_told = True
+        if now - since >= _PATIENCE:
+            return False
+        time.sleep(_LOOK)
+    return True
+
+
 def _window(client: Any) -> int:
     """Return how many rows the workers hold at once, so that each has its next; as many have joined by now."""
-    with suppress(Exception):  # the scheduler is gone: the rows it had will tell; the class differs by moment, as below
-        return max(_LEAST_WINDOW, _EACH * sum(client.nthreads().values()))
-    return _LEAST_WINDOW
+    return max(_LEAST_WINDOW, _EACH * (_slots(client) or 0))
+
+
+def _slots(client: Any) -> int | None:
+    """Return how many rows the workers can run at once; None where the scheduler is gone, as the rows it had tell."""
+    with suppress(Exception):  # its class differs by moment, as below
+        return sum(client.nthreads().values())
+    return None
 
 
 def _result(future: Any, task: RowTask) -> RowResult:

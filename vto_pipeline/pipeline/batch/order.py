@@ -17,6 +17,7 @@ from pydantic import Field
 from vto_pipeline.errors import ConfigError, MissingDependencyError
 from vto_pipeline.io.documents import Document, check_schema, load_yaml
 from vto_pipeline.io.files import check_file, check_inside
+from vto_pipeline.io.stalls import check_answers
 from vto_pipeline.model.settings import Config
 from vto_pipeline.pipeline.request import number_or_word
 
@@ -73,8 +74,10 @@ def read_order(path: Path, root: Path | None = None) -> list[Row]:
     batch: BatchFile = check_schema(document, BatchFile)
     base = path.resolve().parent
     for name in (batch.run, batch.rows):
-        if root is not None and isinstance(name, str):
-            check_inside(base / name, root, str(path))
+        if isinstance(name, str):
+            check_answers(base / name)
+            if root is not None:
+                check_inside(base / name, root, str(path))
     whole = _pipeline_document(batch.run, document, base)
     changes = list(_changes(batch, document, base))
     rows: list[Row] = []
@@ -204,6 +207,7 @@ def _path(text: str, base: Path) -> str | None:
     """Return the absolute path of what is there under that name, or None."""
     path = base / Path(text).expanduser()
     try:
+        check_answers(path)
         return str(path.resolve()) if path.exists() else None
     except (OSError, ValueError, RuntimeError):
         return None

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
+
+import numpy as np
 
 from vto_pipeline.errors import ConfigError
 from vto_pipeline.model.job import Job
@@ -16,6 +18,7 @@ from vto_pipeline.pipeline.request import Request
 SETTING = "time_budget_s"
 """A stage whose settings have this can stop in time; all others take as long as they take."""
 _AT_LEAST = 0.001  # s; the setting is positive
+_FEWEST = 3  # errors that a rate is taken from
 
 
 class Budget:
@@ -76,3 +79,25 @@ def check_memory(
                 f"the budget is {budget / 1e9:.3g} GB",
                 hint="give more memory, or less to do: `vto plan` shows what each stage takes",
             )
+
+
+def error_after(seconds: Sequence[float], errors: Sequence[float], more: float) -> float | None:
+    """Return the error after more time, if it goes on falling as in the latter half: exponentially, by least squares.
+
+    Args:
+        seconds, errors: Error against run time, in its order; what is not finite does not count.
+        more: Time after the last of them [s].
+
+    Returns:
+        In the unit of the errors; None where it did not fall, or where there are too few to tell.
+    """
+    times, values = np.asarray(seconds, dtype=np.float64), np.asarray(errors, dtype=np.float64)
+    known = np.isfinite(values) & (values > 0.0)
+    times, values = times[known], values[known]
+    if len(times) == 0:
+        return None
+    latter = times >= 0.5 * (times[0] + times[-1])
+    if latter.sum() < _FEWEST:
+        return None
+    rate = float(np.polyfit(times[latter] - times[-1], np.log(values[latter]), 1)[0])
+    return float(values[-1] * np.exp(rate * more)) if rate < 0.0 else None

@@ -11,17 +11,20 @@ from typing import Any
 
 import vto_pipeline
 from vto_pipeline.errors import InputError
+from vto_pipeline.io.stalls import Beat, answered
 from vto_pipeline.pipeline.given import Given
 
-_SOURCE = {".py", ".yaml", ".html", ".js", ".css", ".csv", ".npz"}
+SOURCE = {".py", ".yaml", ".html", ".js", ".css", ".csv", ".npz"}
+"""Endings of the files of the package that decide what it computes."""
 
 
-def digest_file(path: Path) -> str:
-    """SHA-256 of a file's bytes, in hex."""
+def digest_file(path: Path, beat: Beat = lambda: None) -> str:
+    """SHA-256 of a file's bytes, in hex; `beat` is called for each block."""
     state = hashlib.sha256()
     with path.open("rb") as stream:
         while block := stream.read(1 << 20):
             state.update(block)
+            beat()
     return state.hexdigest()
 
 
@@ -29,16 +32,24 @@ def digest_path(path: Path) -> str:
     """Digest of a file (its type and bytes) or of a folder (names and bytes of its visible files).
 
     Raises:
-        InputError: a file is there no longer.
+        InputError: a file is there no longer, or its folder does not answer.
     """
     try:
-        if path.is_dir():
-            files = sorted(p for p in path.rglob("*") if p.is_file())
-            names = [(p, p.relative_to(path)) for p in files]
-            return digest_value({n.as_posix(): digest_file(p) for p, n in names if not _hidden(n)})
-        return digest_value([path.suffix.lower(), digest_file(path)])
+        return answered(path, lambda beat: _digest_path(path, beat))
     except FileNotFoundError as error:
         raise InputError("the file was there before and has vanished", where=str(error.filename)) from None
+
+
+def _digest_path(path: Path, beat: Beat) -> str:
+    if not path.is_dir():
+        return digest_value([path.suffix.lower(), digest_file(path, beat)])
+    digests = {}
+    for file in path.rglob("*"):
+        name = file.relative_to(path)
+        if file.is_file() and not _hidden(name):
+            digests[name.as_posix()] = digest_file(file, beat)
+        beat()
+    return digest_value(digests)
 
 
 OfPath = Callable[[Path], str]
@@ -62,7 +73,7 @@ def code_identity() -> str:
     package = Path(vto_pipeline.__file__).parent
     if not (package.parent / "pyproject.toml").is_file():
         return vto_pipeline.__version__
-    files = sorted(p for p in package.rglob("*") if p.suffix in _SOURCE)
+    files = sorted(p for p in package.rglob("*") if p.suffix in SOURCE)
     return digest_value({p.relative_to(package).as_posix(): digest_file(p) for p in files})
 
 
