@@ -19,8 +19,8 @@ from vto_pipeline.geometry.smooth import neighbour_mean
 from vto_pipeline.geometry.topology import edge_face_counts, edges, vertex_normals
 from vto_pipeline.model.mesh import TriangleMesh
 
-_ROUNDS = 4
-_REMOVED = 0.9  # of the noise: what is left of it is too smooth to be told from the surface
+_ROUNDS = 6
+_REMOVED = 0.8  # of the noise: what is left of it is too smooth to be told from the surface
 _MAD = 1.4826  # from the median of the absolute to the standard deviation of a normal distribution
 
 
@@ -53,7 +53,7 @@ def without_noise(mesh: TriangleMesh, noise: float) -> TriangleMesh:
     weight[np.unique(pair[count == 1])] = 0.0
     bending = csc_matrix(matrix.T @ diags(weight) @ matrix)
     side = float(np.median(np.linalg.norm(np.diff(mesh.vertices[edges(mesh)], axis=1), axis=2)))
-    low, high = -1.0, 2.0  # decades of the weight, per square of an edge
+    low, high = -3.0, 2.0  # decades of the weight, per square of an edge
     found = mesh.vertices
     for _ in range(_ROUNDS):
         middle = 0.5 * (low + high)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import isotonic_regression
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.unsewn.cut import Bools
@@ -29,6 +30,10 @@ _LOST = 4.0  # edges from a line: farther from it, the surface does not follow i
 _AWAY = 4.0  # how much dearer an edge is that lies one edge length off the line
 _RINGS = 3
 _ROUNDS = 12
+_SAMPLES = 0.25  # edges between points of a line
+_LOOP = 6.0  # edges: a shorter line is not closed though its ends are near each other
+_CROSSED = 0.6  # edges from a vertex of one line to another line that goes through it
+_SLID = 0.6  # of an edge that a vertex at a rim or on a line moves along it at most
 _GAP = 0.2  # of an even spacing: vertices on a line are never closer
 
 
@@ -61,67 +66,75 @@ class _Tracer:
         self._around = neighbour_mean(mesh)
         self._rim = np.zeros(len(mesh.vertices), np.bool_)
         self._rim[pair[count == 1]] = True
+        self._rim_edges = count == 1
         self._x = mesh.vertices.copy()
         self._taken = np.zeros(len(mesh.vertices), np.bool_)
         self._ways: list[NDArray[np.int64]] = []
 
     def follow(self, line: FloatArray, name: str) -> None:
         """Add a line."""
-        line = _evenly(line, 0.25 * self._edge)
-        closed = np.linalg.norm(line[-1] - line[0]) < _NEAR * self._edge and len(line) > 24
-        stops = self._stops(line, closed)
-        for (one, first), (other, last) in zip(stops[:-1], stops[1:], strict=True):
-            if one != other:
-                self._between(line[first : last + 1], one, other, name)
+        line = _evenly(line, _SAMPLES * self._edge)
+        if self._taken[self._anchors(line[-1])].any() and not self._taken[self._anchors(line[0])].any():
+            line = line[::-1]  # begun where it is known on which of two sheets in touch it lies
+        start = self._anchors(line[0])[0]
+        closed = np.linalg.norm(line[-1] - line[0]) < _NEAR * self._edge and len(line) > _LOOP / _SAMPLES
+        stops = self._crossed(line)
+        if closed and not stops:  # a loop is followed in three parts, so that each has one shortest way
+            third = len(line) // 3
+            stops = [(self._nearest(line[k]), k) for k in (third, 2 * third)]
+        ends = np.array([start]) if closed else self._anchors(line[-1])
+        one, first = int(start), 0
+        for other, last in [*((np.array([k]), at) for k, at in stops), (ends, len(line) - 1)]:
+            if (other != one).all():
+                one = self._between(line[first : last + 1], one, other, name)
+                first = last
 
-    def _stops(self, line: FloatArray, closed: bool) -> list[tuple[int, int]]:
-        """Return vertices that the line passes through, and where along it: its ends, and what it crosses."""
-        ends = [(self._anchor(line[0]), 0), (self._anchor(line[-1]), len(line) - 1)]
-        if closed:
-            ends[1] = (ends[0][0], len(line) - 1)
+    def _crossed(self, line: FloatArray) -> list[tuple[int, int]]:
+        """Return vertices of other lines that a line crosses, not those it runs beside, and where along it."""
         taken = np.flatnonzero(self._taken)
-        crossed: list[tuple[int, int]] = []
-        if len(taken):
-            apart = np.linalg.norm(self._x[taken][:, None] - line[None], axis=2)
-            at, nearest = apart.argmin(axis=1), apart.min(axis=1)
-            margin = int(2 * _NEAR / 0.25)
-            inner = (nearest < 0.6 * self._edge) & (at > margin) & (at < len(line) - margin)
-            order = np.flatnonzero(inner)[np.argsort(at[inner], kind="stable")]
-            for k in order:  # of those close together along the line, the nearest to it
-                if crossed and at[k] - crossed[-1][1] < margin:
-                    continue
-                crossed.append((int(taken[k]), int(at[k])))
-        third = len(line) // 3
-        if closed and not crossed:  # a loop is followed in three parts, so that each has one shortest way
-            crossed = [(self._nearest(line[k]), k) for k in (third, 2 * third)]
-        return [ends[0], *crossed, ends[1]]
+        if len(taken) == 0:
+            return []
+        apart = np.linalg.norm(self._x[taken][:, None] - line[None], axis=2)
+        at, nearest = apart.argmin(axis=1), apart.min(axis=1)
+        margin = int(2 * _NEAR / _SAMPLES)
+        inner = (nearest < _CROSSED * self._edge) & (at > margin) & (at < len(line) - margin)
+        order = np.flatnonzero(inner)[np.argsort(at[inner], kind="stable")]
+        groups = np.split(order, np.flatnonzero(np.diff(at[order]) > margin) + 1) if len(order) else []
+        found = []
+        for group in groups:
+            if np.ptp(at[group]) <= margin:
+                best = group[int(nearest[group].argmin())]
+                found.append((int(taken[best]), int(at[best])))
+        return found
 
-    def _anchor(self, point: FloatArray) -> int:
-        """Return the vertex for an end of a line: of another line, or else of the rim, or else the nearest."""
+    def _anchors(self, point: FloatArray) -> NDArray[np.int64]:
+        """Return vertices for an end of a line, the nearest first: of other lines and rims, or else the nearest of all."""
         apart = np.linalg.norm(self._x - point, axis=1)
-        for group in (self._taken & self._rim, self._taken, self._rim):
-            reach = np.where(group, apart, np.inf)
-            if reach.min() < _NEAR * self._edge:
-                return int(reach.argmin())
-        return int(apart.argmin())
+        order = np.argsort(apart, kind="stable")[:200]
+        near = order[apart[order] < _NEAR * self._edge]
+        meant = near[(self._taken | self._rim)[near]]
+        if len(meant):
+            return np.asarray(meant)
+        return np.asarray(order[:1])
 
     def _nearest(self, point: FloatArray) -> int:
         return int(np.linalg.norm(self._x - point, axis=1).argmin())
 
-    def _between(self, line: FloatArray, start: int, end: int, name: str) -> None:
-        from scipy.spatial import cKDTree
-
+    def _between(self, line: FloatArray, start: int, ends: NDArray[np.int64], name: str) -> int:
+        """Add the way along a line from a vertex to whichever of others it leads to best; return that."""
         off, at = cKDTree(line).query(self._x)
         a, b = self._pairs.T
-        free = ~self._taken.copy()
-        free[[start, end]] = True
-        rim_edge = self._rim[a] & self._rim[b]
-        usable = free[a] & free[b] & (np.maximum(off[a], off[b]) < _LOST * self._edge) & ~rim_edge
-        share = (0.5 * (off[a] + off[b]) / self._edge) ** 2
-        cost = (self._lengths * (1.0 + _AWAY * share))[usable]
+        free = ~self._taken
+        free[start] = True
+        free[ends] = True
+        usable = free[a] & free[b] & (np.maximum(off[a], off[b]) < _LOST * self._edge) & ~(self._rim[a] & self._rim[b])
+        dearer = _AWAY * (0.5 * (off[a] + off[b]) / self._edge) ** 2
+        cost = (self._lengths * (1.0 + dearer))[usable]
         count = len(self._x)
         graph = coo_array((cost, (a[usable], b[usable])), shape=(count, count)).tocsr()
         far, before = dijkstra(graph, directed=False, indices=start, return_predecessors=True)
+        apart = np.linalg.norm(self._x[ends] - line[-1], axis=1)
+        end = int(ends[int((far[ends] + _AWAY * apart).argmin())])
         if not np.isfinite(far[end]):
             x, y, z = line[len(line) // 2]
             problem = f"{name}: the surface has no way along it near ({x:.3f}, {y:.3f}, {z:.3f}) m"
@@ -130,9 +143,32 @@ class _Tracer:
         while way[-1] != start:
             way.append(int(before[way[-1]]))
         path = self._without_detours(way[::-1])
+        for vertex, point in ((start, line[0]), (end, line[-1])):
+            self._slide(vertex, point)
         self._ways.append(path)
         self._taken[path] = True
         self._onto(path, line, at)
+        return end
+
+    def _slide(self, vertex: int, point: FloatArray) -> None:
+        """Move a vertex where a line begins or ends to that end: along its rim, or along the one line it is on."""
+        on = [way for way in self._ways if (way == vertex).any()]
+        if self._rim[vertex] and not on:
+            a, b = self._pairs[self._rim_edges].T
+            around = np.concatenate([b[a == vertex], a[b == vertex]])
+        elif len(on) == 1 and not self._rim[vertex] and vertex not in on[0][[0, -1]]:
+            k = int(np.flatnonzero(on[0] == vertex)[0])
+            around = on[0][[k - 1, k + 1]]
+        elif on or self._rim[vertex]:
+            return  # where lines meet already, or meet a rim
+        else:
+            self._x[vertex] = closest_points(point[None], self._mesh.vertices, self._mesh.faces)[1][0]
+            return
+        here = self._x[vertex]
+        sides = self._x[around] - here
+        share = np.clip((sides @ (point - here)) / (sides**2).sum(axis=1), 0.0, _SLID)
+        places = here + share[:, None] * sides
+        self._x[vertex] = places[int(np.linalg.norm(places - point, axis=1).argmin())]
 
     def _without_detours(self, way: list[int]) -> NDArray[np.int64]:
         """Return a way that leaves no corner of it in one triangle with both its neighbours: no other could start there."""
