@@ -1,4 +1,4 @@
-"""Garments taken apart: developable surfaces in closed form, a cap by plate theory, patterns sewn, garments of others."""
+"""Garments taken apart: developable surfaces, a cap by plate theory, patterns sewn, garments of others."""
 
 from __future__ import annotations
 
@@ -186,7 +186,9 @@ def test_noise_is_measured_and_taken_off():
 
 
 def test_corners_are_where_an_outline_turns():
-    square = at_shares("polyline", np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]], float), 0.0, np.linspace(0, 1, 201))
+    square = at_shares(
+        "polyline", np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]], float), 0.0, np.linspace(0, 1, 201)
+    )
     sharp = sharp_corners(square[:-1])
     assert np.flatnonzero(sharp).tolist() == [0, 50, 100, 150]
     angle = 2.0 * np.pi * np.arange(400) / 400

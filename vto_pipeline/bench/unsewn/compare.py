@@ -70,7 +70,9 @@ def compare(found: Unsewn, truth: TriangleMesh) -> list[PanelErrors]:
         shares = barycentric(place[inside], truth.vertices[truth.faces[face[inside]]])
         there = np.einsum("nk,nkd->nd", shares, truth.texture[face[inside]])
         here = found.mesh.texture[own].mean(axis=1)[inside]
-        errors.append(_panel_errors(panel, piece, flat, [run for run in parts if run.piece == number], here, there, area))
+        errors.append(
+            _panel_errors(panel, piece, flat, [run for run in parts if run.piece == number], here, there, area)
+        )
     return errors
 
 

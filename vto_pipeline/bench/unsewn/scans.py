@@ -37,7 +37,7 @@ def drawn_seams(truth: TriangleMesh) -> dict[str, FloatArray]:
     """
     pieces = cut_apart(truth, seams_of_charts(truth))
     found = runs(truth, pieces, [np.zeros(len(piece.start), np.bool_) for piece in pieces])
-    lines = {}
+    lines: dict[str, FloatArray] = {}
     for number, run in enumerate(found):
         if run.sewn > number:
             piece = pieces[run.piece]

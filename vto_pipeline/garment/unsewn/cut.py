@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.geometry.topology import boundary_walks, face_area_vectors, opposite_half_edges
-from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.arrays import IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 
 Bools = NDArray[np.bool_]
@@ -72,7 +72,7 @@ def cut_apart(mesh: TriangleMesh, seam: Bools) -> list[Piece]:
     corner = _linked(np.stack([half, _next(half)]), np.stack([_next(across), across]), len(seam))
     pieces = _linked(half[None] // 3, across[None] // 3, len(mesh.faces))
     names, first = np.unique(pieces, return_index=True)
-    found = []
+    found: list[Piece] = []
     for name in names[np.argsort(first)]:
         face = np.flatnonzero(pieces == name)
         corners = corner.reshape(-1, 3)[face]
@@ -152,8 +152,6 @@ def _linked(one: NDArray[np.integer], other: NDArray[np.integer], count: int) ->
 def _no_disc(mesh: TriangleMesh, openings: int, number: int) -> GarmentError:
     middle, area = mesh.vertices.mean(axis=0), np.linalg.norm(face_area_vectors(mesh), axis=1).sum()
     x, y, z = middle
-    problem = (
-        f"piece {number} around ({x:.2f}, {y:.2f}, {z:.2f}) m, {1e4 * area:.0f} cm², has {openings} rims, where a piece "
-        "that can be laid flat has one"
-    )
+    place = f"piece {number} around ({x:.2f}, {y:.2f}, {z:.2f}) m, {1e4 * area:.0f} cm²"
+    problem = f"{place}, has {openings} rims, where a piece that can be laid flat has one"
     return GarmentError(problem, hint="a seam from rim to rim is missing there: draw it in --seams")

@@ -70,8 +70,7 @@ def _own_shapes(mesh: TriangleMesh) -> FloatArray:
 def _isotropic(mesh: TriangleMesh, own: FloatArray) -> FloatArray:
     import igl
 
-    faces = mesh.faces.astype(np.int64)
-    start = _conformal(mesh, faces)
+    start = _conformal(mesh)
     if not (flat_areas(start, mesh.faces) > 0.0).all():
         start = _convex(mesh)
     wanted = 0.5 * np.linalg.det(own).sum()
@@ -91,14 +90,14 @@ def _isotropic(mesh: TriangleMesh, own: FloatArray) -> FloatArray:
     return flat
 
 
-def _conformal(mesh: TriangleMesh, faces: IntArray) -> FloatArray:
+def _conformal(mesh: TriangleMesh) -> FloatArray:
     import igl
 
     (loop,) = boundary_loops(mesh)
     apart = np.linalg.norm(mesh.vertices[loop] - mesh.vertices[loop[0]], axis=1)
     held = np.array([loop[0], loop[int(np.argmax(apart))]], np.int64)
     places = np.array([[0.0, 0.0], [0.0, apart.max()]])
-    return np.asarray(igl.lscm(mesh.vertices, faces, held, places)[0])
+    return np.asarray(igl.lscm(mesh.vertices, mesh.faces.astype(np.int64), held, places)[0])
 
 
 def _convex(mesh: TriangleMesh) -> FloatArray:
@@ -190,7 +189,7 @@ def _strain(x: FloatArray, faces: IntArray, share: FloatArray) -> tuple[FloatArr
     Args:
         x: Of the panel [m], shape (V, 2).
         faces: Shape (F, 3).
-        share: What each corner adds to G, which takes the face's own plane to the panel: G = sum of x share^T, (F, 3, 2).
+        share: What corners add to G, which takes a face's own plane to the panel: G = sum of x share^T, (F, 3, 2).
     """
     g = np.einsum("fnk,fni->fik", share, x[faces])  # from the face's own plane to the panel, (F, 2, 2)
     c = np.linalg.inv(g @ np.swapaxes(g, 1, 2))
@@ -207,7 +206,9 @@ def _strain(x: FloatArray, faces: IntArray, share: FloatArray) -> tuple[FloatArr
 def _root_of_stiffness(fabric: Fabric) -> FloatArray:
     """Return R, shape (3, 3), with strain R^T R strain the energy per area of warp, weft and shear, doubled."""
     coupled = fabric.poisson * np.sqrt(fabric.stretch_warp * fabric.stretch_weft)
-    stiffness = np.array([[fabric.stretch_warp, coupled, 0.0], [coupled, fabric.stretch_weft, 0.0], [0, 0, fabric.shear]])
+    stiffness = np.array(
+        [[fabric.stretch_warp, coupled, 0.0], [coupled, fabric.stretch_weft, 0.0], [0, 0, fabric.shear]]
+    )
     stiffness[:2, :2] /= 1.0 - fabric.poisson**2
     return np.asarray(np.linalg.cholesky(stiffness).T)
 

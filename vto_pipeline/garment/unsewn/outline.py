@@ -42,7 +42,7 @@ def smoothed(points: FloatArray, noise: float) -> FloatArray:
         points: In order [m], shape (N, D).
         noise: Standard deviation in each direction [m].
     """
-    count, ways = points.shape
+    count = len(points)
     if noise <= 0.0 or count < 4:
         return points
     kernel = np.convolve([1.0, -2.0, 1.0], [1.0, -2.0, 1.0])

@@ -16,6 +16,7 @@ from scipy.optimize import isotonic_regression
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.unsewn.cut import Bools
@@ -91,24 +92,18 @@ class _Tracer:
 
     def _crossed(self, line: FloatArray) -> list[tuple[int, int]]:
         """Return vertices of other lines that a line crosses, not those it runs beside, and where along it."""
-        taken = np.flatnonzero(self._taken)
-        if len(taken) == 0:
-            return []
-        apart = np.linalg.norm(self._x[taken][:, None] - line[None], axis=2)
-        at, nearest = apart.argmin(axis=1), apart.min(axis=1)
         margin = int(2 * _NEAR / _SAMPLES)
-        inner = (nearest < _CROSSED * self._edge) & (at > margin) & (at < len(line) - margin)
-        order = np.flatnonzero(inner)[np.argsort(at[inner], kind="stable")]
-        groups = np.split(order, np.flatnonzero(np.diff(at[order]) > margin) + 1) if len(order) else []
         found = []
-        for group in groups:
-            if np.ptp(at[group]) <= margin:
-                best = group[int(nearest[group].argmin())]
-                found.append((int(taken[best]), int(at[best])))
-        return found
+        for way in self._ways:
+            apart = cdist(self._x[way], line)
+            vertex, at = np.unravel_index(int(apart.argmin()), apart.shape)
+            inner = margin < at < len(line) - margin and apart[vertex, at] < _CROSSED * self._edge
+            if inner and apart[:, [at - margin, at + margin]].min() > self._edge:
+                found.append((int(way[vertex]), int(at)))
+        return sorted(set(found), key=lambda one: one[1])
 
     def _anchors(self, point: FloatArray) -> NDArray[np.int64]:
-        """Return vertices for an end of a line, the nearest first: of other lines and rims, or else the nearest of all."""
+        """Return vertices for an end of a line, the nearest first: of other lines and rims, or else of all."""
         apart = np.linalg.norm(self._x - point, axis=1)
         order = np.argsort(apart, kind="stable")[:200]
         near = order[apart[order] < _NEAR * self._edge]
@@ -171,10 +166,13 @@ class _Tracer:
         self._x[vertex] = places[int(np.linalg.norm(places - point, axis=1).argmin())]
 
     def _without_detours(self, way: list[int]) -> NDArray[np.int64]:
-        """Return a way that leaves no corner of it in one triangle with both its neighbours: no other could start there."""
+        """Return a way none of whose corners is in one triangle with both its neighbours, for others to start there."""
         k = 1
         while k < len(way) - 1:
-            if way[k + 1] in self._around.indices[self._around.indptr[way[k - 1]] : self._around.indptr[way[k - 1] + 1]]:
+            if (
+                way[k + 1]
+                in self._around.indices[self._around.indptr[way[k - 1]] : self._around.indptr[way[k - 1] + 1]]
+            ):
                 del way[k]
                 k = max(k - 1, 1)
             else:

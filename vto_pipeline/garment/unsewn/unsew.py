@@ -59,7 +59,14 @@ class Unsewn:
 
 
 def unsew(
-    mesh: TriangleMesh, seam: Bools, warp: FloatArray, fabric: Fabric, rims: Rims | None, noise: float, name: str, job: Job
+    mesh: TriangleMesh,
+    seam: Bools,
+    warp: FloatArray,
+    fabric: Fabric,
+    rims: Rims | None,
+    noise: float,
+    name: str,
+    job: Job,
 ) -> Unsewn:
     """Cut a garment along its seams and lay the pieces flat.
 
@@ -104,9 +111,7 @@ def _panel(name: str, piece: Piece, flat: FloatArray, own: Sequence[Run], noise:
         Edge("polyline", smoothed(flat[piece.start[np.arange(run.first, run.first + run.count + 1) % count]], noise))
         for run in own
     ]
-    middle = flat.mean(axis=0)
-    reach = 0.25 * float(np.ptp(flat[:, 1]))
-    grain = np.array([middle - [0.0, reach], middle + [0.0, reach]])
+    grain = flat.mean(axis=0) + 0.25 * np.ptp(flat[:, 1]) * np.array([[0.0, -1.0], [0.0, 1.0]])
     return Panel(name, tuple(outline), grain=grain, placement=_placement(piece.mesh.vertices, flat))
 
 
@@ -146,7 +151,9 @@ def _figures(panel: Panel, piece: Piece, flat: FloatArray) -> FlatPiece:
     a, b = edges(piece.mesh).T
     lengths = [np.linalg.norm(x[a] - x[b], axis=1) for x in (flat, piece.mesh.vertices)]
     error = float(np.percentile(np.abs(lengths[0] - lengths[1]), 95))
-    return FlatPiece(panel.name, float(flat_areas(flat, piece.mesh.faces).sum()), float(area.sum()), (middle, most), error)
+    return FlatPiece(
+        panel.name, float(flat_areas(flat, piece.mesh.faces).sum()), float(area.sum()), (middle, most), error
+    )
 
 
 def _tell(figures: Sequence[FlatPiece], panels: Sequence[Panel], job: Job) -> None:

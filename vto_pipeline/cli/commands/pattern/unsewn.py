@@ -29,8 +29,10 @@ def take_apart(path: Path, seams: str, fabric: str, unit: str | None, job: Job) 
         VtoError: the garment or its seams cannot be read, or it does not come apart along them.
     """
     chosen: Seams
-    if seams == "auto" or seams == "charts":
-        chosen = seams
+    if seams == "auto":
+        chosen = "auto"
+    elif seams == "charts":
+        chosen = "charts"
     elif Path(seams).suffix.lower() in (".yaml", ".yml", ".json"):
         chosen = read_seam_lines(Path(seams))
     else:
