@@ -121,6 +121,22 @@ def test_cloth_that_shears_easily_is_sheared_before_it_is_stretched():
     assert (left[1] < 0.5 * left[0]).all()
 
 
+def test_a_panel_does_not_turn_its_warp_to_where_cloth_gives_way():
+    """A barrel is stretched along and around; cloth cut on the bias would rather be sheared by that."""
+    share, angle = np.meshgrid(np.linspace(-1.0, 1.0, 41), np.linspace(-1.0, 1.0, 25), indexing="ij")
+    radius = 0.12 + 0.06 * np.cos(1.5 * share)
+    x, z = radius * np.sin(angle), radius * np.cos(angle)
+    vertices = np.stack([x, 0.2 * share, z], axis=2).reshape(-1, 3)
+    k = (25 * np.arange(40)[:, None] + np.arange(24)).ravel()
+    faces = np.concatenate([np.stack([k, k + 1, k + 26], axis=1), np.stack([k, k + 26, k + 25], axis=1)])[:, [0, 2, 1]]
+    mesh = TriangleMesh(vertices, faces[:, [0, 2, 1]].astype(np.int32))
+    up = np.broadcast_to([0.0, 1.0, 0.0], mesh.faces.shape)
+    flat = flatten(mesh, up, replace(EVEN, shear=5.0))
+    top, low = flat[-25:].mean(axis=0), flat[:25].mean(axis=0)
+    x, y = top - low
+    assert np.arctan2(x, y) == pytest.approx(0.0, abs=np.deg2rad(1.0))
+
+
 def test_more_than_half_a_ball_goes_flat_without_a_fold():
     mesh = cap(0.1, 0.1 * np.deg2rad(140.0))
     flat = flatten(mesh, unknown(mesh), POPLIN)

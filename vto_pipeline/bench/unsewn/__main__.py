@@ -36,7 +36,8 @@ _HEADS = (
     "as worn %",
     "outline mm, mean",
     "most",
-    "seams mm, worst",
+    "worst seam mm",
+    "as worn mm",
     "stretch left, p95 %",
     "passes",
 )
@@ -67,7 +68,7 @@ def rows(sources: list[str], args: argparse.Namespace) -> Iterator[tuple[str, ..
         errors = compare(found, truth)
         yield from _table(source.stem, errors, found)
         passed = sum(map(_passes, errors))
-        yield (source.stem, f"{passed} of {len(errors)} pass", *[""] * 7, f"{seconds:.0f} s CPU")
+        yield (source.stem, f"{passed} of {len(errors)} pass", *[""] * 8, f"{seconds:.0f} s CPU")
 
 
 def _true_panels(path: Path) -> TriangleMesh:
@@ -87,7 +88,10 @@ def _passes(one: PanelErrors) -> bool:
 
 def _table(name: str, errors: list[PanelErrors], found: Unsewn) -> Iterator[tuple[str, ...]]:
     for one, piece in zip(errors, found.pieces, strict=True):
-        worst = float(one.seams[np.abs(one.seams).argmax()]) if len(one.seams) else 0.0
+        worst, worn = 0.0, 0.0
+        if len(one.seams):
+            at = int(np.abs(one.seams).argmax())
+            worst, worn = float(one.seams[at]), float(one.worn_seams[at])
         yield (
             name,
             one.name,
@@ -97,6 +101,7 @@ def _table(name: str, errors: list[PanelErrors], found: Unsewn) -> Iterator[tupl
             f"{1e3 * one.outline_mean:.2f}",
             f"{1e3 * one.outline_most:.1f}",
             f"{1e3 * worst:+.1f}",
+            f"{1e3 * worn:+.1f}",
             f"{1e2 * piece.stretch[1]:.1f}",
             "yes" if _passes(one) else "NO",
         )

@@ -32,6 +32,7 @@ class PanelErrors:
         worn: Relative error of the area in space, without any flattening: how much the cloth is stretched as worn.
         outline_mean, outline_most: Distance of the outlines, either way, after a rigid fit [m].
         seams: Error of the length of each sewn part of the outline [m], shape (S,).
+        worn_seams: The same of its length in space, without any flattening [m], shape (S,).
     """
 
     name: str
@@ -41,6 +42,7 @@ class PanelErrors:
     outline_mean: float
     outline_most: float
     seams: FloatArray
+    worn_seams: FloatArray
 
 
 def compare(found: Unsewn, truth: TriangleMesh) -> list[PanelErrors]:
@@ -104,11 +106,15 @@ def _panel_errors(
     off = np.concatenate([tree.query(moved)[0], cKDTree(moved).query(theirs)[0]])
     ends = np.stack([edge.points[0] for edge in panel.edges]) @ turn.T + shift
     lengths = np.array([np.linalg.norm(np.diff(e.points, axis=0), axis=1).sum() for e in panel.edges])
-    seams = []
+    seams, worn = [], []
     for run in sewn:
         if run.sewn >= 0:
-            way = flat[piece.start[np.arange(run.first, run.first + run.count + 1) % len(piece.start)]]
-            true_length = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+            at = piece.start[np.arange(run.first, run.first + run.count + 1) % len(piece.start)]
+            way = flat[at]
+            true_length, in_space = (
+                float(np.linalg.norm(np.diff(x[at], axis=0), axis=1).sum()) for x in (flat, piece.mesh.vertices)
+            )
+            worn.append(in_space - true_length)
             first, last = (int(np.linalg.norm(ends - way[k], axis=1).argmin()) for k in (0, -1))
             between = np.arange(first, last if last > first else last + len(ends)) % len(ends)
             seams.append(float(lengths[between].sum()) - true_length)
@@ -120,6 +126,7 @@ def _panel_errors(
         float(off.mean()),
         float(off.max()),
         np.asarray(seams),
+        np.asarray(worn),
     )
 
 

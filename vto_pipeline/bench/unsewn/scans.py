@@ -1,4 +1,7 @@
-"""A scan that is simulated: the drape of a known pattern in other triangles, with noise, its seams drawn on it."""
+"""A scan that is simulated: the drape of a known pattern in other triangles, with noise, its seams drawn on it.
+
+The other triangles come from thinning out finer ones. A remesher would round the corners of rims, which a scan has.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +12,12 @@ import numpy as np
 
 from vto_pipeline.errors import InputError
 from vto_pipeline.garment.unsewn.cut import cut_apart, runs, seams_of_charts
-from vto_pipeline.geometry.remeshing.remesh import RemeshConfig, remesh
+from vto_pipeline.geometry.remeshing.decimate import decimate, faces_at
 from vto_pipeline.io.meshes import read_own_mesh
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
+
+_GENTLE = 3.0
 
 
 def draped_truth(run: Path) -> TriangleMesh:
@@ -56,6 +60,9 @@ def scanned(truth: TriangleMesh, edge: float, noise: float, seed: int) -> tuple[
         seed: Of the noise.
     """
     rng = np.random.default_rng(seed)
-    other = remesh(TriangleMesh(truth.vertices, truth.faces), RemeshConfig(edge_mm=1e3 * edge), Job())
+    import igl
+
+    finer = TriangleMesh(*igl.upsample(truth.vertices, truth.faces.astype(np.int64), 1))
+    other = decimate(finer, faces_at(finer, edge), aggressiveness=_GENTLE)
     scan = TriangleMesh(other.vertices + rng.normal(0.0, noise, other.vertices.shape), other.faces)
     return scan, {name: line + rng.normal(0.0, noise, line.shape) for name, line in drawn_seams(truth).items()}

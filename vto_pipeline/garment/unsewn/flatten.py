@@ -140,10 +140,13 @@ def _orthotropic(mesh: TriangleMesh, own: FloatArray, flat: FloatArray, fabric: 
     """Return the panel of least membrane energy, from a near one."""
     energy = _Energy(mesh, own, fabric)
     x = flat
+    about = flat - flat.mean(axis=0)
+    turn = np.column_stack([-about[:, 1], about[:, 0]]).ravel()  # no step turns the panel: its warp is known
     before, right, normal = energy.at(x)
     for _ in range(_ROUNDS):
         solver = splu(normal, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-        step = solver.solve(right).reshape(-1, 2)
+        step, turning = solver.solve(right), solver.solve(turn)
+        step = (step - (turn @ step) / (turn @ turning) * turning).reshape(-1, 2)
         for halving in range(_HALVINGS):
             tried = x + 0.5**halving * step
             if (flat_areas(tried, mesh.faces) > 0.0).all():
