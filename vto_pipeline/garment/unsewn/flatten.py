@@ -4,7 +4,7 @@ The panel is sought that costs the least membrane energy when it is stretched to
 its shear count as the fabric resists them. In front of that, a conformal map, and the symmetric Dirichlet energy
 (Smith & Schaefer 2015) lowered by SLIM (Rabinovich, Poranne, Panozzo & Sorkine-Hornung 2017, in libigl), which knows no
 directions. The last part is a Gauss-Newton method on the Green strain from the panel to the surface, which grows
-without bound where a triangle closes up: with steps cut short before any does, no triangle is ever turned over.
+without bound where a triangle closes up: with steps cut short before any does, no triangle is ever flipped.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def flatten(mesh: TriangleMesh, warp: FloatArray, fabric: Fabric) -> FloatArray:
         fabric: Its stiffness says which stretch is taken first.
 
     Raises:
-        GarmentError: the piece cannot be laid flat without turning a triangle over.
+        GarmentError: the piece cannot be laid flat without flipping a triangle.
     """
     own = _own_shapes(mesh)
     flat = _upright(mesh, _isotropic(mesh, own), warp)
@@ -52,7 +52,7 @@ def stretches(mesh: TriangleMesh, flat: FloatArray) -> FloatArray:
 
 
 def flat_areas(flat: FloatArray, faces: IntArray) -> FloatArray:
-    """Return the areas of faces in the plane, negative where turned over [m²], shape (F,)."""
+    """Return the areas of faces in the plane, negative where flipped [m²], shape (F,)."""
     laid = flat[faces]
     return np.asarray(0.5 * np.linalg.det(laid[:, 1:] - laid[:, :1]))
 
@@ -101,7 +101,7 @@ def _conformal(mesh: TriangleMesh) -> FloatArray:
 
 
 def _convex(mesh: TriangleMesh) -> FloatArray:
-    """Return the piece within a circle, each vertex in the middle of its neighbours, which turns none over (Tutte)."""
+    """Return the piece within a circle, each vertex in the middle of its neighbours, which flips none (Tutte)."""
     (loop,) = boundary_loops(mesh)
     sides = np.linalg.norm(np.roll(mesh.vertices[loop], -1, axis=0) - mesh.vertices[loop], axis=1)
     angle = 2.0 * np.pi * np.concatenate([[0.0], np.cumsum(sides)[:-1]]) / sides.sum()

@@ -206,7 +206,7 @@ class _Tracer:
         """Return the mesh with vertices near lines moved to make room, on the surface.
 
         Raises:
-            GarmentError: no room is found: a triangle is turned over.
+            GarmentError: no room is found: a triangle is flipped.
         """
         mesh, x = self._mesh, self._x.copy()
         near = self._taken.copy()
