@@ -16,6 +16,7 @@ from vto_pipeline.errors import GarmentError, InputError
 from vto_pipeline.garment.pattern.embed import in_shape
 from vto_pipeline.garment.pattern.figures import panel_figures, seam_figures
 from vto_pipeline.garment.pattern.sew import SewConfig, sew
+from vto_pipeline.garment.unsewn.cut import cut_apart, runs
 from vto_pipeline.garment.unsewn.flatten import flat_areas, flatten, stretches
 from vto_pipeline.garment.unsewn.noise import noise_of, without_noise
 from vto_pipeline.garment.unsewn.outline import crosses_itself, sharp_corners, smoothed
@@ -143,6 +144,17 @@ def test_more_than_half_a_ball_goes_flat_without_a_fold():
     assert (flat_areas(flat, mesh.faces) > 0.0).all()
 
 
+def test_a_sliver_of_a_scan_does_no_harm():
+    mesh = cap(0.5, 0.1, rings=10)
+    a, b, c = mesh.faces[200]
+    vertices = mesh.vertices.copy()
+    vertices[c] = 0.4 * vertices[a] + 0.6 * vertices[b] + 1e-9 * (vertices[c] - vertices[a])
+    thin = replace(mesh, vertices=vertices)
+    flat = flatten(thin, unknown(thin), POPLIN)
+    assert np.isfinite(flat).all()
+    assert flat_areas(flat, thin.faces).sum() == pytest.approx(area_of(thin), rel=5e-3)
+
+
 def test_the_warp_of_charts_ends_up_along_y():
     mesh = frustum(0.15, 0.15, 0.4)
     angle = np.arctan2(mesh.vertices[:, 0], mesh.vertices[:, 2])[mesh.faces]
@@ -239,6 +251,26 @@ def test_a_drawn_line_runs_along_edges_and_the_surface_stays():
     assert np.abs(0.15 * there).max() < 2e-3
     assert area_of(cut) == pytest.approx(area_of(mesh), rel=2e-3)
     assert (np.einsum("fd,fd->f", face_area_vectors(cut), face_area_vectors(mesh)) > 0.0).all()
+
+
+def test_a_corner_of_one_side_ends_the_other_side_of_the_seam_too():
+    mesh = frustum(0.15, 0.15, 0.4, around=40, up=8)
+    angle = np.arctan2(mesh.vertices[:, 0], mesh.vertices[:, 2])
+    on = np.isclose(angle, 0.0) | np.isclose(np.abs(angle), np.pi)
+    seam = on[half_edges(mesh)].all(axis=1)
+    pieces = cut_apart(mesh, seam)
+    assert len(pieces) == 2
+    sharp = [np.zeros(len(piece.start), np.bool_) for piece in pieces]
+    whole = runs(mesh, pieces, sharp)
+    assert sorted(run.count for run in whole) == [8] * 4 + [20] * 4
+    upright = next(run for run in whole if run.sewn >= 0 and run.piece == 0)
+    sharp[0][(upright.first + 3) % len(sharp[0])] = True
+    found = runs(mesh, pieces, sharp)
+    assert sorted(run.count for run in found if run.sewn >= 0) == [3, 3, 5, 5, 8, 8]
+    for number, run in enumerate(found):
+        if run.sewn >= 0:
+            assert found[run.sewn].sewn == number
+            assert found[run.sewn].count == run.count
 
 
 def test_what_cannot_come_apart_is_refused():

@@ -117,7 +117,8 @@ def _panel_errors(
             worn.append(in_space - true_length)
             first, last = (int(np.linalg.norm(ends - way[k], axis=1).argmin()) for k in (0, -1))
             between = np.arange(first, last if last > first else last + len(ends)) % len(ends)
-            seams.append(float(lengths[between].sum()) - true_length)
+            length = float(lengths[between].sum())
+            seams.append((0.0 if first == last and length > 2.0 * true_length else length) - true_length)
     return PanelErrors(
         panel.name,
         true_area,

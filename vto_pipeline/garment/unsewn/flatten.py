@@ -23,6 +23,7 @@ _ISOTROPIC_ROUNDS = 40
 _ROUNDS = 40
 _CONVERGED = 1e-6  # of the energy
 _HALVINGS = 12
+_LEAST = 1e-3  # of its area at first that a triangle keeps; of a side, the least height: scans have slivers
 _HOLD = 1e-7  # of the stiffness: which place and turn the panel has does not matter
 _UPRIGHT = 0.3  # a mean of unit vectors shorter than this points nowhere
 
@@ -63,7 +64,7 @@ def _own_shapes(mesh: TriangleMesh) -> FloatArray:
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     length = np.linalg.norm(first, axis=1)
     along = np.einsum("fd,fd->f", first, second) / length
-    height = np.linalg.norm(np.cross(first, second), axis=1) / length
+    height = np.maximum(np.linalg.norm(np.cross(first, second), axis=1) / length, _LEAST * length)
     return np.stack([np.stack([length, along], axis=1), np.stack([0.0 * length, height], axis=1)], axis=1)
 
 
@@ -142,6 +143,7 @@ def _orthotropic(mesh: TriangleMesh, own: FloatArray, flat: FloatArray, fabric: 
     x = flat
     about = flat - flat.mean(axis=0)
     turn = np.column_stack([-about[:, 1], about[:, 0]]).ravel()  # no step turns the panel: its warp is known
+    least = _LEAST * flat_areas(flat, mesh.faces)
     before, right, normal = energy.at(x)
     for _ in range(_ROUNDS):
         solver = splu(normal, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
@@ -149,7 +151,7 @@ def _orthotropic(mesh: TriangleMesh, own: FloatArray, flat: FloatArray, fabric: 
         step = (step - (turn @ step) / (turn @ turning) * turning).reshape(-1, 2)
         for halving in range(_HALVINGS):
             tried = x + 0.5**halving * step
-            if (flat_areas(tried, mesh.faces) > 0.0).all():
+            if (flat_areas(tried, mesh.faces) > least).all():
                 now, right, normal = energy.at(tried)
                 if now < before:
                     break
