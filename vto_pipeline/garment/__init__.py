@@ -8,5 +8,6 @@ simulation_mesh: the mesh that is simulated
 photographed/: the garment held beside the photos
 wearable: whether a surface can be a garment at all
 pattern/: sewing patterns as garments
+unsewn/: from a garment in space back to its pattern
 sizes/: flat measurements of a pattern, and the pattern in other sizes
 """
