@@ -29,7 +29,7 @@ from vto_pipeline.scan.photos.disparity import MatchConfig, match_pair
 from vto_pipeline.scan.photos.neighbours import camera_points, choose_pairs, visibility
 from vto_pipeline.scan.photos.rectify import StereoView, rectify
 from vto_pipeline.scan.photos.region import object_region
-from vto_pipeline.scan.photos.rematch.rematch import RematchConfig, rematch
+from vto_pipeline.scan.photos.rematch.rematch import RematchConfig, look_bytes, rematch
 
 PAIR_BYTES = 250
 """Working memory of one pair per pixel of a photo, with windows as large as they may be [B]."""
@@ -75,7 +75,7 @@ def estimate_depth_maps(
     if not pairs:
         hint = "photos about 15 degrees apart work best; is there texture?"
         raise ScanError(f"no two of {len(views)} photos share {config.min_shared_points} sparse points", hint=hint)
-    threads = _threads(views, pairs, job)
+    threads = _threads(views, pairs, config, job)
     pinholes = tuple(view.camera.without_distortion() for view in views)
     depth = _merge(cameras.names, views, pairs, cloud, seen, config, threads, job)
     merged = DepthMaps(cameras.names, pinholes, cameras.world_from_cam, depth)
@@ -132,8 +132,9 @@ def _with_exposures(views: list[StereoView], cloud: PointCloud, seen: NDArray[np
     return [replace(view, exposure=float(exposure)) for view, exposure in zip(views, found, strict=True)]
 
 
-def _threads(views: list[StereoView], pairs: list[tuple[int, int]], job: Job) -> int:
+def _threads(views: list[StereoView], pairs: list[tuple[int, int]], config: StereoConfig, job: Job) -> int:
     """Return how many pairs are matched at once: one a core, as memory allows. What it needs follows from the pairs.
+    The second look comes after them, and may need more.
 
     Raises:
         ScanError: it does not even allow one.
@@ -152,8 +153,9 @@ def _threads(views: list[StereoView], pairs: list[tuple[int, int]], job: Job) ->
     kept = (1 + 4 + 4) * len(views) + 4 * (most + left.max())  # grey, merged, checked; maps, and those being merged
     cores, free = os.cpu_count() or 1, job.memory_left()
     threads = min(cores, int((free / pixels - kept) / PAIR_BYTES))
-    needed = pixels * (kept + PAIR_BYTES * max(1, threads))
-    if threads < 1:
+    again = look_bytes(len(views), pixels) if config.rematch.rounds else 0.0
+    needed = max(pixels * (kept + PAIR_BYTES * max(1, threads)), again)
+    if threads < 1 or again > free:
         has = "this machine has" if math.isinf(job.memory) else "the budget leaves"
         problem = f"{len(views)} photos need up to {needed / 1e9:.1f} GB of memory; {has} {max(0.0, free) / 1e9:.1f} GB"
         raise ScanError(problem, hint="lower stereo.max_side_px, or give more memory")
