@@ -97,7 +97,7 @@ def check_lifted(
     distance: SurfaceDistance,
     bare: BareParts | None,
 ) -> None:
-    """Refuse fillings that a part of the mannequin goes through: what was filled is an opening, or has one for its part.
+    """Refuse fillings that a part of the mannequin goes through: what was filled is an opening, or holds one.
 
     Args:
         before, after: The garment before and after its fillings were lifted.

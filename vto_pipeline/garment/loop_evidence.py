@@ -138,4 +138,3 @@ def _evenly(points: FloatArray) -> FloatArray:
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
     at = np.arange(AROUND) / AROUND * along[-1]
     return np.column_stack([np.interp(at, along, closed[:, d]) for d in range(3)])
-

@@ -180,7 +180,9 @@ def _least_slanted(
     return np.where(np.take_along_axis(cosine, order, axis=1) > 0, order, -1)
 
 
-def _projected(points: FloatArray, lens: Intrinsics, cam_from_world: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+def _projected(
+    points: FloatArray, lens: Intrinsics, cam_from_world: FloatArray
+) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Column, row and depth of points (N, 3) in a photo, shape (N, 3), and which lie ahead of it, shape (N,)."""
     local = points @ cam_from_world[:3, :3].T + cam_from_world[:3, 3]
     ahead = np.asarray(local[:, 2] > 1e-6)
