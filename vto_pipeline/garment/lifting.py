@@ -57,7 +57,7 @@ def lift_fillings(
     near = filled.copy()
     for _ in range(RINGS):
         near[mesh.faces[near[mesh.faces].any(axis=1)]] = True
-    patch, source = submesh(mesh, near[mesh.faces].all(axis=1))
+    patch, source = submesh(mesh, np.asarray(near[mesh.faces].all(axis=1)))
     free = filled[source]
     nearest = np.clip(away[source], least, usual)[:, None]
     nearest = np.maximum(extend_smoothly(patch, nearest, free, order=1)[:, 0], least)

@@ -113,7 +113,7 @@ def close_scan_holes(
         filled, lifted = lift_fillings(smooth, ~observed, distance, config.clearance_mm * 1e-3)
         if config.keep is None:
             check_lifted(smooth, filled, ~observed, distance, bare)
-        job.measure(lifted_cm2=1e4 * _area(filled, lifted[filled.faces].any(axis=1)))
+        job.measure(lifted_cm2=1e4 * _area(filled, np.asarray(lifted[filled.faces].any(axis=1))))
     final = fair_rims(filled, config.fair_mm * 1e-3)
     if face_components(final)[0] != 1:
         raise GarmentError(f"the garment fell apart into {face_components(final)[0]} pieces")

@@ -67,6 +67,6 @@ def in_grey(picture: ByteArray, shares: FloatArray) -> NDArray[np.uint8]:
     import cv2
 
     if tuple(shares) == USUAL:
-        usual: NDArray[np.uint8] = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
-        return usual
+        usual: Any = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
+        return np.asarray(usual, dtype=np.uint8)
     return np.rint(picture.astype(np.float32) @ shares.astype(np.float32)).astype(np.uint8)

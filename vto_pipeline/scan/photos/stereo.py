@@ -8,34 +8,28 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from vto_pipeline.errors import InputError, ScanError
-from vto_pipeline.io.captures.images import read_image
+from vto_pipeline.errors import ScanError
 from vto_pipeline.io.captures.undistort import undistorted
-from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.model.camera import CameraSet, Intrinsics
+from vto_pipeline.model.camera import CameraSet
 from vto_pipeline.model.frames import DepthMaps, PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
 from vto_pipeline.model.settings import Config
-from vto_pipeline.scan.exposure import exposures
 from vto_pipeline.scan.library_message import library_message
 from vto_pipeline.scan.photos.consistency import agreeing_views, consensus, rays
 from vto_pipeline.scan.photos.disparity import MatchConfig, match_pair
-from vto_pipeline.scan.photos.grey import best_shares, in_grey
-from vto_pipeline.scan.photos.neighbours import camera_points, choose_pairs, visibility
+from vto_pipeline.scan.photos.neighbours import choose_pairs, visibility
 from vto_pipeline.scan.photos.rectify import StereoView, rectify
 from vto_pipeline.scan.photos.region import object_region
 from vto_pipeline.scan.photos.rematch.rematch import RematchConfig, look_bytes, rematch
+from vto_pipeline.scan.photos.views import stereo_views
 
-COLORED = 12
-"""So many photos tell in which grey the print shows best."""
 PAIR_BYTES = 250
 """Working memory of one pair per pixel of a photo, with windows as large as they may be [B]."""
 
@@ -75,9 +69,7 @@ def estimate_depth_maps(
         ScanError: no two photos share enough of the surface, the memory is too small, or no depth is agreed on.
     """
     seen = visibility(cameras, cloud)
-    paths = _paths(photos, cameras)
-    shares = _shares(paths, cameras, cloud, seen, job)
-    views = _with_exposures(_load(paths, cameras, shares, config.max_side_px), cloud, seen, job)
+    views = stereo_views(photos, cameras, cloud, seen, config.max_side_px, job)
     pairs = choose_pairs(cameras, cloud, seen, config.neighbours, config.min_shared_points)
     if not pairs:
         hint = "photos about 15 degrees apart work best; is there texture?"
@@ -104,63 +96,6 @@ def estimate_depth_maps(
     except ScanError as error:
         job.note(f"no second look: {error.problem}")
         return maps
-
-
-def _paths(photos: PhotoSet, cameras: CameraSet) -> list[Path]:
-    """The file of each camera's photo."""
-    paths = {path.name: path for path in photos.paths}
-    for name in cameras.names:
-        if name not in paths:
-            raise InputError(f"there is a camera but no photo for {name}", where=str(photos.paths[0].parent))
-    return [paths[name] for name in cameras.names]
-
-
-def _shares(paths: list[Path], cameras: CameraSet, cloud: PointCloud, seen: NDArray[np.bool_], job: Job) -> FloatArray:
-    """Shares of red, green and blue in the grey that is matched, told by some photos round the sparse points."""
-    some = np.unique(np.linspace(0, len(paths) - 1, min(len(paths), COLORED)).round().astype(int))
-    shown = (
-        (read_image(paths[k]), _pixels(cloud.points[seen[k]], cameras.intrinsics[k], cameras.world_from_cam[k]))
-        for k in some
-    )
-    shares, gain = best_shares(shown)
-    if gain > 1.0:
-        red, green, blue = 100.0 * shares
-        what = f"{red:.0f} % red, {green:.0f} % green, {blue:.0f} % blue"
-        job.note(f"matched in {what}: the print shows {gain:.1f} times as much as in the usual grey")
-        job.measure(grey_shares=[round(float(share), 2) for share in shares], grey_gain=round(gain, 2))
-    return shares
-
-
-def _load(paths: list[Path], cameras: CameraSet, shares: FloatArray, max_side: int) -> list[StereoView]:
-    import cv2
-
-    views = []
-    for path, camera, pose in zip(paths, cameras.intrinsics, cameras.world_from_cam, strict=True):
-        gray: Any = in_grey(read_image(path), shares)
-        scale = min(1.0, max_side / max(gray.shape))
-        if scale < 1:
-            size = (round(gray.shape[1] * scale), round(gray.shape[0] * scale))
-            gray = cv2.resize(gray, size, interpolation=cv2.INTER_AREA)
-            camera = camera.resized(*size)
-        views.append(StereoView(gray, camera, pose))
-    return views
-
-
-def _pixels(points: FloatArray, lens: Intrinsics, world_from_cam: FloatArray) -> FloatArray:
-    """Where a photo shows points that lie before it (N, 3), distortion included [px], shape (N, 2)."""
-    x, y, z = camera_points(points, world_from_cam).T
-    bend = 1.0 + lens.k1 * (x**2 + y**2) / z**2
-    return np.column_stack([lens.fx * x / z * bend + lens.cx, lens.fy * y / z * bend + lens.cy])
-
-
-def _with_exposures(views: list[StereoView], cloud: PointCloud, seen: NDArray[np.bool_], job: Job) -> list[StereoView]:
-    """Return the views with how brightly each was exposed, told by the sparse points that it may see."""
-    pixels = np.zeros((*seen.shape, 2))
-    for index, view in enumerate(views):
-        pixels[index, seen[index]] = _pixels(cloud.points[seen[index]], view.camera, view.world_from_cam)
-    found = exposures([view.gray for view in views], pixels, seen)
-    job.measure(exposure_spread=round(float(found.max() / found.min()), 3))
-    return [replace(view, exposure=float(exposure)) for view, exposure in zip(views, found, strict=True)]
 
 
 def _threads(views: list[StereoView], pairs: list[tuple[int, int]], config: StereoConfig, job: Job) -> int:
