@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
-from vto_pipeline.scan.photos.grey import USUAL, best_shares, in_grey
+from vto_pipeline.scan.grey import USUAL, best_shares, in_grey
 from vto_pipeline.scan.photos.stereo import StereoConfig, estimate_depth_maps
 
 EVERYWHERE = np.stack(np.meshgrid(np.arange(5.0, 155.0), np.arange(5.0, 115.0)), -1).reshape(-1, 2)

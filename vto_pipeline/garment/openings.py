@@ -12,6 +12,7 @@ from vto_pipeline.garment.bare_parts import BareParts
 from vto_pipeline.garment.lifting import check_lifted, lift_fillings
 from vto_pipeline.garment.loop_evidence import LoopShape, encloses, measure_loops
 from vto_pipeline.garment.notches import close_notches
+from vto_pipeline.garment.photographed.covered import covered_loops
 from vto_pipeline.garment.photographed.parted import refuse_parted
 from vto_pipeline.garment.photographed.sightings import look_at_mannequin
 from vto_pipeline.garment.rims import drop_flaps, fair_rims, largest_piece, trim_ledges
@@ -98,6 +99,8 @@ def close_scan_holes(
         )
     shapes = measure_loops(bridged)
     is_opening = _classify(bridged, shapes, distance, config, job)
+    if mannequin is not None and photos is not None and any(is_opening):
+        is_opening = _uncovered(bridged, shapes, is_opening, mannequin, photos, job)
     if config.keep is not None:
         is_opening = _kept(shapes, is_opening, config.keep, job)
     count = sum(is_opening)
@@ -210,6 +213,26 @@ def _classify(
             job.note(f"beyond the mannequin, by its shape alone: {_listing([shape], [True])}")
         real.append(around or hangs)
     return real
+
+
+def _uncovered(
+    mesh: TriangleMesh,
+    shapes: list[LoopShape],
+    likely: list[bool],
+    mannequin: TriangleMesh,
+    photos: PosedPhotos,
+    job: Job,
+) -> list[bool]:
+    """Return which loops are openings once the photos were asked: not those through which they show cloth."""
+    silent = Job(seed=job.seed)  # it is told once, of the finished garment
+    sightings = look_at_mannequin(mesh, np.ones(len(mesh.vertices), dtype=bool), mannequin, photos, silent)
+    if sightings is None:
+        return likely
+    covered = covered_loops(sightings, [mesh.vertices[shape.loop] for shape in shapes])
+    turned = [shape for shape, real, shut in zip(shapes, likely, covered, strict=True) if real and shut]
+    if turned:
+        job.note(f"the photos show cloth there: {_listing(turned, [False] * len(turned))}")
+    return [real and not shut for real, shut in zip(likely, covered, strict=True)]
 
 
 def _kept(shapes: list[LoopShape], likely: list[bool], count: int, job: Job) -> list[bool]:

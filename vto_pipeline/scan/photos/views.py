@@ -17,7 +17,7 @@ from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
 from vto_pipeline.scan.exposure import exposures
-from vto_pipeline.scan.photos.grey import best_shares, in_grey
+from vto_pipeline.scan.grey import best_shares, in_grey
 from vto_pipeline.scan.photos.neighbours import camera_points
 from vto_pipeline.scan.photos.rectify import StereoView
 

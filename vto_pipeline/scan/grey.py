@@ -19,17 +19,19 @@ USUAL = (0.299, 0.587, 0.114)
 """Shares of red, green and blue in what the eye finds bright (ITU-R BT.601)."""
 PRINT_PX = 8.0
 """What changes over a longer distance is shading [px]."""
+FAINT = 5.0
+"""Weaker detail counts less; what is stronger counts as much, or a few outlines would outweigh a print [levels]."""
 CLIPPED = 254
 """A channel at this level or above tells nothing, nor do the places beside it."""
 STEP = 0.1
 """Shares are tried in steps of this."""
 CLEARLY = 1.5
-"""Other shares than the usual ones must show the print so many times better, against noise."""
+"""What is gained by other shares than the usual ones, when the usual ones do well."""
 LEAST = 1000
 """Fewer places tell nothing."""
 
 
-def best_shares(shown: Iterable[tuple[ByteArray, FloatArray]]) -> tuple[FloatArray, float]:
+def best_shares(shown: Iterable[tuple[ByteArray, FloatArray]], least_gain: float = CLEARLY) -> tuple[FloatArray, float]:
     """Return the shares of red, green and blue, (3,), that show a print best against noise, and how many times better
     than the usual ones; those where the gain is small.
 
@@ -37,6 +39,7 @@ def best_shares(shown: Iterable[tuple[ByteArray, FloatArray]]) -> tuple[FloatArr
 
     Args:
         shown: Photos (H, W, 3), and where each shows the object [px], shape (N, 2).
+        least_gain: Other shares than the usual ones must show it so many times better.
     """
     import cv2
 
@@ -48,6 +51,7 @@ def best_shares(shown: Iterable[tuple[ByteArray, FloatArray]]) -> tuple[FloatArr
         lost: Any = cv2.dilate((picture >= CLIPPED).astype(np.uint8), np.ones((5, 5), np.uint8))
         level = picture.astype(np.float32)
         detail = (level - cv2.GaussianBlur(level, (0, 0), PRINT_PX))[there] * (lost[there] == 0)
+        detail /= np.sqrt(np.square(detail).sum(axis=1, keepdims=True) + FAINT**2)
         moment += detail.T.astype(float) @ detail
         count += len(detail)
     usual = np.array(USUAL)
@@ -57,7 +61,7 @@ def best_shares(shown: Iterable[tuple[ByteArray, FloatArray]]) -> tuple[FloatArr
     before = usual @ moment @ usual / (usual @ usual)
     best = int(np.argmax(signal))
     gain = float(np.sqrt(signal[best] / before)) if before > 0.0 else 1.0
-    if count < LEAST or gain < CLEARLY:
+    if count < LEAST or gain < least_gain:
         return usual, 1.0
     return tried[best], gain
 
