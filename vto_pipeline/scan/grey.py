@@ -25,7 +25,7 @@ CLIPPED = 254
 """A channel at this level or above tells nothing, nor do the places beside it."""
 STEP = 0.1
 """Shares are tried in steps of this."""
-CLEARLY = 1.5
+CLEARLY = 1.2
 """What is gained by other shares than the usual ones, when the usual ones do well."""
 LEAST = 1000
 """Fewer places tell nothing."""
