@@ -48,13 +48,15 @@ def recover(mesh: TriangleMesh, seams: Seams, fabric: Fabric, name: str, job: Jo
         GarmentError: a piece is no disc, a line leaves the garment, or its openings tell no type.
     """
     job.progress(0.0, "looking for seams")
+    had_charts = mesh.texture is not None
     mesh = _sound(mesh, job)
     laid = None if mesh.texture is None else _true_to_scale(mesh)
     up = np.broadcast_to([0.0, 1.0, 0.0], mesh.faces.shape)
     rims = rims_of(mesh)
     if seams == "charts" or (seams == "auto" and laid is not None):
         if mesh.texture is None:
-            raise InputError("the garment has no texture coordinates, so no charts to cut along")
+            problem = "edges of more than two faces had to be repaired, which took the charts" if had_charts else ""
+            raise InputError(problem or "the garment has no texture coordinates, so no charts to cut along")
         job.note("seams: the borders of its charts" + (", which are panels at true scale" if laid is not None else ""))
         warp = up if laid is None else _warp(mesh, laid)
         found = unsew(mesh, seams_of_charts(mesh), warp, fabric, rims, 0.0, name, job)
