@@ -18,6 +18,7 @@ GIVEN = {
     "shirt.ply": "shirt_on_form/shirt.ply",
     "form.ply": "shirt_on_form/form.ply",
     "customer.yaml": "customer/measurements.yaml",
+    "cloud.ply": "customer/cloud.ply",
 }
 
 
