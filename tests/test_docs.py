@@ -20,6 +20,7 @@ from vto_pipeline.io.bodies.measurements import read_measurements
 from vto_pipeline.io.captures.photos import read_board
 from vto_pipeline.io.fabrics import read_fabric
 from vto_pipeline.io.motion.keyframes import parse_keyframes
+from vto_pipeline.io.patterns.seam_lines import read_seam_lines
 from vto_pipeline.pipeline.batch.order import read_order
 from vto_pipeline.stages.entry.planning import catalogue, planned
 
@@ -192,6 +193,7 @@ def test_examples_are_read_as_they_stand(page, block, tmp_path):
         "sex": lambda: read_measurements(path),
         "columns": lambda: read_board(path),
         "garment": lambda: read_rules(str(path)),
+        "unit": lambda: read_seam_lines(path),
         "frames_per_second": lambda: parse_keyframes(str(path)),
     }
     assert kinds[first_key(block)]()

@@ -117,3 +117,45 @@ def test_sizes_are_written_with_their_chart(vto):
     assert vto("advise", "run/size_chart.json", "--measurements", "tape.yaml", "--json").data["best"] == "L"
     assert "at most 0.0 mm from what the rules ask for" in vto("pattern", "skirt.json", "--sizes", "S,M").out
     assert vto("pattern", "skirt.json", "--sizes", "S", "-o", "skirt.json").code == 2
+
+
+def write_tube(path: Path, radius: float = 0.15, height: float = 0.4, around: int = 60, up: int = 16) -> None:
+    angle = 2.0 * np.pi * np.arange(around) / around
+    with path.open("w") as stream:
+        for k in range(up + 1):
+            for a in angle:
+                stream.write(f"v {radius * np.sin(a):.6f} {height * k / up:.6f} {radius * np.cos(a):.6f}\n")
+        for k in range(up):
+            for i in range(around):
+                a, b = k * around + i + 1, k * around + (i + 1) % around + 1
+                stream.write(f"f {a} {b} {b + around}\nf {a} {b + around} {a + around}\n")
+
+
+def test_a_garment_in_space_becomes_a_pattern(vto):
+    write_tube(Path("skirt.obj"))
+    said = vto("pattern", "skirt.obj", "-o", "flat.json", "-o", "flat.svg", "-o", "flat.dxf", "-o", "p.obj", "--json")
+    assert said.code == 0
+    assert said.data["written"] == ["flat.json", "flat.svg", "flat.dxf", "p.obj"]
+    half = 60 * 0.15 * np.sin(np.pi / 60)
+    assert [one["area_cm2"] for one in said.data["laid_flat"]] == pytest.approx([1e4 * half * 0.4] * 2, rel=2e-3)
+    assert said.data["flat"]["sizes"][""]["hem"]["mm"] == pytest.approx(1e3 * half, rel=3e-3)
+    assert len(said.data["seams"]) == 2
+    for name in ("flat.json", "flat.svg", "flat.dxf"):
+        again = vto("pattern", name, "--json").data
+        assert [p["area_cm2"] for p in again["panels"]] == pytest.approx([1e4 * half * 0.4] * 2, rel=2e-3)
+    lines = vto("pattern", "p.obj").out
+    assert "panels at true scale" in lines
+    assert "stretch left" in lines
+
+
+def test_a_garment_that_cannot_come_apart_is_refused(vto):
+    write_tube(Path("skirt.obj"))
+    Path("seams.yaml").write_text("schema: 1\nseams:\n  - {name: far, points: [[2, 0, 0], [2, 1, 0]]}\n")
+    Path("broken.yaml").write_text("schema: 1\nseams: 3\n")
+    assert vto("pattern", "skirt.obj", "--seams", "seams.yaml").code == 4
+    assert vto("pattern", "skirt.obj", "--seams", "broken.yaml").code == 3
+    assert vto("pattern", "skirt.obj", "--seams", "somewhere").code == 2
+    assert vto("pattern", "skirt.obj", "--seams", "charts").code == 3
+    assert vto("pattern", "skirt.obj", "-o", "skirt.obj").code == 2
+    assert vto("pattern", "skirt.obj", "-o", "a.pdf").code == 2
+    assert vto("pattern", "skirt.obj", "--size", "M").code == 2

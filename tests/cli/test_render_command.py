@@ -6,10 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from PIL import Image
 
+from vto_pipeline.cli.commands.render.draw import meshes_of
+from vto_pipeline.io.gltf.write import write_glb
 from vto_pipeline.io.meshes import read_mesh, write_ply
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.render import GlbPart
+from vto_pipeline.pipeline.execution.folder import RECORD
 
 
 @pytest.fixture
@@ -90,3 +95,24 @@ def test_a_run_without_a_surface_is_refused(vto):
     assert (said.code, "nothing that can be drawn" in said.err) == (3, True)
     said = vto("render", "RUN", "--views", "", "--web", "small.glb")
     assert (said.code, "nothing that can be drawn" in said.err) == (3, True)
+
+
+def test_a_scene_that_a_run_wrote_is_drawn_part_by_part_in_its_colours(tmp_path):
+    out = tmp_path / "run" / "out"
+    out.mkdir(parents=True)
+    parts = [
+        GlbPart("arms_up garment", icosphere(0.1)),
+        GlbPart("arms_up body", icosphere(0.2), base_color=(1.0, 0.0, 0.0, 1.0)),
+    ]
+    write_glb(out / "poses.glb", parts)
+    assert len(meshes_of(out / "poses.glb")[0]) == 1  # a file from anywhere: one surface
+    (tmp_path / "run" / RECORD).write_text("{}")
+    (garment, body), beside = meshes_of(out / "poses.glb")
+    assert beside == out / "pictures"
+    assert garment.colors is None
+    assert (body.colors == (255, 0, 0)).all()
+
+
+def icosphere(radius):
+    mesh = trimesh.creation.icosphere(1, radius)
+    return TriangleMesh(mesh.vertices, mesh.faces)

@@ -127,3 +127,17 @@ def test_where_a_coarse_mesh_jams_the_next_starts_where_the_garment_was_given(mo
     found = drape(vest(), pear(), fabric(), {**settings, "coarsen_above": 1000}, job)
     assert any(what.startswith("coming to rest on ") and "jammed" in why for what, why in job.left_out)
     assert (found.mesh.vertices == alone.mesh.vertices).all()
+
+
+def test_how_it_was_put_on_is_told_though_only_a_coarse_mesh_was(monkeypatch):
+    grow = levels_module.Phases.grow_body
+
+    def led(self, state, body):
+        self._job.warn("it was moved by 453 mm")
+        return grow(self, state, body)
+
+    monkeypatch.setattr(levels_module.Phases, "grow_body", led)
+    job = Job()
+    drape(vest(), pear(), fabric(), {"settle_seconds": 0.1, "coarsen_above": 1000}, job)
+    assert job.warnings.count("it was moved by 453 mm") == 1
+    assert not any("453 mm" in note for note in job.notes)

@@ -143,10 +143,21 @@ def test_quarter_turns_are_the_rotations_of_a_cube_and_cubes_turn_like_meshes():
 
 @pytest.mark.real_data
 @pytest.mark.skipif(not DATA.exists(), reason="the data folder is absent")
-def test_a_tight_blouse_is_not_put_on_upside_down():
-    """Tight in the chest, it would be filled better by the hips, its sleeves beside them. +z is up in its file."""
-    garment = read_mesh(DATA / "garments" / "berkeley" / "blouse-short" / "blouse-short-iso.obj")
-    body = read_mesh(DATA / "bodies" / "mh_female_averageweight.ply")
-    found = find_placement(remesh(garment, RemeshConfig(edge_mm=20), Job()), body, PlaceConfig(), Job())
-    assert_allclose(found.turn[1], [0.0, 0.0, 1.0], rtol=0, atol=0)
-    assert found.scale == 1.0
+@pytest.mark.parametrize(
+    ("name", "sex"),
+    [("blouse-short", "female"), ("blouse-short", "male"), ("vest", "male"), ("skirt", "male"), ("pants", "female")],
+)
+def test_a_garment_that_fits_better_upside_down_is_not_put_on_so(name, sex):
+    """Tight in the chest, a blouse is filled better by the hips, its sleeves beside them. z is up in the files."""
+    garment = read_mesh(DATA / "garments" / "berkeley" / name / f"{name}-iso.obj")
+    body = read_mesh(DATA / "bodies" / f"mh_{sex}_averageweight.ply")
+    for mesh in (garment, remesh(garment, RemeshConfig(edge_mm=20), Job())):
+        found = find_placement(mesh, body, PlaceConfig(), Job())
+        assert_allclose(found.turn[1], [0.0, 0.0, 1.0], rtol=0, atol=0)
+        assert found.scale == 1.0
+
+
+def test_a_garment_on_its_head_is_turned_where_that_fits_far_better():
+    lying = TriangleMesh(skirt().vertices @ DOWN.T, skirt().faces)
+    found = find_placement(lying, pear(), FINE, Job())
+    assert_allclose(found.turn[1], [0.0, -1.0, 0.0], rtol=0, atol=0)

@@ -79,14 +79,14 @@ def test_one_step_brings_the_outline_onto_the_edges(ball):
     shift = np.array([0.003, -0.002, 0.0])
     photo = EdgePhoto("ball", np.eye(4), (level(CENTER + shift),))
     scan = np.array([[5.0, 5.0, 5.0]])  # far away: nothing is inside
-    problem = OutlineProblem(ball, SurfaceDistance(ball.mesh), scan, [photo])
+    problem = OutlineProblem([ball], SurfaceDistance(ball.mesh), scan, [photo])
     found = problem.step(placed(CENTER), 0.02, (3, 4)).scan_from_form[:3, 3] - CENTER
     assert_allclose(found, shift, rtol=0, atol=4e-4)  # a seventh of a pixel
 
 
 def test_a_ball_farther_off_is_followed_along_its_ray(ball):
     photo = EdgePhoto("ball", np.eye(4), (level(CENTER * 1.02),))
-    problem = OutlineProblem(ball, SurfaceDistance(ball.mesh), np.array([[5.0, 5.0, 5.0]]), [photo])
+    problem = OutlineProblem([ball], SurfaceDistance(ball.mesh), np.array([[5.0, 5.0, 5.0]]), [photo])
     placement = placed(CENTER)
     for _ in range(5):  # each by half of the reach at the most
         placement = problem.step(placement, 0.02, (3, 4, 5)).scan_from_form
@@ -97,7 +97,7 @@ def test_a_ball_farther_off_is_followed_along_its_ray(ball):
 
 def test_a_ball_of_another_size_tells_its_scale(ball):
     wide = EdgePhoto("ball", np.eye(4), (level(CENTER / 1.03),))
-    problem = OutlineProblem(ball, SurfaceDistance(ball.mesh), np.array([[5.0, 5.0, 5.0]]), [wide])
+    problem = OutlineProblem([ball], SurfaceDistance(ball.mesh), np.array([[5.0, 5.0, 5.0]]), [wide])
     placement = placed(CENTER)
     for _ in range(3):
         placement = problem.step(placement, 0.02, (3, 4, 6)).scan_from_form

@@ -13,6 +13,7 @@ from scan_scene import make_scene, orbit, render
 from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
+from vto_pipeline.scan.grey import USUAL
 from vto_pipeline.scan.photos import sfm
 from vto_pipeline.scan.photos.consistency import rays
 from vto_pipeline.scan.photos.matching.features import FAINT, FeatureConfig, detect
@@ -128,7 +129,7 @@ def test_a_faint_object_has_features_once_the_strong_wall_is_painted_over(tmp_pa
     masks = still_pixels(photos)
     assert masks is not None
     (tmp_path / "painted").mkdir()
-    painted = paint_over(photos, masks, tmp_path / "painted")
+    painted = paint_over(photos, masks, np.array(USUAL), tmp_path / "painted")
     on_tube, beside = [], []
     for number, name in enumerate(("photos", "painted")):
         shown = PhotoSet((photos, painted)[number].paths[:2], photos.intrinsics[:2])

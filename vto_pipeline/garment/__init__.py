@@ -4,9 +4,11 @@ coarse_align, scale_search, robust_icp, align: the scan in the frame, and if nee
 outline/: the mannequin found by its outline in the photos
 color_model, graph_cut, subtract: the mannequin taken away
 loop_evidence, bare_parts, notches, rims, openings: real openings kept, scan holes filled
+lifting: fillings kept off the mannequin
 simulation_mesh: the mesh that is simulated
 photographed/: the garment held beside the photos
 wearable: whether a surface can be a garment at all
 pattern/: sewing patterns as garments
+unsewn/: from a garment in space back to its pattern
 sizes/: flat measurements of a pattern, and the pattern in other sizes
 """

@@ -117,6 +117,7 @@ class _Scan:
         self.points, self.normals, _ = sample_surface(surface, config.samples, job.seed)
         self.few = slice(None, None, max(config.samples // FEW, 1))
         self.free = not surface.metric
+        self._in_sizes: list[FloatArray] | None = None
 
     def on_bare_parts(self, least: float, tilted: bool) -> FloatArray:
         """Place the scan by what it shows of the bare mannequin.
@@ -181,8 +182,11 @@ class _Scan:
         return [placement for _, placement in scored]
 
     def _sized(self, count: int) -> list[FloatArray]:
-        """Placements in several sizes, best first."""
-        return scaled_starts(self.points[self.few], self.mannequin, self.distance, count, self.config.enough_bare)
+        """Placements in several sizes, best first; found once, for the outline and the bare parts both ask for them."""
+        if self._in_sizes is None:
+            few, least = self.points[self.few], self.config.enough_bare
+            self._in_sizes = scaled_starts(few, self.mannequin, self.distance, least)
+        return self._in_sizes[:count]
 
     def _refined(self, start: FloatArray, bands: FloatArray, which: slice = slice(None)) -> MannequinAlignment:
         points, normals = self.points[which], self.normals[which]

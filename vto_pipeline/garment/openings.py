@@ -9,8 +9,10 @@ from pydantic import Field
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.align import PosedPhotos
 from vto_pipeline.garment.bare_parts import BareParts
+from vto_pipeline.garment.lifting import check_lifted, lift_fillings
 from vto_pipeline.garment.loop_evidence import LoopShape, encloses, measure_loops
 from vto_pipeline.garment.notches import close_notches
+from vto_pipeline.garment.photographed.covered import covered_loops
 from vto_pipeline.garment.photographed.parted import refuse_parted
 from vto_pipeline.garment.photographed.sightings import look_at_mannequin
 from vto_pipeline.garment.rims import drop_flaps, fair_rims, largest_piece, trim_ledges
@@ -25,9 +27,6 @@ from vto_pipeline.model.garment import Opening
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
-
-MOST_INSIDE = 0.025
-"""A filling may lie so deep inside the mannequin [m], whence it is moved out; deeper, a body part goes through it."""
 
 FILLED_RIM = 1.0 / 3.0
 """With a larger share of its rim filled, an opening's length is uncertain."""
@@ -100,6 +99,8 @@ def close_scan_holes(
         )
     shapes = measure_loops(bridged)
     is_opening = _classify(bridged, shapes, distance, config, job)
+    if mannequin is not None and photos is not None and any(is_opening):
+        is_opening = _uncovered(bridged, shapes, is_opening, mannequin, photos, job)
     if config.keep is not None:
         is_opening = _kept(shapes, is_opening, config.keep, job)
     count = sum(is_opening)
@@ -111,9 +112,11 @@ def close_scan_holes(
     filled = fill_holes(bridged, [shape.walk for shape, real in zip(shapes, is_opening, strict=True) if not real])
     observed = np.arange(len(filled.vertices)) < len(clean.vertices)
     if distance is not None:
+        smooth = filled
+        filled, lifted = lift_fillings(smooth, ~observed, distance, config.clearance_mm * 1e-3)
         if config.keep is None:
-            _check_not_through(filled, ~observed, distance)
-        filled = _project_off_mannequin(filled, ~observed, distance, config.clearance_mm * 1e-3)
+            check_lifted(smooth, filled, ~observed, distance, bare)
+        job.measure(lifted_cm2=1e4 * _area(filled, np.asarray(lifted[filled.faces].any(axis=1))))
     final = fair_rims(filled, config.fair_mm * 1e-3)
     if face_components(final)[0] != 1:
         raise GarmentError(f"the garment fell apart into {face_components(final)[0]} pieces")
@@ -169,25 +172,6 @@ def _thinned(shell: TriangleMesh, edge: float, job: Job) -> TriangleMesh:
     return largest_piece(repair(decimate(shell, faces, aggressiveness=3.0), RepairConfig(weld_mm=0.0), job))
 
 
-def _check_not_through(mesh: TriangleMesh, which: NDArray[np.bool_], distance: SurfaceDistance) -> None:
-    """Refuse fillings that run deep through the mannequin: what was filled is an opening, or has one for its part.
-
-    Raises:
-        GarmentError: they do.
-    """
-    if not which.any():
-        return
-    inside = distance.signed(mesh.vertices[which])
-    deepest = int(np.argmin(inside.distance))
-    if inside.distance[deepest] < -MOST_INSIDE:
-        x, y, z = mesh.vertices[which][deepest]
-        problem = f"a filled hole runs through the mannequin at ({x:.2f}, {y:.2f}, {z:.2f}) m, "
-        raise GarmentError(
-            f"{problem}{-1e3 * inside.distance[deepest]:.0f} mm inside: too little was seen beside an opening",
-            hint="take more photos of that place, from above or below; are scan and mannequin aligned?",
-        )
-
-
 def _check_seen(share: float, garment: TriangleMesh, config: OpeningsConfig, job: Job) -> None:
     """Refuse a garment of which too little was seen: fillings would decide its shape. Who says how many openings it has
     answers for it.
@@ -207,17 +191,6 @@ def _check_seen(share: float, garment: TriangleMesh, config: OpeningsConfig, job
         "Or look at it, and set openings.keep or a lower openings.least_seen",
         partial={"garment": garment},
     )
-
-
-def _project_off_mannequin(
-    mesh: TriangleMesh, which: NDArray[np.bool_], distance: SurfaceDistance, clearance: float
-) -> TriangleMesh:
-    """Return the mesh with some vertices moved out to a distance [m] from the mannequin where they are nearer."""
-    near = distance.signed(mesh.vertices[which])
-    outward = (mesh.vertices[which] - near.point) / np.where(near.distance == 0.0, 1.0, near.distance)[:, None]
-    vertices = mesh.vertices.copy()
-    vertices[which] += np.maximum(clearance - near.distance, 0.0)[:, None] * outward
-    return TriangleMesh(vertices, mesh.faces, mesh.colors)
 
 
 def _classify(
@@ -240,6 +213,26 @@ def _classify(
             job.note(f"beyond the mannequin, by its shape alone: {_listing([shape], [True])}")
         real.append(around or hangs)
     return real
+
+
+def _uncovered(
+    mesh: TriangleMesh,
+    shapes: list[LoopShape],
+    likely: list[bool],
+    mannequin: TriangleMesh,
+    photos: PosedPhotos,
+    job: Job,
+) -> list[bool]:
+    """Return which loops are openings once the photos were asked: not those through which they show cloth."""
+    silent = Job(seed=job.seed)  # it is told once, of the finished garment
+    sightings = look_at_mannequin(mesh, np.ones(len(mesh.vertices), dtype=bool), mannequin, photos, silent)
+    if sightings is None:
+        return likely
+    covered = covered_loops(sightings, [mesh.vertices[shape.loop] for shape in shapes])
+    turned = [shape for shape, real, shut in zip(shapes, likely, covered, strict=True) if real and shut]
+    if turned:
+        job.note(f"the photos show cloth there: {_listing(turned, [False] * len(turned))}")
+    return [real and not shut for real, shut in zip(likely, covered, strict=True)]
 
 
 def _kept(shapes: list[LoopShape], likely: list[bool], count: int, job: Job) -> list[bool]:

@@ -25,7 +25,7 @@ MANNEQUIN_SAMPLES = 4000
 
 
 def scaled_starts(
-    points: FloatArray, mannequin: TriangleMesh, distance: SurfaceDistance, count: int, least_share: float
+    points: FloatArray, mannequin: TriangleMesh, distance: SurfaceDistance, least_share: float
 ) -> list[FloatArray]:
     """Return the placements of the scan that explain most of the mannequin, best first, each of another scale.
 
@@ -33,7 +33,6 @@ def scaled_starts(
         points: Of the scan, +Y up, in any unit, evenly spread by area, shape (N, 3).
         mannequin: In metres.
         distance: Its distance queries.
-        count: Largest number of placements.
         least_share: Placements with a smaller share of the scan on the mannequin are left out: of a scan that is far
             too large, a few points touch it by chance, and stand for much area.
 
@@ -49,7 +48,7 @@ def scaled_starts(
         if score < least_share:
             continue
         found.append((score * scale, placement @ np.diag([scale, scale, scale, 1.0])))
-    return [placement for _, placement in sorted(found, key=lambda one: -one[0])[:count]]
+    return [placement for _, placement in sorted(found, key=lambda one: -one[0])]
 
 
 def _spread(points: FloatArray) -> float:

@@ -47,15 +47,24 @@ def extend_smoothly(mesh: TriangleMesh, values: FloatArray, free: NDArray[np.boo
     """
     if not free.any():
         return values
-    matrix, area = laplacian(mesh)
-    if order == 2:
-        pair, count = edge_face_counts(mesh)
-        hinged = np.zeros(len(values), dtype=bool)
-        hinged[pair[count == 1]] = True
-        hinged &= ~free
-        matrix = csr_matrix(matrix @ diags(np.where(hinged, 0.0, 1.0 / area)) @ matrix)
+    matrix = bending(mesh, free)[0] if order == 2 else laplacian(mesh)[0]
     rows = matrix[free]
     solved = spsolve(rows[:, free].tocsc(), -np.asarray(rows[:, ~free] @ values[~free]))
     result = np.array(values, dtype=float)
     result[free] = solved.reshape(-1, values.shape[1])
     return result
+
+
+def bending(mesh: TriangleMesh, free: NDArray[np.bool_]) -> tuple[csr_matrix, FloatArray]:
+    """Return the matrix of a thin plate's bending energy (V, V) [1/m²], and the area of each vertex [m²], shape (V,).
+
+    Args:
+        mesh: The surface.
+        free: Which vertices may move, shape (V,); a border that may not bears no moment.
+    """
+    matrix, area = laplacian(mesh)
+    pair, count = edge_face_counts(mesh)
+    hinged = np.zeros(len(area), dtype=bool)
+    hinged[pair[count == 1]] = True
+    hinged &= ~free
+    return csr_matrix(matrix @ diags(np.where(hinged, 0.0, 1.0 / area)) @ matrix), area

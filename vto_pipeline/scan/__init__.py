@@ -3,7 +3,7 @@
 photos/, depth/: cameras and depth, from each kind of capture
 texture/: the photos laid on the surface
 keyframes: photos from a video
-exposure: how brightly each photo was exposed
+exposure, grey: how brightly each photo was exposed, and in which grey its print shows best
 fuse, level_set: one surface from many depth maps
 depth_views, in_order: maps that are read when they are needed
 disagreement: the error to expect, from how far the maps are from their surface

@@ -1,6 +1,6 @@
 """The table: every stage, every artifact, and what may be given.
 
-scan, garment, avatar, cloth, motion, scan_report, output: the rows, by subject
+scan, garment, avatar, cloth, motion, poses, scan_report, output: the rows, by subject
 roles: rows that serve garment, mannequin and body alike
 outfit, outfit_page: several garments in one document
 entry: the ways in to the tables
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from vto_pipeline.io.runs.artifacts import ARTIFACTS
 from vto_pipeline.pipeline.catalogue import Catalogue
-from vto_pipeline.stages import avatar, cloth, garment, motion, output, scan, scan_report
+from vto_pipeline.stages import avatar, cloth, garment, motion, output, poses, scan, scan_report
 from vto_pipeline.stages.roles import ROLES
 
 _SCANNED = ("photos", "video", "depth", "cloud", "surface")
@@ -37,6 +37,7 @@ CATALOGUE = Catalogue(
         *avatar.STAGES,
         *cloth.STAGES,
         *motion.STAGES,
+        *poses.STAGES,
         *scan_report.STAGES,
         *output.STAGES,
     ),

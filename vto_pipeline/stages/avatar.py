@@ -24,7 +24,7 @@ Outputs = Mapping[str, Any]
 class PoseConfig(Config):
     """Settings of the pose."""
 
-    pose: Literal["as_fitted", "a_pose", "t_pose", "arms_down", "sitting"] = Field(
+    pose: Literal["as_fitted", "a_pose", "t_pose", "arms_down", "arms_up", "sitting", "step"] = Field(
         "as_fitted", description="How the avatar stands; as_fitted keeps the pose of the scan or of the template"
     )
 

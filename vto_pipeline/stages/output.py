@@ -29,14 +29,14 @@ Outputs = Mapping[str, Any]
 
 
 def _transfer(inputs: Inputs, settings: DressConfig, job: Job) -> Outputs:
-    garment = _most_detailed(inputs)
+    garment = most_detailed(inputs)
     parts = deform_render_mesh(garment, inputs["sim_mesh"], inputs["draped"], settings, job)
     if settings.body and "collider" in inputs:
         parts.append(body_part(inputs["collider"].final, settings))
     return {"render_mesh": parts}
 
 
-def _most_detailed(inputs: Inputs) -> TriangleMesh | TexturedMesh:
+def most_detailed(inputs: Inputs) -> TriangleMesh | TexturedMesh:
     """Return the garment with its picture, from photos or from its file, or else as it was repaired."""
     if "garment_texture" in inputs:
         textured: TexturedMesh = inputs["garment_texture"]

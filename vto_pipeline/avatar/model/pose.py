@@ -21,9 +21,14 @@ _ARM_BELOW_HORIZONTAL_RAD = {
     "a_pose": ARM_ANGLE_RAD,
     "t_pose": 0.0,
     "arms_down": np.deg2rad(78.0),
+    "arms_up": np.deg2rad(-60.0),
     "sitting": ARM_ANGLE_RAD,
+    "step": ARM_ANGLE_RAD,
 }
-
+_FORWARD_RAD = {  # thighs, then how far the knees bend back: left, right
+    "sitting": (np.deg2rad([90.0, 90.0]), np.deg2rad([90.0, 90.0])),
+    "step": (np.deg2rad([25.0, -20.0]), np.deg2rad([5.0, 15.0])),
+}
 
 _RAISED_RAD = np.deg2rad([0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0])
 
@@ -122,8 +127,8 @@ def named_pose(avatar: Avatar, name: str, raised: float = 0.0) -> Avatar:
 
     Args:
         avatar: Any of our bodies.
-        name: "a_pose" (arms 45 degrees down), "t_pose" (level), "arms_down" (hanging), "sitting" (thighs level,
-            shins upright, arms as in the A-pose).
+        name: "a_pose" (arms 45 degrees down), "t_pose" (level), "arms_down" (hanging), "arms_up" (60 degrees above
+            level), "sitting" (thighs level, shins upright), "step" (left foot forward); arms as in the A-pose in both.
         raised: How much higher the arms are held [rad].
 
     Raises:
@@ -137,9 +142,9 @@ def named_pose(avatar: Avatar, name: str, raised: float = 0.0) -> Avatar:
     for side, sign in (("left", 1.0), ("right", -1.0)):
         pose[avatar.joint_names.index(f"{side}_clavicle"), 2] = sign * 0.2 * turn
         pose[avatar.joint_names.index(f"{side}_shoulder"), 2] = sign * 0.8 * turn
-        if name == "sitting":
-            pose[avatar.joint_names.index(f"{side}_hip"), 0] = -np.pi / 2
-            pose[avatar.joint_names.index(f"{side}_knee"), 0] = np.pi / 2
+    for side, thigh, knee in zip(("left", "right"), *_FORWARD_RAD.get(name, ((), ())), strict=False):
+        pose[avatar.joint_names.index(f"{side}_hip"), 0] = -thigh
+        pose[avatar.joint_names.index(f"{side}_knee"), 0] = knee
     posed = pose_avatar(avatar, pose, np.zeros(3))
     return pose_avatar(avatar, pose, np.array([0.0, -posed.vertices[:, 1].min(), 0.0]))
 

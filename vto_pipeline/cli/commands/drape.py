@@ -43,6 +43,14 @@ from vto_pipeline.cli.session import Session, pass_session
     metavar="FILE|NAME",
     help="Carry the draped garment through a motion: BVH, glTF, SMPL poses, YAML, or a preset such as walking_step.",
 )
+@click.option(
+    "--pose",
+    "poses",
+    multiple=True,
+    metavar="NAME",
+    help="Look at the draped garment in this pose, too: arms_down, arms_up, step, sitting, t_pose, a_pose; repeat "
+    "for several.",
+)
 @click.option("--regraded", is_flag=True, help="Show how it looks in the customer's size, not whether it fits.")
 @drape_options
 @pass_session
@@ -54,6 +62,7 @@ def drape_command(
     source_body: Path | None,
     fabrics: tuple[str, ...],
     motion: str | None,
+    poses: tuple[str, ...],
     regraded: bool,
     **options: Any,
 ) -> None:
@@ -64,9 +73,10 @@ def drape_command(
     vto drape --garment shirt.ply --source-body form.ply --body customer.ply --regraded -o runs/shirt
     vto drape --garment trousers.ply --fabric denim --garment shirt.ply --fabric cotton_poplin --body customer.ply
     vto drape --garment shirt.ply --body runs/customer/out/avatar.npz --motion walk.bvh -o runs/walk
+    vto drape --garment shirt.ply --measurements customer.yaml --pose arms_up --pose sitting
     """
     from vto_pipeline.cli.results import perform
     from vto_pipeline.stages.entry.documents import drape_order
 
-    order = drape_order(garments, fabrics, body, measurements, source_body, regraded, "the command line", motion)
+    order = drape_order(garments, fabrics, body, measurements, source_body, regraded, "the command line", motion, poses)
     perform(session, order, **options)

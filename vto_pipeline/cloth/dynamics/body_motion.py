@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vto_pipeline.cloth.collision.body.contacts import BodyCollider
 from vto_pipeline.cloth.dynamics.stepper import Stepper
@@ -123,7 +124,11 @@ def body_travel(body: MovingBody, cloth: TriangleMesh) -> float:
         body: The keyframes.
         cloth: On the body as it begins [m].
     """
-    near = SurfaceDistance(cloth).nearest(body.keyframes[0]).distance < _BESIDE
-    steps = np.linalg.norm(np.diff(body.keyframes, axis=0), axis=2)[:, near]
+    steps = np.linalg.norm(np.diff(body.keyframes, axis=0), axis=2)[:, beside(body.keyframes[0], cloth)]
     fastest = steps.max(axis=1, initial=0.0)
     return float(len(steps) * fastest.max(initial=0.0))
+
+
+def beside(vertices: FloatArray, cloth: TriangleMesh) -> NDArray[np.int64]:
+    """Return which vertices of a body [m], shape (V, 3), are so near the cloth that they set its pace, shape (N,)."""
+    return np.flatnonzero(SurfaceDistance(cloth).nearest(vertices).distance < _BESIDE)

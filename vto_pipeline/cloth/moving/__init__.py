@@ -3,7 +3,6 @@
 follow: frame by frame: the way in
 frame: one frame: steps, and what is done where it fails
 path_collider: the body, posed when it is asked for
-yielding: a body that gives way where its own parts press on each other
 frame_audit: what each frame is judged by
 config: settings
 """

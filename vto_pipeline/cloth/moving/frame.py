@@ -14,18 +14,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vto_pipeline.cloth.collision.body.contacts import Recollection
+from vto_pipeline.cloth.collision.body.yielding import YieldingBody
 from vto_pipeline.cloth.collision.response.active_set import ActiveSet
+from vto_pipeline.cloth.dynamics.body_motion import beside
 from vto_pipeline.cloth.dynamics.methods import FRAME
 from vto_pipeline.cloth.dynamics.stepper import Stepper
 from vto_pipeline.cloth.model.build import ClothModel, ClothState
 from vto_pipeline.cloth.moving.config import FollowConfig
 from vto_pipeline.cloth.moving.frame_audit import stretch_of_edges
 from vto_pipeline.cloth.moving.path_collider import PathCollider
-from vto_pipeline.cloth.moving.yielding import YieldingBody
 from vto_pipeline.cloth.simulation import default_skin
 from vto_pipeline.errors import DivergedError
 from vto_pipeline.geometry.intersections import intersecting_faces, self_intersections
-from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import laid_edge_lengths
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.fabric import Fabric
@@ -34,11 +34,9 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.motion import BodyPath
 
-_BESIDE = 0.15  # m: the body this near the cloth sets the steps, and gives way to itself
 _THICKEN = 1e-3  # m an attempt at least,
 _FASTER = 0.15  # and this share of the skin
 _KEPT = 0.9  # share of what the skin is thicker by that is left after a frame
-_ROOM = 2.0  # skins between parts of the body that come near each other: one for the cloth on either
 _FINER = 2  # times as many steps where the cloth overstretches
 
 
@@ -124,8 +122,7 @@ class FrameStepper:
         self._config = config
         skin = default_skin(model.edge_length) if config.skin_mm is None else 1e-3 * config.skin_mm
         self._skin = np.full(len(model.mass), skin)
-        beside = SurfaceDistance(garment.mesh).nearest(path.at(0.0)).distance < _BESIDE
-        self.body = YieldingBody(path, _ROOM * skin, np.flatnonzero(beside))
+        self.body = YieldingBody(path, skin, beside(path.at(0.0), garment.mesh))
         self._path = self.body.path
         friction = fabric.friction if config.friction is None else config.friction
         self._collider = PathCollider(self._path, friction, job)
@@ -205,8 +202,7 @@ class FrameStepper:
         """Return the steps per 1/60 s in which the body near the cloth moves no farther than it may in each."""
         seconds = time - begin.state.time
         start, end = self._path.at(begin.state.time), self._path.at(time)
-        cloth = SurfaceDistance(TriangleMesh(begin.state.positions, self._model.faces))
-        near = cloth.nearest(start).distance < _BESIDE
+        near = beside(start, TriangleMesh(begin.state.positions, self._model.faces))
         travel = float(np.linalg.norm(end - start, axis=1)[near].max(initial=0.0))
         needed = ceil(travel / (1e-3 * self._config.body_step_mm)) * FRAME / seconds
         return float(np.clip(needed, self._substeps, max(self._config.finest, self._substeps)))

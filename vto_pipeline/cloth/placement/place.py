@@ -27,6 +27,7 @@ _TELLING = 1.5  # times the cube: enough to tell them apart
 _CLOSE = 0.9  # of the best coarse worth: these are looked at again with fine cubes
 _ALIKE = 0.98  # as good, but for where the cubes happen to lie
 _LARGER, _STEPS = 1.2, 4  # a garment may start up to twice as large as it is
+_UPRIGHT = 0.7  # of the best score: files have y or z up, and a tight blouse scores more upside down
 _FALLING = 0.85  # of the best worth yet: larger garments need not be tried
 _DEEP = 0.01  # m
 _HEIGHTS = 6  # tried where limbs go through cloth
@@ -241,10 +242,23 @@ def _best_orientation(
     cubes = VoxelFit(garment, body, _COARSE * cube, config.cloth_in_body)
     coarse = np.array([cubes.best_placement(turn).score for turn in turns])
     promising = coarse >= np.maximum(_CLOSE * coarse.max(), config.turned_well * coarse[0])
+    upright = np.array([_is_upright(turn) for turn in turns])
+    promising |= upright & (coarse >= _CLOSE * max(coarse[upright].max(), _UPRIGHT * coarse.max()))
     promising[0] = True
     cubes = VoxelFit(garment, body, cube, config.cloth_in_body)
     ways = [cubes.best_placement(turn) for turn, look in zip(turns, promising, strict=True) if look]
-    return ways[0], max(ways, key=lambda way: way.score)
+    return ways[0], ways[_preferred([way.turn for way in ways], [way.score for way in ways])]
+
+
+def _is_upright(turn: FloatArray) -> bool:
+    """Return whether what is up in the file, y or z, is up on the body."""
+    return bool((turn[1] == (0, 1, 0)).all() or (turn[1] == (0, 0, 1)).all())
+
+
+def _preferred(turns: Sequence[FloatArray], scores: Sequence[float]) -> int:
+    """Return which turn is taken: the best upright one, unless another is far better."""
+    worth = np.where([_is_upright(turn) for turn in turns], np.array(scores), _UPRIGHT * np.array(scores))
+    return int(np.argmax(worth))
 
 
 def _best_orientation_if_larger(garment: TriangleMesh, body: BodyCubes, config: PlaceConfig) -> VoxelPlacement:
@@ -262,7 +276,7 @@ def _best_orientation_if_larger(garment: TriangleMesh, body: BodyCubes, config: 
             break
     fits = int(np.argmax([one.max() for one in scores]))
     relative = sum(one / max(one.max(), 1e-9) for one in scores[fits : fits + 2])
-    turn = turns[int(np.argmax(relative))]
+    turn = turns[_preferred(turns, relative)]
     return VoxelFit(garment, body, 1e-3 * config.cube_mm, config.cloth_in_body).best_placement(turn)
 
 

@@ -143,6 +143,8 @@ class _CoarseToFine:
         phases.some = partial(self._some, level)
         first = TriangleMesh(body.keyframes[0], body.faces)
         state = phases.resolve_crossings(at_rest(garment.mesh.vertices))
+        untangled = len(job.warnings)
+        put_on = untangled
         if fresh:  # the others start outside the body, but for corners that edges have cut
             try:
                 grown = phases.grow_body(state, first)
@@ -151,12 +153,14 @@ class _CoarseToFine:
                     raise
                 self._leave_out(model, f"too coarse: {error.problem}")
                 return None
+            put_on = len(job.warnings)
             state = phases.resolve_crossings(grown, first)
             if level > 0 and phases.crossings_left > 0:
                 left = f"{phases.crossings_left} pairs of triangles still intersect"
                 self._leave_out(model, f"too coarse to clear the body: {left}")
                 return None
-        collider = phases.collider(body, TriangleMesh(state.positions, model.faces))
+        cloth = TriangleMesh(state.positions, model.faces)
+        collider = phases.collider(phases.give_way(body, cloth), cloth)
         stepper = phases.stepper(model, collider, config.damping)
         stepper.prepare(state.positions)
         job.note(f"{stepper.choice.method}, {stepper.substeps} steps per 1/60 s: {stepper.choice.reason}")
@@ -177,8 +181,10 @@ class _CoarseToFine:
             self._leave_out(model, f"too coarse: {what}, {weights}")
             return None
         settling.trace = [replace(row, seconds=before + row.seconds, level=level) for row in settling.trace]
-        if level > 0:  # what matters in the end warns again
-            self._job.notes += [f"on {len(model.mass)} vertices: {text}" for text in job.warnings]
+        if level > 0:  # how it was put on is done but once; what else matters in the end warns again
+            self._job.warnings += job.warnings[untangled:put_on]
+            others = job.warnings[:untangled] + job.warnings[put_on:]
+            self._job.notes += [f"on {len(model.mass)} vertices: {text}" for text in others]
         return RestOnMesh(model, phases, stepper, settling)
 
     def _some(self, level: int, positions: FloatArray) -> FloatArray:

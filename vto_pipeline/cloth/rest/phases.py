@@ -8,9 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from vto_pipeline.cloth.collision.body.yielding import give_way
 from vto_pipeline.cloth.collision.self_collision.counters import CollisionCounters, report_counters
 from vto_pipeline.cloth.drape_config import DrapeConfig
-from vto_pipeline.cloth.dynamics.body_motion import VariableSpeedBody, body_travel, run_body_motion
+from vto_pipeline.cloth.dynamics.body_motion import VariableSpeedBody, beside, body_travel, run_body_motion
 from vto_pipeline.cloth.dynamics.stepper import Stepper
 from vto_pipeline.cloth.model.build import ClothModel, ClothState, at_rest, without_gravity
 from vto_pipeline.cloth.placement.body_growth import plan_body_growth
@@ -81,6 +82,15 @@ class Phases:
         if start.crossings == 0:
             return state
         return replace(state, positions=start.positions, velocities=np.zeros_like(state.velocities))
+
+    def give_way(self, body: MovingBody, cloth: TriangleMesh) -> MovingBody:
+        """Return the body, which leaves room for the cloth where its own parts press on each other on its way."""
+        if len(body.keyframes) == 1:
+            return body
+        found, deepest = give_way(body, self._skin, beside(body.keyframes[0], cloth))
+        if deepest > 0.0:
+            self._job.note(f"the body gives way by up to {1e3 * deepest:.1f} mm where its own parts press on the cloth")
+        return found
 
     def collider(self, body: MovingBody, cloth: TriangleMesh) -> VariableSpeedBody:
         """Return the body, which moves as fast as it may about the cloth."""

@@ -76,7 +76,9 @@ class ContourMesh:
         pixel = np.column_stack(
             [camera.fx * local[:, 0] / safe + camera.cx, camera.fy * local[:, 1] / safe + camera.cy, z]
         )
-        whole: NDArray[np.bool_] = np.asarray(ahead[self.mesh.faces].all(axis=1))
+        whole: NDArray[np.bool_] = (
+            np.ones(len(self.mesh.faces), bool) if ahead.all() else np.asarray(ahead[self.mesh.faces].all(axis=1))
+        )
         _, _, depth = rasterise(pixel[self.mesh.faces[whole & toward]], camera.width, camera.height)
         rim = (toward[self.beside[:, 0]] != toward[self.beside[:, 1]]) & whole[self.beside].all(axis=1)
         pair = self.edges[rim]

@@ -54,16 +54,17 @@ class OutlineProblem:
     """All that placements are judged by.
 
     Args:
-        form: The mannequin.
-        distance: Its distance queries.
+        forms: The mannequin for photos of full size, of half, and so on; the last one serves all smaller ones.
+        distance: Distance queries of the first.
         scan: Points of the scan, spread evenly, in its unit, shape (N, 3).
         photos: As edges.
     """
 
     def __init__(
-        self, form: ContourMesh, distance: SurfaceDistance, scan: FloatArray, photos: Sequence[EdgePhoto]
+        self, forms: Sequence[ContourMesh], distance: SurfaceDistance, scan: FloatArray, photos: Sequence[EdgePhoto]
     ) -> None:
-        self.form, self.distance, self.scan, self.photos = form, distance, scan, photos
+        form = forms[0]
+        self.form, self.forms, self.distance, self.scan, self.photos = form, forms, distance, scan, photos
         self.middle = 0.5 * (form.mesh.vertices.min(axis=0) + form.mesh.vertices.max(axis=0))
         self.lever = 0.5 * form.size
         self._sector = _sectors(photos)
@@ -114,8 +115,9 @@ class OutlineProblem:
         cam_from_form = photo.cam_from_scan @ placement
         near = cam_from_form[:3, :3] @ self.middle + cam_from_form[:3, 3]
         fine = reach * photo.levels[0].camera.fx / max(near[2] / scale, 1e-6)
-        level = photo.levels[int(np.clip(np.floor(np.log2(max(fine / REACH_PX, 1.0)) + 0.5), 0, len(photo.levels) - 1))]
-        seen = self.form.contour(cam_from_form, level)
+        halved = int(np.clip(np.floor(np.log2(max(fine / REACH_PX, 1.0)) + 0.5), 0, len(photo.levels) - 1))
+        level = photo.levels[halved]
+        seen = self.forms[min(halved, len(self.forms) - 1)].contour(cam_from_form, level)
         camera = level.camera
         if len(seen.depth) == 0:
             return np.zeros((0, 7)), np.zeros(0), np.zeros(0), np.zeros(0)

@@ -28,8 +28,8 @@ FINEST_PX = 3.0
 """Reach of the last steps, in pixels on the form."""
 UPRIGHT = (1, 3, 4, 5)
 """Of the seven ways to move, those that leave an upright form upright."""
-LARGEST_FORM = 40_000
-"""Faces; an outline at the pixels of a photo is not changed by more."""
+LARGEST_FORMS = (40_000, 10_000, 4_000)
+"""Faces, for photos of full size, of half, and smaller; an outline at their pixels is not changed by more."""
 SAME_PLACE = 0.02
 """Placements whose points differ by no more than this on average are one [share of the form's size]."""
 SHARED_PX = 0.5
@@ -95,10 +95,11 @@ def place_by_outline(
     Raises:
         GarmentError: the outline is not found, found in two places, or leaves the placement uncertain.
     """
-    mesh = ContourMesh(decimate(form, LARGEST_FORM))
+    meshes = [ContourMesh(decimate(form, faces)) for faces in LARGEST_FORMS]
+    mesh = meshes[0]
     distance = SurfaceDistance(mesh.mesh)
     some = np.unique(np.linspace(0, len(photos) - 1, min(len(photos), FEW_PHOTOS)).round().astype(int))
-    few = OutlineProblem(mesh, distance, scan, [photos[k] for k in some])
+    few = OutlineProblem(meshes, distance, scan, [photos[k] for k in some])
     free: tuple[int, ...] = (*UPRIGHT, 6) if free_scale else UPRIGHT
     rough = []
     for number, start in enumerate(starts):
@@ -108,7 +109,7 @@ def place_by_outline(
         rough.append(few.step(placement, COARSE * mesh.size, free, move=False))
         job.progress(0.4 + 0.3 * (number + 1) / len(starts), f"outline: start {number + 1} of {len(starts)}")
     chosen = _distinct(sorted(rough, key=_worth, reverse=True), mesh)[: config.refined]
-    every = OutlineProblem(mesh, distance, scan, photos)
+    every = OutlineProblem(meshes, distance, scan, photos)
     free = tuple(range(7 if free_scale else 6))
     fits = []
     for number, one in enumerate(chosen):

@@ -1,5 +1,6 @@
 """A garment held beside the photos that it was made from.
 
 sightings: where on the mannequin the photos show cloth, and where they show it bare
+covered: loops through which they show cloth, which are no openings
 parted: cloth that the garment lacks, and whether it makes several openings of one
 """

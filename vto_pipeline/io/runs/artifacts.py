@@ -321,6 +321,8 @@ ARTIFACTS: tuple[ArtifactKind, ...] = (
         write_glb_bytes,
     ),
     _json("motion_audit", "motion_audit.json", "checks of each frame of the motion"),
+    _json("pose_report", "pose_report.json", "the fit in other poses: where it is tight, what slides"),
+    ArtifactKind("posed_scene", "poses.glb", "garment and avatar in other poses, side by side", read_glb, write_glb),
     ArtifactKind("trace", "trace.csv", "error against run time", traces.read_trace, traces.write_trace),
     ArtifactKind("render_mesh", "render_mesh.glb", "garment and avatar to look at", read_glb, write_glb),
     _json("fit_report", "fit_report.json", "ease, strain and contact per zone"),

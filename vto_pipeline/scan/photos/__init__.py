@@ -2,7 +2,7 @@
 
 matching/, triangulation, region, sfm: matches, cameras and sparse points, without what surrounds the object
 board, lengths, scale: metres from a printed board, with floor and origin, or from stated lengths
-neighbours, rectify, disparity, subpixel, consistency, stereo: dense depth
+views, neighbours, rectify, disparity, subpixel, consistency, stereo: dense depth
 rematch/: a second look at what stereo missed
 coverage: how much of what the photos see has depth
 """

@@ -21,7 +21,7 @@ from vto_pipeline.model.settings import Config
 from vto_pipeline.scan.photos.matching.adjust import adjust
 from vto_pipeline.scan.photos.matching.features import FAINT, SURE, FeatureConfig, detect, match
 from vto_pipeline.scan.photos.matching.mapping import MIN_PHOTOS, lens_of, map_photos
-from vto_pipeline.scan.photos.matching.still_background import paint_over, still_pixels
+from vto_pipeline.scan.photos.matching.still_background import grey_beside, paint_over, still_pixels
 from vto_pipeline.scan.photos.matching.ties import LEAST_TIES
 from vto_pipeline.scan.photos.region import object_region
 from vto_pipeline.scan.upright import upright_from_scan
@@ -126,7 +126,8 @@ def _beside_background(
     job.note(f"looking for fainter features beside the background, which is {100 * share:.0f} % of the photos")
     beside = scratch / "beside"
     (beside / "photos").mkdir(parents=True)
-    return _faint(paint_over(photos, masks, beside / "photos"), photos, beside, config, job)
+    painted = paint_over(photos, masks, grey_beside(photos, masks), beside / "photos")
+    return _faint(painted, photos, beside, config, job)
 
 
 def _faint(

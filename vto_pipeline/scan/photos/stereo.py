@@ -14,22 +14,21 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from vto_pipeline.errors import InputError, ScanError
-from vto_pipeline.io.captures.images import read_image
+from vto_pipeline.errors import ScanError
 from vto_pipeline.io.captures.undistort import undistorted
 from vto_pipeline.model.camera import CameraSet
 from vto_pipeline.model.frames import DepthMaps, PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
 from vto_pipeline.model.settings import Config
-from vto_pipeline.scan.exposure import exposures
 from vto_pipeline.scan.library_message import library_message
 from vto_pipeline.scan.photos.consistency import agreeing_views, consensus, rays
 from vto_pipeline.scan.photos.disparity import MatchConfig, match_pair
-from vto_pipeline.scan.photos.neighbours import camera_points, choose_pairs, visibility
+from vto_pipeline.scan.photos.neighbours import choose_pairs, visibility
 from vto_pipeline.scan.photos.rectify import StereoView, rectify
 from vto_pipeline.scan.photos.region import object_region
-from vto_pipeline.scan.photos.rematch.rematch import RematchConfig, rematch
+from vto_pipeline.scan.photos.rematch.rematch import RematchConfig, look_bytes, rematch
+from vto_pipeline.scan.photos.views import stereo_views
 
 PAIR_BYTES = 250
 """Working memory of one pair per pixel of a photo, with windows as large as they may be [B]."""
@@ -70,12 +69,12 @@ def estimate_depth_maps(
         ScanError: no two photos share enough of the surface, the memory is too small, or no depth is agreed on.
     """
     seen = visibility(cameras, cloud)
-    views = _with_exposures(_load(photos, cameras, config.max_side_px), cloud, seen, job)
+    views = stereo_views(photos, cameras, cloud, seen, config.max_side_px, job)
     pairs = choose_pairs(cameras, cloud, seen, config.neighbours, config.min_shared_points)
     if not pairs:
         hint = "photos about 15 degrees apart work best; is there texture?"
         raise ScanError(f"no two of {len(views)} photos share {config.min_shared_points} sparse points", hint=hint)
-    threads = _threads(views, pairs, job)
+    threads = _threads(views, pairs, config, job)
     pinholes = tuple(view.camera.without_distortion() for view in views)
     depth = _merge(cameras.names, views, pairs, cloud, seen, config, threads, job)
     merged = DepthMaps(cameras.names, pinholes, cameras.world_from_cam, depth)
@@ -99,41 +98,9 @@ def estimate_depth_maps(
         return maps
 
 
-def _load(photos: PhotoSet, cameras: CameraSet, max_side: int) -> list[StereoView]:
-    import cv2
-
-    paths = {path.name: path for path in photos.paths}
-    views = []
-    for name, camera, pose in zip(cameras.names, cameras.intrinsics, cameras.world_from_cam, strict=True):
-        if name not in paths:
-            raise InputError(f"there is a camera but no photo for {name}", where=str(photos.paths[0].parent))
-        gray: Any = cv2.cvtColor(read_image(paths[name]), cv2.COLOR_RGB2GRAY)
-        scale = min(1.0, max_side / max(gray.shape))
-        if scale < 1:
-            size = (round(gray.shape[1] * scale), round(gray.shape[0] * scale))
-            gray = cv2.resize(gray, size, interpolation=cv2.INTER_AREA)
-            camera = camera.resized(*size)
-        views.append(StereoView(gray, camera, pose))
-    return views
-
-
-def _with_exposures(views: list[StereoView], cloud: PointCloud, seen: NDArray[np.bool_], job: Job) -> list[StereoView]:
-    """Return the views with how brightly each was exposed, told by the sparse points that it may see."""
-    pixels = np.zeros((*seen.shape, 2))
-    for index, view in enumerate(views):
-        x, y, z = camera_points(cloud.points[seen[index]], view.world_from_cam).T
-        bend = 1.0 + view.camera.k1 * (x**2 + y**2) / z**2
-        lens = view.camera
-        pixels[index, seen[index]] = np.column_stack(
-            [lens.fx * x / z * bend + lens.cx, lens.fy * y / z * bend + lens.cy]
-        )
-    found = exposures([view.gray for view in views], pixels, seen)
-    job.measure(exposure_spread=round(float(found.max() / found.min()), 3))
-    return [replace(view, exposure=float(exposure)) for view, exposure in zip(views, found, strict=True)]
-
-
-def _threads(views: list[StereoView], pairs: list[tuple[int, int]], job: Job) -> int:
+def _threads(views: list[StereoView], pairs: list[tuple[int, int]], config: StereoConfig, job: Job) -> int:
     """Return how many pairs are matched at once: one a core, as memory allows. What it needs follows from the pairs.
+    The second look comes after them, and may need more.
 
     Raises:
         ScanError: it does not even allow one.
@@ -152,8 +119,9 @@ def _threads(views: list[StereoView], pairs: list[tuple[int, int]], job: Job) ->
     kept = (1 + 4 + 4) * len(views) + 4 * (most + left.max())  # grey, merged, checked; maps, and those being merged
     cores, free = os.cpu_count() or 1, job.memory_left()
     threads = min(cores, int((free / pixels - kept) / PAIR_BYTES))
-    needed = pixels * (kept + PAIR_BYTES * max(1, threads))
-    if threads < 1:
+    again = look_bytes(len(views), pixels) if config.rematch.rounds else 0.0
+    needed = max(pixels * (kept + PAIR_BYTES * max(1, threads)), again)
+    if threads < 1 or again > free:
         has = "this machine has" if math.isinf(job.memory) else "the budget leaves"
         problem = f"{len(views)} photos need up to {needed / 1e9:.1f} GB of memory; {has} {max(0.0, free) / 1e9:.1f} GB"
         raise ScanError(problem, hint="lower stereo.max_side_px, or give more memory")

@@ -89,6 +89,7 @@ def drape(
     fabric: str | Sequence[str] = "cotton_poplin",
     regraded: bool = False,
     motion: Path | str | None = None,
+    poses: Sequence[str] = (),
     output: Path | str | None = None,
     settings: Settings | None = None,
     listener: Listener | None = None,
@@ -103,6 +104,7 @@ def drape(
         fabric: Preset or file; or one for each garment.
         regraded: Show how it looks in the customer's size, not whether it fits.
         motion: Motion file or name of a preset, through which the draped garment is carried.
+        poses: Names of poses that the draped garment is looked at in, too, such as "arms_up".
         output, settings, listener: As for `scan`; None: runs/drape_NAME.
 
     Raises:
@@ -111,7 +113,7 @@ def drape(
     garments = [Path(garment)] if isinstance(garment, str | Path) else [Path(one) for one in garment]
     fabrics = [fabric] if isinstance(fabric, str) else list(fabric)
     order = drape_order(
-        garments, fabrics, _path(body), _path(measurements), _path(source_body), regraded, "drape", motion
+        garments, fabrics, _path(body), _path(measurements), _path(source_body), regraded, "drape", motion, poses
     )
     return run_order(order, output, _overrides(settings), listener=listener)
 

@@ -18,6 +18,7 @@ from vto_pipeline.stages.entry import planning
 
 _CAPTURES = ("photos", "video", "depth", "cloud", "surface")
 _DRAPED = ("draped", "audit", "trace", "render_mesh", "fit_report", "page")
+_POSED = ("pose_report", "posed_scene")
 _MOVED = ("draped_motion", "motion_audit", "moving_scene")
 
 
@@ -124,6 +125,7 @@ def drape_order(
     regraded: bool,
     name: str,
     motion: Path | str | None = None,
+    poses: Sequence[str] = (),
 ) -> Order:
     """Return the order of a drape.
 
@@ -136,17 +138,19 @@ def drape_order(
         regraded: Whether the garment is shown in the customer's size, not whether it fits.
         name: Stands where a file's name stands in messages.
         motion: File, or name of a preset, through which the draped garment is carried; None: it rests.
+        poses: Names of poses that the draped garment is looked at in, too.
 
     Raises:
         ConfigError: arguments that do not go together.
     """
-    if motion is not None and len(garments) > 1:
-        raise ConfigError("a motion is only possible with one garment", hint="drape the layers one at a time")
-    if motion is not None and body is not None and not _is_avatar(body):
-        raise ConfigError(
-            f"a motion needs a body with joints, and {body} is a plain mesh or another model's body",
-            hint="fit an avatar to it with `vto fit --scan FILE`, and give that as the body",
-        )
+    for what in [*(["a motion"] if motion is not None else []), *(["a pose"] if poses else [])]:
+        if len(garments) > 1:
+            raise ConfigError(f"{what} is only possible with one garment", hint="drape the layers one at a time")
+        if body is not None and not _is_avatar(body):
+            raise ConfigError(
+                f"{what} needs a body with joints, and {body} is a plain mesh or another model's body",
+                hint="fit an avatar to it with `vto fit --scan FILE`, and give that as the body",
+            )
     if (body is None) == (measurements is None):
         raise ConfigError("give either a body or measurements")
     given = {
@@ -156,8 +160,9 @@ def drape_order(
         "body.measurements": measurements,
         "motion": motion,
     }
-    wanted = _DRAPED if motion is None else (*_DRAPED, *_MOVED)
-    document = _document(name, given, wanted, {"grade": {"mode": "regraded"}} if regraded else {})
+    wanted = (*_DRAPED, *(_MOVED if motion is not None else ()), *(_POSED if poses else ()))
+    settings = {"grade": {"mode": "regraded"} if regraded else {}, "poses": {"poses": list(poses)} if poses else {}}
+    document = _document(name, given, wanted, {stage: chosen for stage, chosen in settings.items() if chosen})
     return Order(document, Path("runs") / f"drape_{'_'.join(resolved(garment).stem for garment in garments)}")
 
 

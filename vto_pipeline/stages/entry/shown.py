@@ -46,7 +46,7 @@ def shown_meshes(name: str, value: Any) -> list[TriangleMesh]:
     if isinstance(value, TriangleMesh):
         return [value]
     if isinstance(value, tuple):
-        return [_painted(part) for part in value if part.name != BODY]
+        return [painted(part) for part in value if part.name != BODY]
     return [tint(value.final, SKIN)] if name.endswith("collider") else [value.mesh]
 
 
@@ -75,7 +75,7 @@ def _made(outcome: Outcome) -> Iterator[str]:
                 yield kind.name
 
 
-def _painted(part: GlbPart) -> TriangleMesh:
+def painted(part: GlbPart) -> TriangleMesh:
     """Return the mesh of a part with its picture, or its colour, on it."""
     if part.texture is None or part.uv is None:
         if part.mesh.colors is not None or part.base_color[:3] == _UNDYED:

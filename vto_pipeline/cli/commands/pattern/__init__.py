@@ -2,6 +2,7 @@
 
 command: the command
 lines, flat_lines: a sewing pattern in tables and as JSON; its flat measurements
+unsewn: a garment in space taken apart
 graded: a pattern in other sizes
 """
 

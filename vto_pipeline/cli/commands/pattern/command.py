@@ -15,35 +15,57 @@ from vto_pipeline.errors import ConfigError, InputError
 from vto_pipeline.units import LENGTH_M
 
 if TYPE_CHECKING:
+    from vto_pipeline.garment.unsewn.unsew import Unsewn
+    from vto_pipeline.model.job import Job
     from vto_pipeline.model.pattern import Pattern
 
 
 @click.command("pattern")
 @click.argument("paths", metavar="PATH...", type=PATH, nargs=-1, required=True)
-@click.option("-o", "--output", type=PATH, metavar="PATH", help="Write a .dxf, .svg or .json; with --sizes, a folder.")
+@click.option(
+    "-o",
+    "--output",
+    "outputs",
+    type=PATH,
+    multiple=True,
+    metavar="PATH",
+    help="Write a .dxf, .svg or .json, of a garment mesh an .obj as well; repeat for more; with --sizes, a folder.",
+)
 @click.option("--size", metavar="NAME", help="Take the panels of one size. [default: all]")
 @click.option("--type", "kind", metavar="TYPE", help="Type of garment, or a file of size rules. [default: by name]")
 @click.option("--sizes", metavar="S,M,L", help="Grade to these sizes, by the rules of the type.")
 @click.option("--base", default="M", show_default=True, metavar="SIZE", help="The size that others are graded from.")
 @click.option("--format", "form", type=click.Choice(("json", "dxf", "svg")), default="json", help="Of graded sizes.")
 @click.option("--unit", type=click.Choice(sorted(LENGTH_M)), help="Unit of length, in place of the file's.")
+@click.option(
+    "--seams",
+    default="auto",
+    show_default=True,
+    metavar="WHERE",
+    help="Where a garment mesh comes apart: auto, charts (of its texture), or a file of lines.",
+)
+@click.option(
+    "--fabric", default="cotton_poplin", show_default=True, metavar="NAME|FILE", help="Of a garment mesh laid flat."
+)
 @message_options
 @pass_session
 def pattern_command(
     session: Session,
     paths: tuple[Path, ...],
-    output: Path | None,
+    outputs: tuple[Path, ...],
     size: str | None,
     kind: str | None,
     sizes: str | None,
     base: str,
     form: str,
     unit: str | None,
+    seams: str,
+    fabric: str,
 ) -> None:
-    """Measure a sewing pattern, and write it in another format or in other sizes.
+    """Measure a sewing pattern, and write it in another format or in other sizes; or make one of a garment mesh.
 
     Reads DXF after AAMA and ASTM D6673, SVG, and JSON of GarmentCode. Several files, or a folder, give a table with a
-    row for each.
+    row for each. A mesh is cut along its seams and laid flat.
 
     \b
     vto pattern tee.json
@@ -51,17 +73,34 @@ def pattern_command(
     vto pattern shirt.dxf --size M -o shirt_M.svg
     vto pattern tee.json --sizes S,M,L,XL --base M -o tee_sizes/ --format dxf
     vto pattern patterns/
+    vto pattern scanned_tee.ply --seams seams.yaml -o tee.json -o tee.svg
     """
+    from vto_pipeline.cli.commands.pattern.unsewn import take_apart
+    from vto_pipeline.io.meshes import PARSERS as MESHES
+    from vto_pipeline.io.patterns.read import read_pattern
+    from vto_pipeline.model.job import Job
+
     files = _files(paths)
     if sizes is not None:
         if len(files) != 1 or size is not None:
             raise ConfigError("--sizes takes one pattern, and does not go with --size")
+        if len(outputs) > 1:
+            raise ConfigError("--sizes writes one folder; more than one --output is given")
+        output = outputs[0] if outputs else None
         _grade(session, files[0], kind, [one.strip() for one in sizes.split(",")], base, form, output, unit)
         return
     if len(paths) == 1 and not paths[0].is_dir():
-        _describe(session, files[0], output, size, kind, unit)
+        job = Job()
+        if files[0].suffix.lower() in MESHES:
+            if size is not None:
+                raise ConfigError("--size goes with patterns, and a mesh is given")
+            taken = take_apart(files[0], seams, fabric, unit, job)
+            _describe(session, files[0], taken.pattern, outputs, kind, job, taken)
+        else:
+            pattern = _sized(read_pattern(files[0], unit=unit, job=job), size)
+            _describe(session, files[0], pattern, outputs, kind, job, None)
         return
-    if output is not None:
+    if outputs:
         raise ConfigError(f"--output takes one pattern, and {len(files)} are given")
     rows = []
     for number, path in enumerate(files, start=1):
@@ -109,26 +148,37 @@ def _grade(
 
 
 def _describe(
-    session: Session, path: Path, output: Path | None, size: str | None, kind: str | None, unit: str | None
+    session: Session,
+    path: Path,
+    pattern: Pattern,
+    outputs: Sequence[Path],
+    kind: str | None,
+    job: Job,
+    taken: Unsewn | None,
 ) -> None:
     from vto_pipeline.cli.commands.pattern.flat_lines import flat_facts, flat_lines
     from vto_pipeline.cli.commands.pattern.lines import pattern_facts, pattern_lines
-    from vto_pipeline.io.patterns.read import read_pattern
+    from vto_pipeline.cli.commands.pattern.unsewn import unsewn_facts, unsewn_lines
+    from vto_pipeline.io.patterns.panels_obj import write_panels_obj
     from vto_pipeline.io.patterns.write import write_pattern
-    from vto_pipeline.model.job import Job
 
-    job = Job()
-    pattern = _sized(read_pattern(path, unit=unit, job=job), size)
-    if output is not None:
+    for output in outputs:
         if output.resolve() == path.resolve():
             raise ConfigError("the output would overwrite the input", where=str(output))
-        write_pattern(output, pattern, job)
+    for output in outputs:
+        if taken is not None and output.suffix.lower() == ".obj":
+            write_panels_obj(output, taken.mesh)
+        else:
+            write_pattern(output, pattern, job)
     flat = flat_facts(pattern, kind)
     facts = {"path": str(path), **pattern_facts(pattern), "flat": flat, "notes": job.notes}
-    if output is not None:
-        facts["written"] = str(output)
     lines = [f"{path}: {pattern.name}, unit: {pattern.unit}", *pattern_lines(pattern), "", *flat_lines(flat), ""]
-    session.answer(facts, [*lines, *job.notes, *([f"written: {output}"] if output else [])])
+    if taken is not None:
+        facts |= {"laid_flat": unsewn_facts(taken), "warnings": job.warnings}
+        lines += [*unsewn_lines(facts["laid_flat"]), "", *(f"warning: {text}" for text in job.warnings)]
+    if outputs:
+        facts["written"] = str(outputs[0]) if len(outputs) == 1 else [str(one) for one in outputs]
+    session.answer(facts, [*lines, *job.notes, *(f"written: {output}" for output in outputs)])
 
 
 def _sized(pattern: Pattern, size: str | None) -> Pattern:

@@ -23,11 +23,16 @@ def meshes_of(path: Path) -> tuple[list[TriangleMesh], Path]:
     Raises:
         InputError: nothing that can be drawn; FormatError: a broken file.
     """
+    from vto_pipeline.io.gltf.write import read_glb
     from vto_pipeline.io.meshes import read_mesh
     from vto_pipeline.pipeline.execution.folder import is_run
     from vto_pipeline.stages.entry.outcome import open_run
-    from vto_pipeline.stages.entry.shown import shown_artifacts, shown_meshes
+    from vto_pipeline.stages.entry.shown import painted, shown_artifacts, shown_meshes
 
+    if (
+        path.suffix.lower() == ".glb" and path.parent.name == "out" and is_run(path.parents[1])
+    ):  # each part in its colour
+        return [painted(part) for part in read_glb(path)], path.parent / "pictures"
     if not (path.is_dir() and is_run(path)):
         return [read_mesh(path)], path.parent / "pictures"
     outcome = open_run(path)

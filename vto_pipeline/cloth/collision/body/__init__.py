@@ -3,4 +3,5 @@
 contacts: the cloth's contacts with it
 nearest, ray_march, triangle_planes, crease: where it is touched
 clean, visible: bodies that are neither closed nor free of crossings
+yielding: bodies that give way where their own parts press on each other
 """

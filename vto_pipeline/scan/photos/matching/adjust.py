@@ -8,15 +8,17 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vto_pipeline.io.captures.images import read_image
-from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
+from vto_pipeline.scan.grey import best_shares, in_grey
 from vto_pipeline.scan.library_message import COLMAP_ERRORS, library_message
 from vto_pipeline.scan.photos.matching.mapping import lens_of
 from vto_pipeline.scan.photos.matching.tracks import TrackedPhoto, follow, without_light
@@ -35,6 +37,8 @@ SOFT_PX = 0.4
 """Errors beyond this lose their weight [px]."""
 LENS = 50
 """So many points a photo, spread as they are, tell how the lens bends; with fewer it stays as it was found."""
+COLORED = 12
+"""So many photos tell in which grey their print shows best."""
 SPOILT = 1.2
 """An adjustment after which the features' own points are off by so many times as much has failed."""
 
@@ -142,12 +146,13 @@ def _views(model: Any, photos: PhotoSet, ids: list[int]) -> tuple[list[TrackedPh
     import cv2
 
     paths = {path.name: path for path in photos.paths}
+    shares = _shares(model, paths, ids)
     views, scales = [], []
     for number in ids:
         image = model.images[number]
         camera = model.cameras[image.camera_id]
         lens = lens_of(camera)
-        gray: Any = cv2.cvtColor(read_image(paths[image.name]), cv2.COLOR_RGB2GRAY)
+        gray: Any = in_grey(read_image(paths[image.name]), shares)
         scale = min(1.0, LONGER_SIDE / max(gray.shape))
         if scale < 1.0:
             size = (round(gray.shape[1] * scale), round(gray.shape[0] * scale))
@@ -161,6 +166,18 @@ def _views(model: Any, photos: PhotoSet, ids: list[int]) -> tuple[list[TrackedPh
         views.append(TrackedPhoto(without_light(gray), lens, pose, pixels, points))
         scales.append(scale)
     return views, scales
+
+
+def _shares(model: Any, paths: Mapping[str, Path], ids: list[int]) -> FloatArray:
+    """Return the shares of red, green and blue in which some photos show the places of their points best, (3,)."""
+
+    def shown(number: int) -> tuple[ByteArray, FloatArray]:
+        image = model.images[number]
+        pixels = np.array([point.xy for point in image.get_observation_points2D()]).reshape(-1, 2) - 0.5
+        return read_image(paths[image.name]), pixels
+
+    some = np.unique(np.linspace(0, len(ids) - 1, min(len(ids), COLORED)).round().astype(int))
+    return best_shares(shown(ids[k]) for k in some)[0]
 
 
 def _shared(model: Any, ids: list[int]) -> NDArray[np.int64]:

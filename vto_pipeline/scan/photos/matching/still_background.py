@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vto_pipeline.io.captures.images import read_image
+from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.frames import PhotoSet
+from vto_pipeline.scan.grey import USUAL, best_shares, in_grey
 
 LONGER_SIDE = 1000
 """The photos are compared at this size or below [px]."""
@@ -26,6 +28,8 @@ NEAR_PX = 3
 """So near to the object, a pixel counts as the object's [px]."""
 FADE_PX = 15.0
 """The object's colours are carried on so far over the background: a sharp edge would be a feature that moves [px]."""
+LOOKED_AT, EVERY = 12, 4
+"""Photos, and pixels of their rows and columns, that tell in which grey the object shows best."""
 BLANK = 128.0
 """Grey level of the background beyond."""
 _FAINTEST = 0.01
@@ -59,18 +63,40 @@ def still_pixels(photos: PhotoSet) -> list[NDArray[np.bool_]] | None:
     return [cv2.resize(mask, (width, height), interpolation=cv2.INTER_NEAREST) > 0 for mask in masks]
 
 
-def paint_over(photos: PhotoSet, masks: list[NDArray[np.bool_]], folder: Path) -> PhotoSet:
+def grey_beside(photos: PhotoSet, masks: list[NDArray[np.bool_]]) -> FloatArray:
+    """Return the shares of red, green and blue that show best what is beside the background, shape (3,).
+
+    The usual ones have failed when this is asked: any gain will do.
+
+    Args:
+        photos: Some of which are looked at.
+        masks: Of the background, each (H, W).
+    """
+
+    def shown(index: int) -> tuple[ByteArray, FloatArray]:
+        row, column = np.nonzero(~masks[index][::EVERY, ::EVERY])
+        return read_image(photos.paths[index]), EVERY * np.column_stack([column, row]).astype(float)
+
+    some = np.unique(np.linspace(0, len(masks) - 1, min(len(masks), LOOKED_AT)).round().astype(int))
+    return best_shares((shown(k) for k in some), least_gain=1.0)[0]
+
+
+def paint_over(photos: PhotoSet, masks: list[NDArray[np.bool_]], shares: FloatArray, folder: Path) -> PhotoSet:
     """Write the photos with their background painted over, under their own names.
 
     Args:
         photos: To copy.
         masks: Of the background, each (H, W).
+        shares: Of red, green and blue in the grey they are written in; in colour where it is the usual one.
         folder: Empty.
     """
     import cv2
 
     for path, mask in zip(photos.paths, masks, strict=True):
-        picture, shown = read_image(path).astype(np.float32), np.repeat(~mask[..., None], 3, axis=2).astype(np.float32)
+        colors = read_image(path)
+        if tuple(shares) != USUAL:
+            colors = np.repeat(in_grey(colors, shares)[..., None], 3, axis=2)
+        picture, shown = colors.astype(np.float32), np.repeat(~mask[..., None], 3, axis=2).astype(np.float32)
         weight = cv2.GaussianBlur(shown, (0, 0), FADE_PX)
         carried_on = (cv2.GaussianBlur(picture * shown, (0, 0), FADE_PX) + _FAINTEST * BLANK) / (weight + _FAINTEST)
         painted = np.where(mask[..., None], carried_on, picture).round().astype(np.uint8)

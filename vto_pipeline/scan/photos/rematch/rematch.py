@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 from vto_pipeline.geometry.seen.depth_picture import depth_picture
 from vto_pipeline.geometry.topology import edges, vertex_normals
 from vto_pipeline.model.arrays import ByteArray, FloatArray, IntArray
+from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.frames import DepthMaps
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -40,7 +41,13 @@ LEAST_COSINE = 0.17
 PASSES = 2
 """The second with the slants that the first found."""
 MOST_PATCHES = 100_000
-"""Of one look, the nearest to confirmed depth; 0.5 GB."""
+"""Of one look, the nearest to confirmed depth."""
+PATCH_BYTES = 5000
+"""What one takes, with its share of the guessed surface [B]: 0.5 GB for the most."""
+PATCH_PIXELS = 250
+"""Pixels of photos for each patch at least: they lie six pixels apart, and several photos show each."""
+MAP_BYTES = 10
+"""Per pixel of every photo: its grey level twice, its depth before and after a look."""
 CHUNK = 2000
 """Patches that one thread works on at a time."""
 
@@ -109,6 +116,11 @@ def rematch(grays: Iterable[NDArray[np.uint8]], maps: DepthMaps, config: Rematch
     return maps
 
 
+def look_bytes(photos: int, pixels: int) -> float:
+    """Return the memory that the second look takes at most, for so many photos of so many pixels each [B]."""
+    return photos * pixels * MAP_BYTES + PATCH_BYTES * min(MOST_PATCHES, photos * pixels / PATCH_PIXELS)
+
+
 def _round(
     photos: _Photos, maps: DepthMaps, last_new: FloatArray | None, pixel: float, config: RematchConfig
 ) -> tuple[DepthMaps, FloatArray]:
@@ -159,16 +171,23 @@ def _least_slanted(
         depth = depth_picture(mesh, lens, inverse)
         to_eye = pose[:3, 3] - points
         slant = (to_eye * facing).sum(axis=1) / np.linalg.norm(to_eye, axis=1)
-        local = (points + lift * facing) @ inverse[:3, :3].T + inverse[:3, 3]
-        ahead = local[:, 2] > 0
-        z = np.where(ahead, local[:, 2], 1.0)
-        u = np.rint(lens.fx * local[:, 0] / z + lens.cx).astype(np.int64)
-        v = np.rint(lens.fy * local[:, 1] / z + lens.cy).astype(np.int64)
+        shown, ahead = _projected(points + lift * facing, lens, inverse)
+        u, v = np.rint(shown[:, :2]).astype(np.int64).T
         inside = ahead & (u >= 0) & (v >= 0) & (u < lens.width) & (v < lens.height) & (slant > LEAST_COSINE)
-        inside[inside] = local[inside, 2] <= depth[v[inside], u[inside]]
+        inside[inside] = shown[inside, 2] <= depth[v[inside], u[inside]]
         cosine[inside, k] = slant[inside]
     order = np.argsort(-cosine, axis=1, kind="stable")[:, :count]
     return np.where(np.take_along_axis(cosine, order, axis=1) > 0, order, -1)
+
+
+def _projected(
+    points: FloatArray, lens: Intrinsics, cam_from_world: FloatArray
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Column, row and depth of points (N, 3) in a photo, shape (N, 3), and which lie ahead of it, shape (N,)."""
+    local = points @ cam_from_world[:3, :3].T + cam_from_world[:3, 3]
+    ahead = np.asarray(local[:, 2] > 1e-6)
+    z = np.where(ahead, local[:, 2], 1.0)
+    return np.column_stack([lens.fx * local[:, 0] / z + lens.cx, lens.fy * local[:, 1] / z + lens.cy, z]), ahead
 
 
 def _correlated(
@@ -253,14 +272,12 @@ def _filled(
     fresh = new[mesh.faces].any(axis=1)
     for k, (lens, pose) in enumerate(zip(maps.intrinsics, maps.world_from_cam, strict=True)):
         known = np.isfinite(ways[k])
-        inverse = np.linalg.inv(pose)
-        local = mesh.vertices + np.where(known, ways[k], moved)[:, None] * normals
-        local = local @ inverse[:3, :3].T + inverse[:3, 3]
-        ahead = np.flatnonzero((local[:, 2] > 1e-6)[mesh.faces].all(axis=1))
-        z = np.maximum(local[:, 2], 1e-6)
-        placed = np.column_stack([lens.fx * local[:, 0] / z + lens.cx, lens.fy * local[:, 1] / z + lens.cy, z])
-        face, _, away = rasterise(placed[mesh.faces[ahead]], lens.width, lens.height)
-        good = (fresh & known[mesh.faces].all(axis=1))[ahead]
+        placed, ahead = _projected(
+            mesh.vertices + np.where(known, ways[k], moved)[:, None] * normals, lens, np.linalg.inv(pose)
+        )
+        whole = np.flatnonzero(ahead[mesh.faces].all(axis=1))
+        face, _, away = rasterise(placed[mesh.faces[whole]], lens.width, lens.height)
+        good = (fresh & known[mesh.faces].all(axis=1))[whole]
         own = depth[k, : lens.height, : lens.width]
         add = (face >= 0) & good[face] & (own == 0)
         own[add] = away[add]

@@ -2,7 +2,8 @@
 
 Skinned bodies pass through themselves in armpits, groins and bent elbows, where flesh would be pressed flat. Cloth in
 between has no room, and is caught (Baraff, Witkin & Kass 2003, "Untangling cloth", section 5). So in each frame the
-skin about such places sinks in along its normals, on both sides alike, until cloth fits between.
+skin about such places sinks in along its normals, on both sides alike, until cloth fits between. Where a motion ends in
+rest, the body is as it was given: cloth then lies on its union.
 """
 
 from __future__ import annotations
@@ -16,11 +17,13 @@ from vto_pipeline.geometry.intersections import self_intersections
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import vertex_normals
 from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.motion import BodyPath
 
 _STEP, _STEPS = 3e-3, 10  # m of sinking at a time, and how often: less than 30 mm on either side
 _SMOOTHINGS = 2  # times that sinking is averaged with that of neighbours
+_ROOM = 2.0  # skins between parts of the body that come near each other: one for the cloth on either
 _REMEMBERED = 3  # frames
 
 
@@ -29,13 +32,13 @@ class YieldingBody:
 
     Args:
         path: The body as it is posed.
-        room: To leave between parts that press on each other [m].
+        skin: Distance that cloth keeps from it [m].
         about: Its vertices that may sink, shape (N,). Those that have no room as the motion begins never do: creases.
     """
 
-    def __init__(self, path: BodyPath, room: float, about: NDArray[np.int64]) -> None:
-        self._posed, self._room = path, room
-        self._about = about[~_pressed(TriangleMesh(path.at(0.0), path.faces), about, room)]
+    def __init__(self, path: BodyPath, skin: float, about: NDArray[np.int64]) -> None:
+        self._posed, self._room = path, _ROOM * skin
+        self._about = about[~_pressed(TriangleMesh(path.at(0.0), path.faces), about, self._room)]
         self._known: OrderedDict[int, tuple[int, FloatArray]] = OrderedDict()
         self.path = BodyPath(self._at, path.faces, path.frames, path.frame_time)
 
@@ -64,6 +67,27 @@ class YieldingBody:
             if len(self._known) > _REMEMBERED:
                 self._known.popitem(last=False)
         return self._known[frame]
+
+
+def give_way(
+    body: MovingBody, skin: float, about: NDArray[np.int64], *, at_end: bool = False
+) -> tuple[MovingBody, float]:
+    """Return the body, its skin sunken between its first and last keyframe, and how far it sinks at most [m].
+
+    Args:
+        body: The keyframes.
+        skin: Distance that cloth keeps from it [m].
+        about: Its vertices that may sink, shape (N,). Those that have no room as the motion begins never do: creases.
+        at_end: Whether it gives way in its last keyframe, too.
+    """
+    frames, room = body.keyframes.copy(), _ROOM * skin
+    about = about[~_pressed(TriangleMesh(frames[0], body.faces), about, room)]
+    deepest = 0.0
+    for frame in frames[1 : None if at_end else -1]:
+        sunk = sunken(TriangleMesh(frame, body.faces), about, room)
+        frame += sunk
+        deepest = max(deepest, float(np.linalg.norm(sunk, axis=1).max(initial=0.0)))
+    return (MovingBody(frames, body.faces), deepest) if deepest > 0.0 else (body, 0.0)
 
 
 def sunken(mesh: TriangleMesh, about: NDArray[np.int64], room: float) -> FloatArray:

@@ -1,0 +1,130 @@
+"""Fillings lifted off a body: a sheet over a ball, whose every distance has a formula, and a hole over a shoulder."""
+
+from __future__ import annotations
+
+import dressed_form
+import numpy as np
+import pytest
+import trimesh
+from numpy.testing import assert_allclose
+
+from vto_pipeline.errors import GarmentError
+from vto_pipeline.garment.bare_parts import BareParts
+from vto_pipeline.garment.lifting import check_lifted, lift_fillings
+from vto_pipeline.garment.openings import OpeningsConfig, close_scan_holes
+from vto_pipeline.geometry.remeshing.holes import fill_holes
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.geometry.topology import boundary_walks, submesh
+from vto_pipeline.model.garment import SurfaceLabels
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+
+BALL = 0.1
+
+
+@pytest.fixture(scope="module")
+def ball():
+    made = trimesh.creation.icosphere(subdivisions=5, radius=BALL)
+    return TriangleMesh(made.vertices, made.faces)
+
+
+def over_a_ball(gap, hole, seed=0):
+    """A dome `gap` off a ball from 100 degrees down, without what is within `hole` of its top, and a flat filling."""
+    made = trimesh.creation.icosphere(subdivisions=5, radius=BALL + gap)
+    from_top = np.arccos(np.clip(made.vertices[:, 1] / (BALL + gap), -1, 1))
+    kept = (from_top[made.faces] > hole).all(axis=1) & (from_top[made.faces] < np.radians(100)).all(axis=1)
+    torn = submesh(TriangleMesh(made.vertices, made.faces), kept)[0]
+    walk = max(boundary_walks(torn), key=lambda one: torn.vertices[torn.faces[one // 3, 0], 1].mean())
+    return torn, fill_holes(torn, [walk])
+
+
+def away(mesh):
+    return np.linalg.norm(mesh.vertices, axis=1) - BALL
+
+
+@pytest.mark.parametrize("gap", [0.002, 0.006])
+def test_a_filling_pressed_into_a_ball_comes_to_lie_as_far_off_as_the_cloth_around_it(ball, gap):
+    """Cloth that rests on a ball all round rests on it in the hole, too: that is the truth, and it is known."""
+    torn, filled = over_a_ball(gap, np.radians(60))
+    new = np.arange(len(filled.vertices)) >= len(torn.vertices)
+    pressed = filled.vertices.copy()
+    pressed[new, 1] -= 0.05 * np.cos(0.5 * np.pi * np.linalg.norm(pressed[new][:, ::2], axis=1) / (0.87 * BALL))
+    sunk = TriangleMesh(pressed, filled.faces)
+    assert away(sunk)[new].min() < -0.03
+    lifted, moved = lift_fillings(sunk, new, SurfaceDistance(ball), 0.001)
+    assert_allclose(away(lifted)[new], gap, atol=0.001)  # facets of 3 mm, and of the ball itself
+    assert_allclose(lifted.vertices[~new], torn.vertices, rtol=0, atol=0)
+    assert moved[new].mean() > 0.8
+    assert not moved[~new].any()
+    corners = lifted.vertices[lifted.faces[new[lifted.faces].any(axis=1)]]
+    longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max()
+    assert longest < 0.012  # those of the rim are 3.4 mm: what was pressed in is not torn apart on the way out
+
+
+def test_a_filling_that_is_outside_stays_as_it_is(ball):
+    torn, filled = over_a_ball(0.02, np.radians(20))
+    new = np.arange(len(filled.vertices)) >= len(torn.vertices)
+    out = filled.vertices.copy()
+    out[new] *= 1.05
+    lifted, moved = lift_fillings(TriangleMesh(out, filled.faces), new, SurfaceDistance(ball), 0.001)
+    assert_allclose(lifted.vertices, out, rtol=0, atol=0)
+    assert not moved.any()
+
+
+def test_beside_cloth_that_is_nearer_than_usual_a_filling_may_be_so_too(ball):
+    """Most of the cloth is 6 mm off; about the hole it is 2 mm off, and so is the filling's edge."""
+    torn, filled = over_a_ball(0.006, np.radians(60))
+    new = np.arange(len(filled.vertices)) >= len(torn.vertices)
+    from_top = np.arccos(filled.vertices[:, 1] / np.linalg.norm(filled.vertices, axis=1))
+    close = filled.vertices * np.where(from_top < np.radians(62), (BALL + 0.002) / (BALL + 0.006), 1.0)[:, None]
+    sunk = TriangleMesh(np.where(new[:, None], 0.9 * close, close), filled.faces)
+    lifted, _ = lift_fillings(sunk, new, SurfaceDistance(ball), 0.001)
+    assert 0.0009 < away(lifted)[new].min() < 0.0025
+    assert away(lifted)[new].max() < 0.007
+
+
+def test_what_a_limb_goes_through_is_refused_however_it_is_lifted():
+    """A disc across an arm: lifted, its triangles still span it."""
+    flat = trimesh.creation.icosphere(subdivisions=4)
+    top = flat.vertices[flat.faces].mean(axis=1)[:, 1] > 0
+    disc = submesh(TriangleMesh(flat.vertices, flat.faces), top)[0]
+    disc = TriangleMesh(disc.vertices * [0.15, 0.0, 0.15], disc.faces)
+    new = np.linalg.norm(disc.vertices, axis=1) < 0.13
+    arm = trimesh.creation.capsule(height=0.8, radius=0.04, count=[48, 48])
+    arm.apply_transform(trimesh.transformations.rotation_matrix(np.radians(80), [1, 0, 0]))
+    distance = SurfaceDistance(TriangleMesh(arm.vertices, arm.faces))
+    lifted, _ = lift_fillings(disc, new, distance, 0.001)
+    with pytest.raises(GarmentError, match="runs through the mannequin"):
+        check_lifted(disc, lifted, new, distance, None)
+
+
+@pytest.mark.parametrize("bare", [True, False])
+def test_a_filling_lifted_over_what_was_seen_bare_is_refused(ball, bare):
+    torn, filled = over_a_ball(0.004, np.radians(60))
+    new = np.arange(len(filled.vertices)) >= len(torn.vertices)
+    sunk = TriangleMesh(np.where(new[:, None], filled.vertices * 0.6, filled.vertices), filled.faces)
+    distance = SurfaceDistance(ball)
+    lifted, _ = lift_fillings(sunk, new, distance, 0.001)
+    top = ball.vertices[:, 1] > 0.07
+    seen = submesh(ball, (top if bare else ~top)[ball.faces].all(axis=1))[0]
+    labels = SurfaceLabels(np.zeros(len(seen.vertices), bool), np.ones(len(seen.vertices)))
+    parts = BareParts(seen, labels, ball)
+    if bare:
+        with pytest.raises(GarmentError, match="seen bare"):
+            check_lifted(sunk, lifted, new, distance, parts)
+    else:
+        check_lifted(sunk, lifted, new, distance, parts)
+
+
+def test_a_shoulder_that_was_not_seen_is_filled_outside_the_form(scene):
+    """The shirt is an even 2 mm off the form there: that is what the filling must find again."""
+    middle = scene.shirt.vertices[scene.shirt.faces].mean(axis=1)
+    spots = np.array([[0.14, 0.755, 0.0], [0.16, 0.72, 0.03]])
+    torn = submesh(scene.shirt, (np.linalg.norm(middle[:, None] - spots, axis=2) > 0.05).all(axis=1))[0]
+    closed, openings, observed = close_scan_holes(torn, scene.form, OpeningsConfig(), Job())
+    assert len(openings) == 4
+    filling = closed.vertices[~observed]
+    assert len(filling) > 20
+    off = np.abs(dressed_form.form_distance(filling) - dressed_form.shirt_gap(filling))
+    assert np.quantile(off, 0.95) < 0.004
+    assert dressed_form.form_distance(filling).min() > 0.0005

@@ -1,0 +1,75 @@
+"""The grey in which a print shows best: for two colours it has a formula, and a print without brightness is matched."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from vto_pipeline.model.frames import PhotoSet
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import PointCloud
+from vto_pipeline.scan.grey import USUAL, best_shares, in_grey
+from vto_pipeline.scan.photos.stereo import StereoConfig, estimate_depth_maps
+
+EVERYWHERE = np.stack(np.meshgrid(np.arange(5.0, 155.0), np.arange(5.0, 115.0)), -1).reshape(-1, 2)
+
+
+def printed(one, other, seed=0):
+    """Dots of one colour on another."""
+    rng = np.random.default_rng(seed)
+    dots = cv2.GaussianBlur(rng.normal(0, 1, (120, 160)).astype(np.float32), (0, 0), 1.5)[..., None] > 0
+    return np.clip(np.where(dots, one, other) + rng.normal(0, 1, (120, 160, 3)), 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [((150, 90, 60), (90, 100, 60)), ((120, 128, 200), (130, 130, 100)), ((200, 60, 160), (100, 93, 150))],
+)
+def test_two_colours_are_best_told_apart_along_what_differs(one, other):
+    """Against equal noise in each channel the best direction is the difference itself, or of one sign what it has."""
+    apart = np.array(one, float) - other
+    kept = max(np.maximum(apart, 0), np.maximum(-apart, 0), key=np.linalg.norm)
+    shares, gain = best_shares([(printed(one, other), EVERYWHERE)])
+    assert_allclose(shares, kept / kept.sum(), rtol=0, atol=0.11)  # steps of 0.1
+    usual = abs(np.dot(USUAL, apart)) / np.linalg.norm(USUAL)
+    assert_allclose(gain, np.linalg.norm(kept) / usual, rtol=0.12)
+
+
+def test_a_print_in_black_and_white_is_seen_as_the_eye_does():
+    shares, gain = best_shares([(printed((60, 60, 60), (180, 180, 180)), EVERYWHERE)])
+    assert (tuple(shares), gain) == (USUAL, 1.0)
+    picture = printed((200, 60, 160), (100, 113, 150))
+    assert in_grey(picture, shares).tobytes() == cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY).tobytes()
+
+
+def test_where_light_is_clipped_nothing_is_learnt():
+    """The edge of a clipped patch is strong and no print. Beside it dots differ in blue alone."""
+    picture = printed((150, 100, 160), (150, 100, 120))
+    picture[:, :80, 0] = np.where(np.arange(80) % 16 < 8, 255, 90)
+    shares, _ = best_shares([(picture, EVERYWHERE[EVERYWHERE[:, 0] < 75])])
+    assert shares[0] > 0.5  # what is left there still changes in red alone
+    picture[:, :80, 0] = np.where(np.arange(80) % 6 < 3, 255, 90)  # now all of it is near what is clipped
+    shares, _ = best_shares([(picture, EVERYWHERE)])
+    assert_allclose(shares, [0, 0, 1], rtol=0, atol=0.11)
+
+
+def test_a_print_of_one_brightness_is_matched(shot, true_cameras, scene, tmp_path):
+    """The same photos with their print in blue against green, so that the eye's grey is even."""
+    for path in shot[0].paths:
+        level = cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2GRAY).astype(float) - 128.0
+        blue, green = 128.0 + level, 128.0 - USUAL[2] / USUAL[1] * level
+        even = np.stack([blue, green, np.full_like(blue, 128.0)], -1)
+        cv2.imwrite(str(tmp_path / f"{path.stem}.png"), np.rint(even).astype(np.uint8))
+    paths = tuple(tmp_path / f"{path.stem}.png" for path in shot[0].paths)
+    cameras = type(true_cameras)(
+        tuple(path.name for path in paths), true_cameras.intrinsics, true_cameras.world_from_cam, true_cameras.metric
+    )
+    step = scene.vertices[::7]
+    normals = step * [1, 0, 1] / np.linalg.norm(step * [1, 0, 1], axis=1, keepdims=True)
+    job = Job()
+    photos, config = PhotoSet(paths, shot[0].intrinsics), StereoConfig(rematch={"rounds": 0})
+    found = estimate_depth_maps(photos, cameras, PointCloud(step, normals), config, job)
+    assert job.metrics["grey_shares"][2] > 0.7
+    assert min((depth > 0).sum() for depth in found.depth) > 0.4 * 20_000

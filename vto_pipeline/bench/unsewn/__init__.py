@@ -1,0 +1,5 @@
+"""Garments of known cut taken apart, and their patterns held against that cut.
+
+compare: one pattern against the true panels
+scans: a scan that is simulated, of a drape whose pattern is known
+"""

@@ -1,0 +1,76 @@
+"""One channel out of three: the grey in which a print shows best.
+
+A photo's usual grey is what the eye finds bright. Prints of one brightness in several colours are all but lost in it,
+and where red and green are clipped by too much light, so is what they printed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vto_pipeline.model.arrays import ByteArray, FloatArray
+
+USUAL = (0.299, 0.587, 0.114)
+"""Shares of red, green and blue in what the eye finds bright (ITU-R BT.601)."""
+PRINT_PX = 8.0
+"""What changes over a longer distance is shading [px]."""
+FAINT = 5.0
+"""Weaker detail counts less; what is stronger counts as much, or a few outlines would outweigh a print [levels]."""
+CLIPPED = 254
+"""A channel at this level or above tells nothing, nor do the places beside it."""
+STEP = 0.1
+"""Shares are tried in steps of this."""
+CLEARLY = 1.2
+"""What is gained by other shares than the usual ones, when the usual ones do well."""
+LEAST = 1000
+"""Fewer places tell nothing."""
+
+
+def best_shares(shown: Iterable[tuple[ByteArray, FloatArray]], least_gain: float = CLEARLY) -> tuple[FloatArray, float]:
+    """Return the shares of red, green and blue, (3,), that show a print best against noise, and how many times better
+    than the usual ones; those where the gain is small.
+
+    Noise is taken to be as strong in each channel, and independent.
+
+    Args:
+        shown: Photos (H, W, 3), and where each shows the object [px], shape (N, 2).
+        least_gain: Other shares than the usual ones must show it so many times better.
+    """
+    import cv2
+
+    moment, count = np.zeros((3, 3)), 0
+    for picture, pixels in shown:
+        column, row = np.rint(pixels).astype(int).T
+        inside = (column >= 0) & (row >= 0) & (column < picture.shape[1]) & (row < picture.shape[0])
+        there = row[inside], column[inside]
+        lost: Any = cv2.dilate((picture >= CLIPPED).astype(np.uint8), np.ones((5, 5), np.uint8))
+        level = picture.astype(np.float32)
+        detail = (level - cv2.GaussianBlur(level, (0, 0), PRINT_PX))[there] * (lost[there] == 0)
+        detail /= np.sqrt(np.square(detail).sum(axis=1, keepdims=True) + FAINT**2)
+        moment += detail.T.astype(float) @ detail
+        count += len(detail)
+    usual = np.array(USUAL)
+    steps = np.arange(round(1.0 / STEP) + 1)
+    tried = STEP * np.array([c for c in product(steps, repeat=3) if sum(c) == steps[-1]])
+    signal = np.einsum("nc,cd,nd->n", tried, moment, tried) / np.square(tried).sum(axis=1)
+    before = usual @ moment @ usual / (usual @ usual)
+    best = int(np.argmax(signal))
+    gain = float(np.sqrt(signal[best] / before)) if before > 0.0 else 1.0
+    if count < LEAST or gain < least_gain:
+        return usual, 1.0
+    return tried[best], gain
+
+
+def in_grey(picture: ByteArray, shares: FloatArray) -> NDArray[np.uint8]:
+    """Return a photo (H, W, 3) in grey, shape (H, W)."""
+    import cv2
+
+    if tuple(shares) == USUAL:
+        usual: Any = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
+        return np.asarray(usual, dtype=np.uint8)
+    return np.rint(picture.astype(np.float32) @ shares.astype(np.float32)).astype(np.uint8)
