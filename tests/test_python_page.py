@@ -18,6 +18,7 @@ GIVEN = {
     "shirt.ply": "shirt_on_form/shirt.ply",
     "form.ply": "shirt_on_form/form.ply",
     "customer.yaml": "customer/measurements.yaml",
+    "cloud.ply": "customer/cloud.ply",
 }
 
 
@@ -39,7 +40,9 @@ def test_the_examples_of_the_page_run_as_they_stand(tmp_path, monkeypatch, capsy
     names: dict = {}
     for block in BLOCKS:
         exec(compile(block, "docs/python.md", "exec"), names)
-    assert capsys.readouterr().out.startswith("3 no such file")
+    printed = capsys.readouterr().out
+    assert printed.startswith("3 given.body.measurements: no such file")
+    assert "absent.yaml" in printed
     assert names["customer"].read("measurements").values["waist_girth"] == pytest.approx(0.75, abs=0.2)
     assert names["found"].path("page").is_file()
     assert names["open_run"]("runs/draft").verdicts == names["found"].verdicts
