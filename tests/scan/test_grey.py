@@ -48,11 +48,8 @@ def test_where_light_is_clipped_nothing_is_learnt():
     """The edge of a clipped patch is strong and no print. Beside it dots differ in blue alone."""
     picture = printed((150, 100, 160), (150, 100, 120))
     picture[:, :80, 0] = np.where(np.arange(80) % 16 < 8, 255, 90)
-    shares, _ = best_shares([(picture, EVERYWHERE[EVERYWHERE[:, 0] < 75])])
-    assert shares[0] > 0.5  # what is left there still changes in red alone
-    picture[:, :80, 0] = np.where(np.arange(80) % 6 < 3, 255, 90)  # now all of it is near what is clipped
-    shares, _ = best_shares([(picture, EVERYWHERE)])
-    assert_allclose(shares, [0, 0, 1], rtol=0, atol=0.11)
+    for places in (EVERYWHERE, EVERYWHERE[EVERYWHERE[:, 0] < 75]):
+        assert_allclose(best_shares([(picture, places)])[0], [0, 0, 1], rtol=0, atol=0.11)
 
 
 def test_a_print_of_one_brightness_is_matched(shot, true_cameras, scene, tmp_path):

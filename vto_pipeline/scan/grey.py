@@ -49,8 +49,9 @@ def best_shares(shown: Iterable[tuple[ByteArray, FloatArray]], least_gain: float
         inside = (column >= 0) & (row >= 0) & (column < picture.shape[1]) & (row < picture.shape[0])
         there = row[inside], column[inside]
         lost: Any = cv2.dilate((picture >= CLIPPED).astype(np.uint8), np.ones((5, 5), np.uint8))
-        level = picture.astype(np.float32)
-        detail = (level - cv2.GaussianBlur(level, (0, 0), PRINT_PX))[there] * (lost[there] == 0)
+        level, told = picture.astype(np.float32), (lost == 0).astype(np.float32)
+        about, weight = (cv2.GaussianBlur(part, (0, 0), PRINT_PX) for part in (level * told, told))
+        detail = ((level - about / np.maximum(weight, np.finfo(np.float32).tiny)) * told)[there]
         detail /= np.sqrt(np.square(detail).sum(axis=1, keepdims=True) + FAINT**2)
         moment += detail.T.astype(float) @ detail
         count += len(detail)
