@@ -16,7 +16,7 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.scan.grey import USUAL
 from vto_pipeline.scan.photos import sfm
 from vto_pipeline.scan.photos.consistency import rays
-from vto_pipeline.scan.photos.matching.features import FAINT, FeatureConfig, detect
+from vto_pipeline.scan.photos.matching.features import FAINT, FeatureConfig, detect, match
 from vto_pipeline.scan.photos.matching.fixed_camera import moving_matches, still_features
 from vto_pipeline.scan.photos.matching.mapping import map_photos
 from vto_pipeline.scan.photos.matching.still_background import paint_over, still_pixels
@@ -145,6 +145,33 @@ def test_a_faint_object_has_features_once_the_strong_wall_is_painted_over(tmp_pa
         beside.append(int((~inside).sum()))
     assert on_tube[1] > 2 * on_tube[0]
     assert beside[1] < 0.2 * beside[0]
+
+
+@pytest.mark.parametrize("stays", [True, False])
+def test_where_the_camera_is_known_to_stay_no_match_stays_in_its_place(tmp_path, stays):
+    """Few specks of a wall are left under the paint: fewer than tell by themselves that the camera did not move."""
+    rng = np.random.default_rng(0)
+    specks, moving = (
+        cv2.resize(rng.integers(60, 200, (20, wide)).astype(np.uint8), None, fx=8, fy=8, interpolation=cv2.INTER_CUBIC)
+        for wide in (10, 60)
+    )
+    paths = tuple(tmp_path / f"{k}.png" for k in range(4))
+    for k, path in enumerate(paths):
+        picture = np.full((360, 480), 128, np.uint8)
+        picture[10:170, 10:90] = specks
+        picture[180:340, 20:440] = moving[:, 15 * k : 15 * k + 420]
+        cv2.imwrite(str(path), picture)
+    photos, database, config = PhotoSet(paths, (None,) * 4), tmp_path / "photos.db", FeatureConfig()
+    detect(photos, database, FAINT, config)
+    match(photos, database, config, Job(), camera_stays=stays)
+    moved = []
+    with pycolmap.Database.open(str(database)) as opened:
+        for pair, found in zip(*opened.read_two_view_geometries(), strict=True):
+            one, other = (opened.read_keypoints(number)[:, :2] for number in pycolmap.pair_id_to_image_pair(pair))
+            rows = found.inlier_matches
+            moved += list(np.linalg.norm(one[rows[:, 0]] - other[rows[:, 1]], axis=1))
+    assert sum(way > 10 for way in moved) > 100
+    assert (min(moved) > 2.5) == stays
 
 
 def test_photos_that_fail_before_their_background_are_placed_beside_it(scene, tmp_path, monkeypatch):

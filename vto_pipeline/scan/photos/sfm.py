@@ -127,17 +127,17 @@ def _beside_background(
     beside = scratch / "beside"
     (beside / "photos").mkdir(parents=True)
     painted = paint_over(photos, masks, grey_beside(photos, masks), beside / "photos")
-    return _faint(painted, photos, beside, config, job)
+    return _faint(painted, photos, beside, config, job, camera_stays=True)
 
 
 def _faint(
-    shown: PhotoSet, photos: PhotoSet, folder: Path, config: SfmConfig, job: Job
+    shown: PhotoSet, photos: PhotoSet, folder: Path, config: SfmConfig, job: Job, *, camera_stays: bool = False
 ) -> tuple[Any | None, list[int], int]:
     """Place the photos by faint features of what is shown of them; returns what `_beside_background` does."""
     folder.mkdir(exist_ok=True)
     database = folder / "faint.db"
     counts = detect(shown, database, FAINT, config.features)
-    pairs, _ = match(shown, database, config.features, Job(seed=job.seed))
+    pairs, _ = match(shown, database, config.features, Job(seed=job.seed), camera_stays=camera_stays)
     return map_photos(database, photos.paths[0].parent, len(photos.paths), job), counts, pairs
 
 
