@@ -57,6 +57,9 @@ class AsCompleted:
         self.waiting.append(future)
         Client.most = max(Client.most, len(self.waiting))
 
+    def has_ready(self) -> bool:
+        return len(self.waiting) > 0
+
     def __next__(self) -> Future:
         return self.waiting.popleft()
 

@@ -27,7 +27,7 @@ _TELLING = 1.5  # times the cube: enough to tell them apart
 _CLOSE = 0.9  # of the best coarse worth: these are looked at again with fine cubes
 _ALIKE = 0.98  # as good, but for where the cubes happen to lie
 _LARGER, _STEPS = 1.2, 4  # a garment may start up to twice as large as it is
-_UPRIGHT = 0.7  # of the best score: files have y or z up, and a tight blouse scores more upside down
+_UPRIGHT = 0.7  # of the best score: files have y or z up, and a tight blouse scores more upside down about the hips
 _FALLING = 0.85  # of the best worth yet: larger garments need not be tried
 _DEEP = 0.01  # m
 _HEIGHTS = 6  # tried where limbs go through cloth
@@ -115,13 +115,14 @@ def find_placement(
     scale = _scale(garment, cubes, config, job)
     metres = TriangleMesh(scale * garment.vertices, garment.faces)
     stands, best = _best_orientation(metres, cubes, config)
+    among = [turn for turn in quarter_turns() if _is_upright(turn)] if _is_upright(best.turn) else quarter_turns()
     if round(best.score, 6) <= 0.0:  # but for what the transforms round
         raise InputError(
             "the body fills this garment nowhere: it goes around nothing of the body",
             hint="give it as it is worn, sewn and open; drape.place=as_it_stands drapes it from where it lies",
         )
     if stands.score < config.turned_well * best.score:
-        best = _best_orientation_if_larger(metres, cubes, config)
+        best = _best_orientation_if_larger(metres, cubes, config, among)
     as_turned = 1.0 if (best.turn == stands.turn).all() else _relative_score(stands.score, best.score)
     if as_turned >= _ALIKE:
         best = stands
@@ -247,7 +248,11 @@ def _best_orientation(
     promising[0] = True
     cubes = VoxelFit(garment, body, cube, config.cloth_in_body)
     ways = [cubes.best_placement(turn) for turn, look in zip(turns, promising, strict=True) if look]
-    return ways[0], ways[_preferred([way.turn for way in ways], [way.score for way in ways])]
+    best = max(ways, key=lambda way: way.score)
+    upright_way = max((way for way in ways if _is_upright(way.turn)), key=lambda way: way.score)
+    if _UPRIGHT * best.score <= upright_way.score < best.score:
+        best = _least_astray(upright_way, best, garment, body.mesh)
+    return ways[0], best
 
 
 def _is_upright(turn: FloatArray) -> bool:
@@ -255,19 +260,28 @@ def _is_upright(turn: FloatArray) -> bool:
     return bool((turn[1] == (0, 1, 0)).all() or (turn[1] == (0, 0, 1)).all())
 
 
-def _preferred(turns: Sequence[FloatArray], scores: Sequence[float]) -> int:
-    """Return which turn is taken: the best upright one, unless another is far better."""
-    worth = np.where([_is_upright(turn) for turn in turns], np.array(scores), _UPRIGHT * np.array(scores))
-    return int(np.argmax(worth))
+def _least_astray(
+    one: VoxelPlacement, other: VoxelPlacement, garment: TriangleMesh, body: TriangleMesh
+) -> VoxelPlacement:
+    """Return the first of two places, or the other if fewer limbs go through cloth there."""
+    thinning = Thinning(body)
+
+    def astray(way: VoxelPlacement) -> int:
+        return thinning.limbs_astray(TriangleMesh(garment.vertices @ way.turn.T + way.shift, garment.faces))
+
+    found = astray(one)
+    return one if found == 0 or astray(other) >= found else other
 
 
-def _best_orientation_if_larger(garment: TriangleMesh, body: BodyCubes, config: PlaceConfig) -> VoxelPlacement:
-    """Return the best place, turned as the garment would be if larger.
+def _best_orientation_if_larger(
+    garment: TriangleMesh, body: BodyCubes, config: PlaceConfig, turns: Sequence[FloatArray]
+) -> VoxelPlacement:
+    """Return the best place, turned as the garment would be if larger, one of these ways.
 
     One too small for the trunk may suit a thigh, and a tight top the hips upside down, its sleeves beside them. So the
     turn is that which suits the size that fits best and the next larger one, in which nothing is tight.
     """
-    turns, scores = quarter_turns(), []
+    scores: list[FloatArray] = []
     for step in range(_STEPS + 1):
         larger = TriangleMesh(_LARGER**step * garment.vertices, garment.faces)
         cubes = VoxelFit(larger, body, 1e-3 * _TELLING * config.cube_mm, config.cloth_in_body)
@@ -276,7 +290,7 @@ def _best_orientation_if_larger(garment: TriangleMesh, body: BodyCubes, config: 
             break
     fits = int(np.argmax([one.max() for one in scores]))
     relative = sum(one / max(one.max(), 1e-9) for one in scores[fits : fits + 2])
-    turn = turns[_preferred(turns, relative)]
+    turn = turns[int(np.argmax(relative))]
     return VoxelFit(garment, body, 1e-3 * config.cube_mm, config.cloth_in_body).best_placement(turn)
 
 

@@ -18,7 +18,7 @@ from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.settings import Config
 from vto_pipeline.scan.library_message import COLMAP_ERRORS, library_message
-from vto_pipeline.scan.photos.matching.fixed_camera import MOVING_SHARE, Pair, moving_matches, still_features
+from vto_pipeline.scan.photos.matching.fixed_camera import Pair, moving_matches, still_features
 
 GUESSED_FOCAL = 1.2
 """COLMAP's guess where EXIF says nothing, in longer sides of the picture."""
@@ -112,7 +112,7 @@ def match(photos: PhotoSet, database: Path, config: FeatureConfig, job: Job, *, 
         database: Holds their features.
         config: Settings.
         job: Seeds the RANSAC; notified when the camera did not move.
-        camera_stays: Whether that is known: then all matches that stay in their place are left out.
+        camera_stays: Whether that is known, few as the features of its background may be.
 
     Raises:
         ScanError: COLMAP cannot match them.
@@ -123,9 +123,6 @@ def match(photos: PhotoSet, database: Path, config: FeatureConfig, job: Job, *, 
     pairs.write_text("".join(f"{a} {b}\n" for a, b in _pairs([path.name for path in photos.paths], config)))
     verification = pycolmap.TwoViewGeometryOptions()
     verification.ransac.random_seed = job.seed
-    if camera_stays:
-        verification.filter_stationary_matches = True
-        verification.stationary_matches_max_error = MOVING_SHARE * _longer_side(photos)
     try:
         pycolmap.match_image_pairs(
             database,
@@ -134,7 +131,7 @@ def match(photos: PhotoSet, database: Path, config: FeatureConfig, job: Job, *, 
             verification,
             device=pycolmap.Device.cpu,
         )
-        moving = None if camera_stays else _drop_background(database, photos, job)
+        moving = _drop_background(database, photos, job, camera_stays)
         if moving is not None:  # only these: COLMAP would match again what has no matches
             pairs.write_text("".join(f"{one} {other}\n" for one, other in moving))
             pycolmap.verify_matches(database, pairs, verification)
@@ -149,10 +146,10 @@ def match(photos: PhotoSet, database: Path, config: FeatureConfig, job: Job, *, 
                 kept += inliers > 0
             else:
                 opened.delete_two_view_geometry(first, second)
-    return Matched(kept, camera_stays or moving is not None)
+    return Matched(kept, moving is not None)
 
 
-def _drop_background(database: Path, photos: PhotoSet, job: Job) -> list[Pair] | None:
+def _drop_background(database: Path, photos: PhotoSet, job: Job, camera_stays: bool) -> list[Pair] | None:
     """Take the matches of a background that stays out of the database.
 
     Returns:
@@ -168,10 +165,10 @@ def _drop_background(database: Path, photos: PhotoSet, job: Job) -> list[Pair] |
         for pair, rows in zip(*opened.read_all_matches(), strict=True):
             one, other = pycolmap.pair_id_to_image_pair(pair)
             matches[names[one], names[other]] = rows
-        longer_side = _longer_side(photos)
+        longer_side = float(max(max(read_image_size(path)) for path in photos.paths))
         found = still_features(places, matches, longer_side)
         job.measure(still_share=round(found.share, 3))
-        if not found.fixed_camera:
+        if not (found.fixed_camera or camera_stays):
             return None
         job.note(f"the camera did not move: {100 * found.share:.0f} % of the features are background, and left out")
         opened.clear_two_view_geometries()
@@ -181,10 +178,6 @@ def _drop_background(database: Path, photos: PhotoSet, job: Job) -> list[Pair] |
             if len(moving):
                 opened.write_matches(numbers[first], numbers[second], moving)
     return [pair for pair, moving in left.items() if len(moving)]
-
-
-def _longer_side(photos: PhotoSet) -> float:
-    return float(max(max(read_image_size(path)) for path in photos.paths))
 
 
 def _groups(photos: PhotoSet) -> dict[tuple[int, int, Intrinsics | None], list[str]]:
