@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vto_pipeline.assess.strain import principal_stretches
 from vto_pipeline.assess.surface import face_areas
+from vto_pipeline.geometry.closest import barycentric
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import boundary_loops
 from vto_pipeline.model.arrays import FloatArray
@@ -70,26 +71,16 @@ def openings_slide(
     Returns:
         Of each opening, highest first: height_m, its mean height before, and slides_m, the mean over its vertices.
     """
-    found = []
-    faces = body_before.faces
+    found, faces = [], body_before.faces
+    surface_before, surface_after = SurfaceDistance(body_before), SurfaceDistance(body_after)
     for loop in boundary_loops(before):
-        place = SurfaceDistance(body_before).nearest(before.vertices[loop])
-        weights = _barycentric(body_before.vertices[faces[place.face]], place.point)
+        place = surface_before.nearest(before.vertices[loop])
+        weights = barycentric(place.point, body_before.vertices[faces[place.face]])
         carried = np.einsum("nk,nkd->nd", weights, body_after.vertices[faces[place.face]])
-        now = SurfaceDistance(body_after).nearest(after.vertices[loop]).point
+        now = surface_after.nearest(after.vertices[loop]).point
         slides = np.linalg.norm(now - carried, axis=1)
         found.append({"height_m": float(before.vertices[loop, 1].mean()), "slides_m": float(slides.mean())})
     return sorted(found, key=lambda one: -one["height_m"])
-
-
-def _barycentric(corners: FloatArray, points: FloatArray) -> FloatArray:
-    """Return the weights of the corners, shape (N, 3, 3), that give points of their triangles, shape (N, 3)."""
-    one, two, way = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], points - corners[:, 0]
-    aa, ab, bb = (np.einsum("nd,nd->n", a, b) for a, b in ((one, one), (one, two), (two, two)))
-    aw, bw = np.einsum("nd,nd->n", one, way), np.einsum("nd,nd->n", two, way)
-    size = np.maximum(aa * bb - ab * ab, np.finfo(float).tiny)
-    second, third = (bb * aw - ab * bw) / size, (aa * bw - ab * aw) / size
-    return np.stack([1.0 - second - third, second, third], axis=1)
 
 
 def verdict(

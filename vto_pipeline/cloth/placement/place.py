@@ -27,7 +27,6 @@ _TELLING = 1.5  # times the cube: enough to tell them apart
 _CLOSE = 0.9  # of the best coarse worth: these are looked at again with fine cubes
 _ALIKE = 0.98  # as good, but for where the cubes happen to lie
 _LARGER, _STEPS = 1.2, 4  # a garment may start up to twice as large as it is
-_UPRIGHT = 0.7  # of the best score: files have y or z up, and a tight blouse scores more upside down about the hips
 _FALLING = 0.85  # of the best worth yet: larger garments need not be tried
 _DEEP = 0.01  # m
 _HEIGHTS = 6  # tried where limbs go through cloth
@@ -115,7 +114,9 @@ def find_placement(
     scale = _scale(garment, cubes, config, job)
     metres = TriangleMesh(scale * garment.vertices, garment.faces)
     stands, best = _best_orientation(metres, cubes, config)
-    among = [turn for turn in quarter_turns() if _is_upright(turn)] if _is_upright(best.turn) else quarter_turns()
+    among = [
+        turn for turn in quarter_turns() if _is_upright(turn) or not _is_upright(best.turn)
+    ]  # files have y or z up
     if round(best.score, 6) <= 0.0:  # but for what the transforms round
         raise InputError(
             "the body fills this garment nowhere: it goes around nothing of the body",
@@ -243,16 +244,10 @@ def _best_orientation(
     cubes = VoxelFit(garment, body, _COARSE * cube, config.cloth_in_body)
     coarse = np.array([cubes.best_placement(turn).score for turn in turns])
     promising = coarse >= np.maximum(_CLOSE * coarse.max(), config.turned_well * coarse[0])
-    upright = np.array([_is_upright(turn) for turn in turns])
-    promising |= upright & (coarse >= _CLOSE * max(coarse[upright].max(), _UPRIGHT * coarse.max()))
     promising[0] = True
     cubes = VoxelFit(garment, body, cube, config.cloth_in_body)
     ways = [cubes.best_placement(turn) for turn, look in zip(turns, promising, strict=True) if look]
-    best = max(ways, key=lambda way: way.score)
-    upright_way = max((way for way in ways if _is_upright(way.turn)), key=lambda way: way.score)
-    if _UPRIGHT * best.score <= upright_way.score < best.score:
-        best = _least_astray(upright_way, best, garment, body.mesh)
-    return ways[0], best
+    return ways[0], max(ways, key=lambda way: way.score)
 
 
 def _is_upright(turn: FloatArray) -> bool:
@@ -260,23 +255,10 @@ def _is_upright(turn: FloatArray) -> bool:
     return bool((turn[1] == (0, 1, 0)).all() or (turn[1] == (0, 0, 1)).all())
 
 
-def _least_astray(
-    one: VoxelPlacement, other: VoxelPlacement, garment: TriangleMesh, body: TriangleMesh
-) -> VoxelPlacement:
-    """Return the first of two places, or the other if fewer limbs go through cloth there."""
-    thinning = Thinning(body)
-
-    def astray(way: VoxelPlacement) -> int:
-        return thinning.limbs_astray(TriangleMesh(garment.vertices @ way.turn.T + way.shift, garment.faces))
-
-    found = astray(one)
-    return one if found == 0 or astray(other) >= found else other
-
-
 def _best_orientation_if_larger(
     garment: TriangleMesh, body: BodyCubes, config: PlaceConfig, turns: Sequence[FloatArray]
 ) -> VoxelPlacement:
-    """Return the best place, turned as the garment would be if larger, one of these ways.
+    """Return the best place, turned as the garment would be if larger, in one of these ways.
 
     One too small for the trunk may suit a thigh, and a tight top the hips upside down, its sleeves beside them. So the
     turn is that which suits the size that fits best and the next larger one, in which nothing is tight.

@@ -29,9 +29,8 @@ def meshes_of(path: Path) -> tuple[list[TriangleMesh], Path]:
     from vto_pipeline.stages.entry.outcome import open_run
     from vto_pipeline.stages.entry.shown import painted, shown_artifacts, shown_meshes
 
-    if (
-        path.suffix.lower() == ".glb" and path.parent.name == "out" and is_run(path.parents[1])
-    ):  # each part in its colour
+    written_by_run = path.suffix.lower() == ".glb" and path.parent.name == "out" and is_run(path.parents[1])
+    if written_by_run:  # its parts are known, and each has its colour
         return [painted(part) for part in read_glb(path)], path.parent / "pictures"
     if not (path.is_dir() and is_run(path)):
         return [read_mesh(path)], path.parent / "pictures"
