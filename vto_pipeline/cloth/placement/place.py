@@ -114,16 +114,16 @@ def find_placement(
     scale = _scale(garment, cubes, config, job)
     metres = TriangleMesh(scale * garment.vertices, garment.faces)
     stands, best = _best_orientation(metres, cubes, config)
-    among = [
-        turn for turn in quarter_turns() if _is_upright(turn) or not _is_upright(best.turn)
-    ]  # files have y or z up
+    turns = quarter_turns()
+    if _is_upright(best.turn):  # as files have it: to be tight is no reason to be upside down
+        turns = [turn for turn in turns if _is_upright(turn)]
     if round(best.score, 6) <= 0.0:  # but for what the transforms round
         raise InputError(
             "the body fills this garment nowhere: it goes around nothing of the body",
             hint="give it as it is worn, sewn and open; drape.place=as_it_stands drapes it from where it lies",
         )
     if stands.score < config.turned_well * best.score:
-        best = _best_orientation_if_larger(metres, cubes, config, among)
+        best = _best_orientation_if_larger(metres, cubes, config, turns)
     as_turned = 1.0 if (best.turn == stands.turn).all() else _relative_score(stands.score, best.score)
     if as_turned >= _ALIKE:
         best = stands
