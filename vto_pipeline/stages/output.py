@@ -23,6 +23,7 @@ from vto_pipeline.pipeline.stage import Stage
 from vto_pipeline.render.dress import BODY, DressConfig, body_part, deform_render_mesh
 from vto_pipeline.render.marks import mark_places
 from vto_pipeline.report.page import build_page
+from vto_pipeline.stages.motion import shown_motion
 
 Inputs = Mapping[str, Any]
 Outputs = Mapping[str, Any]
@@ -89,6 +90,8 @@ def _page(inputs: Inputs, settings: Config, job: Job) -> Outputs:
         parts["render_mesh"] = [part for part in shown if part.name != BODY]
         if "avatar" not in parts and len(parts["render_mesh"]) < len(shown):
             parts["worn_by"] = next(part.mesh for part in shown if part.name == BODY)
+    if all(name in inputs for name in ("draped_motion", "avatar", "avatar_motion")):
+        parts["motion"] = shown_motion(inputs["draped_motion"], inputs["avatar"], inputs["avatar_motion"])
     places = _crossings(inputs.get("audit", {}))
     if places:
         parts["crossings"] = mark_places(np.array(places))
@@ -143,6 +146,11 @@ STAGES: tuple[Stage, ...] = (
             "render_mesh",
             "fit_report",
             "fit_maps",
+            "draped_motion",
+            "avatar_motion",
+            "motion_maps",
+            "motion_report",
+            "pose_report",
         ),
         makes=("page",),
         run=_page,
