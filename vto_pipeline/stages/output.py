@@ -20,6 +20,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
 from vto_pipeline.model.texture import TexturedMesh
 from vto_pipeline.pipeline.stage import Stage
+from vto_pipeline.render.clear_body import clear_body
 from vto_pipeline.render.dress import BODY, DressConfig, body_part, deform_render_mesh
 from vto_pipeline.render.marks import mark_places
 from vto_pipeline.report.page import build_page
@@ -32,8 +33,11 @@ Outputs = Mapping[str, Any]
 def _transfer(inputs: Inputs, settings: DressConfig, job: Job) -> Outputs:
     garment = most_detailed(inputs)
     parts = deform_render_mesh(garment, inputs["sim_mesh"], inputs["draped"], settings, job)
-    if settings.body and "collider" in inputs:
-        parts.append(body_part(inputs["collider"].final, settings))
+    if "collider" in inputs:
+        parts, moved = clear_body([*parts, body_part(inputs["collider"].final, settings)])
+        job.measure(moved_out_of_body=moved)
+        if not settings.body:
+            parts.pop()
     return {"render_mesh": parts}
 
 

@@ -12,8 +12,9 @@ from vto_pipeline.errors import InputError
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.motion import BodyPath, ClothMotion
+from vto_pipeline.render.clear_body import outside
 from vto_pipeline.render.tint import SKIN, tint
-from vto_pipeline.render.transfer import apply, bind
+from vto_pipeline.render.transfer import Binding, apply, bind
 from vto_pipeline.stages.entry.outcome import Outcome
 from vto_pipeline.stages.entry.shown import shown_artifacts, shown_meshes
 
@@ -45,9 +46,9 @@ class MovingScene:
 
     def at(self, frame: int) -> list[TriangleMesh]:
         """Return the surfaces in a frame, the garment first [m]."""
-        worn = self._bound
-        moved = [replace(mesh, vertices=apply(one, self.cloth.frames[frame])) for mesh, one in zip(*worn, strict=True)]
         body = TriangleMesh(self.body.at(frame * self.cloth.frame_time), self.body.faces)
+        worn = outside([apply(one, self.cloth.frames[frame]) for one in self._bound], body)
+        moved = [replace(mesh, vertices=place) for mesh, place in zip(self.garment, worn, strict=True)]
         return [*moved, tint(body, SKIN)]
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
@@ -59,8 +60,8 @@ class MovingScene:
         return np.min(ends, axis=0), np.max(ends, axis=0)
 
     @cached_property
-    def _bound(self):  # type: ignore[no-untyped-def]
-        return self.garment, [bind(mesh, self.draped) for mesh in self.garment]
+    def _bound(self) -> list[Binding]:
+        return [bind(mesh, self.draped) for mesh in self.garment]
 
 
 def moving_scene(outcome: Outcome) -> MovingScene:
