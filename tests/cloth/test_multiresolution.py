@@ -9,7 +9,7 @@ from test_drape import double_vest, pear, vest
 
 import vto_pipeline.cloth.rest.multiresolution as levels_module
 from vto_pipeline.cloth.drape import drape
-from vto_pipeline.cloth.rest.coarsening import coarsen
+from vto_pipeline.cloth.model.coarsening import coarsen
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import boundary_loops, face_area_vectors

@@ -9,7 +9,7 @@ from test_drape import pear, vest
 import vto_pipeline.cloth.rest.multiresolution as levels_module
 from vto_pipeline.cloth.drape import drape
 from vto_pipeline.cloth.dynamics.stepper import Stepper
-from vto_pipeline.cloth.rest.coarsening import coarsen
+from vto_pipeline.cloth.model.coarsening import coarsen
 from vto_pipeline.cloth.rest.true_distance import some_positions, with_true_distances
 from vto_pipeline.model.cloth import TraceRow, seconds_within
 from vto_pipeline.model.job import Job

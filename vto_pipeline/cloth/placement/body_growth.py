@@ -7,7 +7,7 @@ Laplacian of the first shape kept, the flow does not pinch off necks.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -15,23 +15,26 @@ from numpy.typing import NDArray
 from scipy.sparse import diags
 from scipy.sparse.linalg import splu
 
+from vto_pipeline.cloth.model.coarsening import coarsen
 from vto_pipeline.cloth.placement.flexible_escape import escape_flexibly
 from vto_pipeline.cloth.placement.limb_lead import lead_onto_limbs
 from vto_pipeline.cloth.placement.limb_openings import Piece, pieces_with_limbs
 from vto_pipeline.cloth.placement.limbs import Limbs
 from vto_pipeline.cloth.placement.rigid_escape import escape_rigidly
 from vto_pipeline.cloth.placement.voxel_fit import close_openings
-from vto_pipeline.errors import IntersectingError
+from vto_pipeline.errors import GarmentError, InputError, IntersectingError
 from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.geometry.laplace import laplacian
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.body import MovingBody
+from vto_pipeline.model.garment import Garment, RestShape
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
 _STEP = 1e-3  # m²: a limb of radius r shrinks by exp(-1e-3 / r²) a step, a wrist of 30 mm to a third
 _MOST = 12  # steps: an arm is a line long before, and a torso still two thirds
 _LINES = 6  # steps after which limbs are lines
+_FEW = 1500  # vertices of a garment that is led
 _LED_BY = (0, 3, 6)  # steps of thinning after which the garment is led about the body: the thin one leaves room
 _STILL_WORN = 0.5  # of the body's surface that was in the garment: with less, it is led to another part of the body
 _LARGER = (1.1, 1.2, 1.35, 1.5)  # times: so much it may start larger than it is
@@ -90,9 +93,11 @@ def plan_body_growth(body: TriangleMesh, garment: TriangleMesh, job: Job) -> Bod
 
     Where it crosses however thin, or a limb goes through another opening than is there for it, the garment is not about
     the body, and is led there: sleeve by sleeve onto the limbs, as a whole, part by part about the body, and about
-    thinner ones. Of all that was tried and is still worn there, the one with the least crossing and the fewest limbs
-    astray is taken. A garment that is too small for where it is worn starts larger: tight is no reason to be worn
-    elsewhere, a skirt about the neck.
+    thinner ones. Of all that was tried and is still worn there, the one with the fewest limbs through cloth is taken,
+    which no move of a little frees; among these that with the least crossing and the fewest limbs astray.
+
+    A garment that is too small for where it is worn starts larger: tight is no reason to be worn elsewhere, a skirt
+    about the neck.
 
     Args:
         body: Closed or with holes [m].
@@ -107,7 +112,7 @@ def plan_body_growth(body: TriangleMesh, garment: TriangleMesh, job: Job) -> Bod
     enough = _STILL_WORN * area[worn].sum()
     for led in _led(first, thinning):
         if area[worn & _enclosed(led, body)].sum() >= enough:
-            best = min(best, thinning.growth(led), key=lambda one: one.fault)
+            best = min(best, thinning.growth(led), key=lambda one: (one.pierced, *one.fault))
         if best.fault == (0, 0):
             break
     if best is not first:
@@ -126,17 +131,34 @@ def plan_body_growth(body: TriangleMesh, garment: TriangleMesh, job: Job) -> Bod
 
 
 def _led(first: BodyGrowth, thinning: Thinning) -> Iterator[TriangleMesh]:
-    """Yield the garment led onto the limbs, as a whole, and each of these and itself part by part."""
-    garment, body = first.garment, thinning.after(0)
-    onto = lead_onto_limbs(garment, body, thinning.limbs, thinning.after(_LINES), first.pieces)
-    whole = TriangleMesh(escape_rigidly(body, garment), garment.faces)
-    yield onto
-    yield whole
+    """Yield the garment led onto the limbs, as a whole, and each of these and itself part by part.
+
+    It is led as one of few vertices, which the others follow: cloth that keeps its shape goes a few edges a round, and
+    so a fine garment would not get there.
+    """
+    garment, body, thin = first.garment, thinning.after(0), thinning.after(_LINES)
+    coarse, prolong = _few_vertices(garment)
+    pieces = first.pieces if coarse is garment else pieces_with_limbs(coarse, thinning.limbs, thin)
+    onto = lead_onto_limbs(coarse, body, thinning.limbs, thin, pieces)
+    whole = TriangleMesh(escape_rigidly(body, coarse), coarse.faces)
+    yield prolong(onto)
+    yield prolong(whole)
     astray = first.fault[1] > 0
-    for led in (onto, garment, whole) if astray else (garment, whole, onto):
+    for led in (onto, coarse, whole) if astray else (coarse, whole, onto):
         for steps in _LED_BY:
-            led = TriangleMesh(escape_flexibly(thinning.after(steps), led), garment.faces)
-            yield led
+            led = TriangleMesh(escape_flexibly(thinning.after(steps), led), coarse.faces)
+            yield prolong(led)
+
+
+def _few_vertices(garment: TriangleMesh) -> tuple[TriangleMesh, Callable[[TriangleMesh], TriangleMesh]]:
+    """Return a garment in fewer triangles, itself where it has few or must keep them, and what carries moves over."""
+    if len(garment.vertices) <= _FEW:
+        return garment, lambda led: led
+    try:
+        coarse = coarsen(Garment(garment, RestShape(garment.vertices)), _FEW)
+    except (InputError, GarmentError):
+        return garment, lambda led: led
+    return coarse.garment.mesh, lambda led: TriangleMesh(coarse.prolong(led.vertices), garment.faces)
 
 
 def _larger(tight: BodyGrowth, thinning: Thinning, job: Job) -> BodyGrowth:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.dynamics.stepper import Stepper
 from vto_pipeline.cloth.model.build import ClothModel, at_rest, build_cloth
-from vto_pipeline.cloth.rest.coarsening import CoarseGarment, coarsen
+from vto_pipeline.cloth.model.coarsening import CoarseGarment, coarsen
 from vto_pipeline.cloth.rest.convergence import SettlingResult
 from vto_pipeline.cloth.rest.phases import PLACED, REST, ROUGH, Phases
 from vto_pipeline.cloth.rest.true_distance import some_positions, with_true_distances
