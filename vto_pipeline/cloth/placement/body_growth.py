@@ -133,21 +133,27 @@ def plan_body_growth(body: TriangleMesh, garment: TriangleMesh, job: Job) -> Bod
 def _led(first: BodyGrowth, thinning: Thinning) -> Iterator[TriangleMesh]:
     """Yield the garment led onto the limbs, as a whole, and each of these and itself part by part.
 
-    It is led as one of few vertices, which the others follow: cloth that keeps its shape goes a few edges a round, and
-    so a fine garment would not get there.
+    It is led as one of few vertices first, which the others follow: cloth that keeps its shape goes a few edges a
+    round, so that a fine garment takes long, and may not get there. Where few are too few, all are led.
     """
-    garment, body, thin = first.garment, thinning.after(0), thinning.after(_LINES)
+    garment = first.garment
     coarse, prolong = _few_vertices(garment)
-    pieces = first.pieces if coarse is garment else pieces_with_limbs(coarse, thinning.limbs, thin)
-    onto = lead_onto_limbs(coarse, body, thinning.limbs, thin, pieces)
-    whole = TriangleMesh(escape_rigidly(body, coarse), coarse.faces)
-    yield prolong(onto)
-    yield prolong(whole)
-    astray = first.fault[1] > 0
-    for led in (onto, coarse, whole) if astray else (coarse, whole, onto):
+    if coarse is not garment:
+        pieces = pieces_with_limbs(coarse, thinning.limbs, thinning.after(_LINES))
+        yield from map(prolong, _ways(coarse, pieces, thinning, astray=first.fault[1] > 0))
+    yield from _ways(garment, first.pieces, thinning, astray=first.fault[1] > 0)
+
+
+def _ways(garment: TriangleMesh, pieces: list[Piece], thinning: Thinning, *, astray: bool) -> Iterator[TriangleMesh]:
+    body = thinning.after(0)
+    onto = lead_onto_limbs(garment, body, thinning.limbs, thinning.after(_LINES), pieces)
+    whole = TriangleMesh(escape_rigidly(body, garment), garment.faces)
+    yield onto
+    yield whole
+    for led in (onto, garment, whole) if astray else (garment, whole, onto):
         for steps in _LED_BY:
-            led = TriangleMesh(escape_flexibly(thinning.after(steps), led), coarse.faces)
-            yield prolong(led)
+            led = TriangleMesh(escape_flexibly(thinning.after(steps), led), garment.faces)
+            yield led
 
 
 def _few_vertices(garment: TriangleMesh) -> tuple[TriangleMesh, Callable[[TriangleMesh], TriangleMesh]]:
