@@ -111,7 +111,7 @@ class _Run:
         self.store, self.budget = store, budget
         self.memory = math.inf if memory is None else memory
         self.out = OutputFolder(folder / "out", catalogue)
-        self.record = RunRecord(folder / RECORD, request, plan, budget and budget.whole, memory)
+        self.record = RunRecord(folder / RECORD, request, plan, None if budget is None else budget.whole, memory)
         self.results: dict[str, Result] = {}
         self.given_digests: dict[str, str] = {}
 
