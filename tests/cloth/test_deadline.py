@@ -60,9 +60,7 @@ def test_a_look_that_is_cut_short_is_kept_and_tells_no_error(clock):
     stepper, limits = hanging(), SettleLimits(1e-5, 0.01, 60.0, 320)
     looks = 3.5  # of 6 steps
     began = clock[0]
-    found = relax_to_rest(
-        stepper, at_rest(MESH.vertices), SettleLimits(1e-5, 0.01, 60.0, 320, began + looks * 6 * TAKES)
-    )
+    found = relax_to_rest(stepper, at_rest(MESH.vertices), replace(limits, deadline=began + looks * 6 * TAKES))
     assert clock[0] == began + looks * 6 * TAKES  # all of it is used
     assert len(found.trace) == 4
     assert not found.settled

@@ -76,7 +76,9 @@ def _another_minute(run_record: Mapping[str, Any], trace: Sequence[TraceRow]) ->
         left = error_after([row.seconds for row in rows], [row.error_mm for row in rows], _MORE)
         if settled:
             yield f"{said}: nothing more, it is at rest"
-        elif reached is None or left is None:
+        elif reached is None:
+            yield f"{said}: not known, as it has not moved for long enough to tell what is left"
+        elif left is None:
             yield f"{said}: not known, as its error did not fall lately"
         else:
             yield f"{said}: about {left:.2g} mm instead of {reached:.2g}"
