@@ -148,6 +148,12 @@ def test_a_store_cannot_name_files_outside_the_folder(memory, monkeypatch):
         "sftp://user:word@host/a.ply",
         "s3://bucket/a\n.ply",
         "://a",
+        "file:///data?/../../etc/a.ply",
+        "file:///data#/../../etc/a.ply",
+        "s3://bucket/orders?x=/../../a.ply",
+        "s3://bucket/..\\a.ply",
+        "file://~/a.ply",
+        "file://host/a.ply",
     ],
 )
 def test_addresses_that_mean_something_else_are_refused(address):

@@ -70,15 +70,14 @@ def check_address(address: str, where: str) -> None:
             where=where,
             hint=f"it begins with one of {', '.join(f'{one}://' for one in PROTOCOLS)}",
         )
-    parts = urlsplit(address)
-    if "@" in parts.netloc:
-        raise ConfigError(
-            f"the address {parts.scheme}://... holds a user or a password",
-            where=where,
-            hint="leave them to the environment",
-        )
-    if not address.isprintable() or ".." in PurePosixPath(unquote(parts.path)).parts:
+    if "@" in urlsplit(address).netloc:
+        problem = f"the address {protocol}://... holds a user or a password"
+        raise ConfigError(problem, where=where, hint="leave them to the environment")
+    there = address.partition("://")[2]  # not what a parser calls the path: stores do not know ? and #
+    if not address.isprintable() or ".." in re.split(r"[/\\]", unquote(there)):
         raise ConfigError(f"the address {address!a} leads up, or is not plain text", where=where)
+    if protocol == "file" and not there.startswith("/"):
+        raise ConfigError(f"{address} does not begin at the top", where=where, hint="as in file:///data/shirt.ply")
 
 
 def list_files(address: str) -> tuple[RemoteFile, ...]:

@@ -11,6 +11,7 @@ from vto_pipeline.io.documents import read_json, write_json
 from vto_pipeline.io.stores import check_address, copy_there, size_there
 from vto_pipeline.pipeline.batch.ledger import LEDGER
 from vto_pipeline.pipeline.execution.digest import digest_file
+from vto_pipeline.pipeline.execution.folder import RECORD
 
 PUBLISHED = "published.json"
 _SUMMARY = ("page.html", "batch.parquet", "batch.csv", LEDGER)
@@ -49,7 +50,7 @@ class Publisher:
         """
         if row["status"] != "done":
             return 0
-        record, *others = row["files"]
+        record, *others = row.get("files", [f"rows/{row['name']}/{RECORD}"])
         return self.put([*others, *filter(None, [row["picture"]]), record])
 
     def put_batch(self, batch: Mapping[str, Any]) -> str:

@@ -57,9 +57,9 @@ class Roots:
             ConfigError: it is refused.
         """
         check_address(address, where)
-        parts = urlsplit(address)
-        if parts.scheme.lower() == _LOCAL:
-            self.check_path(Path(parts.path), where)
+        protocol, _, there = address.partition("://")
+        if protocol.lower() == _LOCAL:
+            self.check_path(Path(there), where)
             return
         begins = [root.rstrip("/") + "/" for root in self.every if is_address(root)]
         if self.every and not any(address.startswith(begin) for begin in begins):
