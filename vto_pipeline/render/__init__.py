@@ -1,6 +1,7 @@
 """The detailed garment after the drape, and pictures.
 
 dress, transfer: the render mesh rides on the simulation mesh
+clear_body: none of it inside the body
 web: the render mesh within the limits of a web page
 pictures, frames: pictures without a display, and what they frame
 pixels: the kernel that draws them
