@@ -14,8 +14,8 @@ from vto_pipeline.pipeline.execution.budget import TimeBudget
 from vto_pipeline.pipeline.execution.run import run
 from vto_pipeline.pipeline.plan import make_plan
 
-DOCUMENT = "schema: 1\ngiven: {left: {number: left.txt}}\nwant: [squared]\n"
-BEFORE, AFTER = 3.0, 5.0  # s that left.double and square take
+DOCUMENT = "schema: 1\ngiven: {left: {number: left.txt}}\nwant: [squared, page]\n"
+BEFORE, AFTER, PAGE = 3.0, 5.0, 2.0  # s that left.double, square and the page take
 STARTING = 0.5  # s before the engine begins: loading the program
 
 
@@ -29,7 +29,7 @@ class AnytimeConfig(AddConfig):
 def budgeted(ask, tmp_path, monkeypatch):
     """Run the document with a budget: the record, and what the stage add was told, or nothing if it was stored.
 
-    On a clock that only two stages move.
+    On a clock that only three stages move.
     """
     told: list[float | None] = []
     now = 100.0
@@ -47,7 +47,7 @@ def budgeted(ask, tmp_path, monkeypatch):
         told.append(settings.time_budget_s)
         return {"total": sum(inputs.values()) + settings.offset}
 
-    slow = {"left.double": BEFORE, "square": AFTER}
+    slow = {"left.double": BEFORE, "square": AFTER, "page": PAGE}
     stages = [taking(stage, slow[stage.name]) if stage.name in slow else stage for stage in TOY.stages]
     stages = [replace(stage, run=add, settings=AnytimeConfig) if stage.name == "add" else stage for stage in stages]
     tables = Catalogue(tuple(stages), KINDS, GIVEN)
@@ -67,11 +67,11 @@ def test_the_stage_gets_what_is_not_spent_and_not_needed_later(budgeted):
     record, (first,) = budgeted(10.0)
     assert first == 10.0 - STARTING - BEFORE  # what comes later was never measured
     assert record["time_budget_s"] == 10.0
-    assert record["time_spent_s"] == STARTING + BEFORE + AFTER
+    assert record["time_spent_s"] == STARTING + BEFORE + AFTER + PAGE
     add = next(stage for stage in record["stages"] if stage["name"] == "add")
     assert add["metrics"]["time_budget_s"] == first
-    _, (second,) = budgeted(20.0)  # left.double is stored, square took AFTER
-    assert second == pytest.approx(20.0 - STARTING - AFTER, rel=1e-12)  # by way of its logarithm
+    _, (second,) = budgeted(20.0)  # left.double is stored; square and the page took as long as they do
+    assert second == pytest.approx(20.0 - STARTING - AFTER - PAGE, rel=1e-12)  # by way of its logarithm
 
 
 def test_the_same_budget_finds_the_same_result_and_another_does_not(budgeted):
