@@ -142,6 +142,7 @@ def test_a_store_cannot_name_files_outside_the_folder(memory, monkeypatch):
         "simplecache::http://host/a.ply",
         "zip://a.ply::file:///etc/b.zip",
         "reference://x",
+        "s3://bucket/a.ply::file:///etc/a.ply",
         "python://x",
         "s3://bucket/../other/a.ply",
         "s3://bucket/%2E%2e/a.ply",

@@ -11,7 +11,7 @@ from web_folder import served
 
 from vto_pipeline.errors import BatchError, ConfigError, InputError
 from vto_pipeline.io.documents import read_json
-from vto_pipeline.pipeline.batch import publish
+from vto_pipeline.pipeline.batch import inputs, publish
 from vto_pipeline.pipeline.batch.inputs import INDEX, Inputs
 from vto_pipeline.pipeline.batch.order import read_order
 from vto_pipeline.pipeline.batch.publish import Publisher
@@ -45,8 +45,10 @@ def paths(rows: list) -> list[Path]:
     return [Path(row.data["given"]["left"]["number"]) for row in rows]
 
 
-def test_each_content_is_here_once_however_many_rows_and_addresses_name_it(web, tmp_path):
+def test_each_content_is_here_once_however_many_rows_and_addresses_name_it(web, tmp_path, monkeypatch):
     _, address, fetched = web
+    asked, ask = [], inputs.list_files
+    monkeypatch.setattr(inputs, "list_files", lambda one: asked.append(one) or ask(one))
     rows = ordered(tmp_path, *[f"{address}/left.txt"] * 5, f"{address}/same.txt", f"{address}/right.txt")
     said: list[str] = []
     found = paths(Inputs(tmp_path / "inputs", Roots(), said.append).of_rows(rows))
@@ -54,7 +56,7 @@ def test_each_content_is_here_once_however_many_rows_and_addresses_name_it(web, 
     assert len(set(found[:5])) == 1
     assert found[0].parent == found[5].parent  # two names of one content, in the folder of its digest
     assert sorted(fetched) == ["/left.txt", "/right.txt", "/same.txt"]
-    assert len(said) == 3
+    assert len(said) == len(asked) == 3
     assert {path.name for path in (tmp_path / "inputs").iterdir()} == {*(p.parent.name for p in found), INDEX}
     index = read_json(tmp_path / "inputs" / INDEX)
     assert (tmp_path / "inputs" / index[f"{address}/right.txt"]["path"]).read_text() == "4"
@@ -127,7 +129,7 @@ def test_a_batch_with_roots_asks_no_store_outside_them(tmp_path, monkeypatch, gi
     home.mkdir()
     (tmp_path / "secret.txt").write_text("7")
     (home / "link.txt").symlink_to(tmp_path / "secret.txt")
-    monkeypatch.setattr("vto_pipeline.pipeline.batch.inputs.list_files", lambda address: pytest.fail(address))
+    monkeypatch.setattr(inputs, "list_files", lambda address: pytest.fail(address))
     rows = ordered(tmp_path, given.format(home=home))
     with pytest.raises(ConfigError):
         Inputs(tmp_path / "inputs", Roots((str(home), "s3://bucket/orders"))).check(rows)
@@ -148,10 +150,10 @@ def test_what_lies_under_a_root_is_read(tmp_path, monkeypatch):
     roots = Roots((str(tmp_path / "home"), "memory://orders/"))
     try:
         given = ("memory://orders/left.txt", f"file://{tmp_path}/home/left.txt", str(tmp_path / "home/left.txt"))
-        rows, inputs = ordered(tmp_path, *given), Inputs(tmp_path / "inputs", roots)
-        assert inputs.check(rows)
-        assert not inputs.check(ordered(tmp_path, str(tmp_path / "home/left.txt")))
-        rows = inputs.of_rows(rows)
+        rows, given_there = ordered(tmp_path, *given), Inputs(tmp_path / "inputs", roots)
+        assert given_there.check(rows)
+        assert not given_there.check(ordered(tmp_path, str(tmp_path / "home/left.txt")))
+        rows = given_there.of_rows(rows)
     finally:
         store.rm("/orders", recursive=True)
     planned = plan_rows(
