@@ -109,6 +109,7 @@ def test_a_copy_that_fails_leaves_nothing(web, tmp_path):
         "file://{home}/link.txt",
         "file://{home}/a?/../../secret.txt",
         "file://{home}/a#/../../secret.txt",
+        "file://{home}?/secret.txt",
         "file://~/secret.txt",
         "http://127.0.0.1/left.txt",
         "https://bucket.example/orders/left.txt",
@@ -201,7 +202,11 @@ def test_a_row_is_put_with_its_record_last_and_only_once(batch, tmp_path, monkey
     assert again.put_row(row("a")) == 2
     assert (tmp_path / "there/rows/a/out/draped.ply").read_text() == "another"
     assert again.put_batch({"rows": [row("a"), row("b")]}) == f"4 files were copied to {address}"
+    other = tmp_path / "elsewhere/rows/a/run.json"
+    other.parent.mkdir(parents=True)
+    other.write_text("x" * (batch / "rows/a/run.json").stat().st_size)  # of the same size, but not ours
     assert Publisher(batch, f"file://{tmp_path}/elsewhere").put_row(row("a")) == 3
+    assert other.read_bytes() == (batch / "rows/a/run.json").read_bytes()
 
 
 def test_a_store_that_fails_in_the_middle_loses_nothing_that_is_there(batch, tmp_path, monkeypatch):
