@@ -129,7 +129,8 @@ def test_a_batch_with_roots_asks_no_store_outside_them(tmp_path, monkeypatch, gi
     home = tmp_path / "home"
     home.mkdir()
     (tmp_path / "secret.txt").write_text("7")
-    (home / "link.txt").symlink_to(tmp_path / "secret.txt")
+    if "link" in given:
+        (home / "link.txt").symlink_to(tmp_path / "secret.txt")
     monkeypatch.setattr(inputs, "list_files", lambda address: pytest.fail(address))
     rows = ordered(tmp_path, given.format(home=home))
     with pytest.raises(ConfigError):
