@@ -54,7 +54,7 @@ MACHINE = {"cpu": "a processor", "cores": 2, "threads": 1, "memory_gb": 25.3, "l
 
 def document(*rows: dict) -> dict:
     head = {"bench": "toy", "command": "vto bench toy", "commit": "0123456789ab", "date": "2026-11-23"}
-    return {**head, "machine": MACHINE, "quick": True, "rows": list(rows)}
+    return {**head, "machine": MACHINE, "quick": True, "rows": list(rows), "fronts": "a toy has none"}
 
 
 @pytest.fixture

@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+import sys
 from collections.abc import Iterator
 from datetime import date, datetime, timezone
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -16,6 +18,7 @@ from vto_pipeline.bench import record as record_module
 from vto_pipeline.bench.bench import Bench, Row, Watch
 from vto_pipeline.bench.machine import same_machine, this_machine
 from vto_pipeline.bench.record import Files, run_bench
+from vto_pipeline.bench.report_card.fronts import Trade
 from vto_pipeline.bench.timing import Timing, timed
 
 ROOT = Path(__file__).parents[2]
@@ -45,6 +48,8 @@ def bench_of(monkeypatch):
     def make(counted: Counted) -> Bench:
         bench = Bench("a toy", "toy", lambda document: str(len(document["rows"])).encode())
         monkeypatch.setattr(Bench, "rows", lambda self, quick, watch: counted.rows(quick, watch))
+        trade = Trade(("rms_mm",), lambda quick: lambda row: row.settings["substeps"] == 2)
+        monkeypatch.setitem(sys.modules, "toy", SimpleNamespace(TRADE=trade))
         return bench
 
     return make
@@ -62,6 +67,9 @@ def test_document_and_picture(bench_of, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["toy.json", "toy.png"]
     assert document["bench"] == "toy"
     assert document["command"] == "vto bench toy"
+    (front,) = document["fronts"]
+    assert front["front"] == [f"toy, substeps {k}" for k in range(4)]
+    assert (front["default"], front["verdict"]) == ("toy, substeps 2", "on the front")
     assert date.fromisoformat(document["date"]) <= datetime.now(timezone.utc).date()
     head = ""  # where there is no git
     if shutil.which("git") is not None:

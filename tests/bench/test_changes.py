@@ -9,7 +9,7 @@ import pytest
 
 from vto_pipeline.bench import sample_runs
 from vto_pipeline.bench.bench import Row
-from vto_pipeline.bench.changes import compare_folders, compare_results
+from vto_pipeline.bench.report_card.changes import compare_folders, compare_results
 from vto_pipeline.bench.sample_runs import SAMPLES, run_sample
 from vto_pipeline.bench.timing import Timing
 from vto_pipeline.errors import ConfigError, InputError

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from toy_tables import CALLS
+from web_folder import served
 
 from vto_pipeline.cli.commands import batch
 
@@ -131,3 +132,39 @@ def test_a_folder_without_a_batch_has_no_status(vto) -> None:
     said = vto("status", ".")
     assert said.code == 3
     assert "it has no batch.json" in said.err
+
+
+@pytest.mark.filterwarnings("default")  # of dask and its worker processes
+def test_what_lies_on_a_server_is_run_and_what_is_made_is_put_into_a_store(ordered, tmp_path: Path) -> None:
+    pytest.importorskip("aiohttp")
+    (tmp_path / "web").mkdir()
+    for name, number in (("left.txt", "3"), ("right.txt", "4")):
+        (tmp_path / "web" / name).write_text(number)
+    with served(tmp_path / "web") as (address, fetched):
+        (tmp_path / "order.yaml").write_text(ORDER.replace("right.txt", f"{address}/right.txt"))
+        table = TABLE.replace("left.txt", f"{address}/left.txt").replace("right.txt", f"{address}/right.txt")
+        (tmp_path / "table.csv").write_text(table.replace("true", ""))
+        command = ("batch", "order.yaml", "-o", "november", "--publish", f"file://{tmp_path}/there", "--workers", "1")
+        said = ordered(*command)
+        assert said.code == 0, said.err
+        assert sorted(fetched) == ["/left.txt", "/right.txt"]  # named by three rows each, or two
+        for row, value in (("a", 2 * 3 + 2 * 4 + 1), ("b", 2 * 4 + 2 * 4 + 2), ("c", 2 * 3 + 2 * 4)):
+            assert (tmp_path / "there/rows" / row / "out/squared.txt").read_text() == str(value**2)
+        made = {path.relative_to(tmp_path / "november") for path in (tmp_path / "november").rglob("page.html")}
+        there = {
+            path.relative_to(tmp_path / "there"): path for path in (tmp_path / "there").rglob("*") if path.is_file()
+        }
+        assert made <= set(there)
+        assert all((tmp_path / "november" / name).read_bytes() == path.read_bytes() for name, path in there.items())
+        again = ordered(*command)
+        assert "3 of 3 rows are done and unchanged" in again.err
+        assert "0 files were copied" in again.err
+        assert len(fetched) == 2
+        (tmp_path / "there").rename(tmp_path / "elsewhere")
+        (tmp_path / "there").write_text("no folder")
+        refused = ordered(*command)
+        assert refused.code == 3, refused.err
+        (tmp_path / "table.csv").write_text(table.replace(f"{address}/right", f"{address}/nowhere"))
+        missing = ordered(*command)
+        assert missing.code == 3
+        assert f"row b, {address}/nowhere.txt" in missing.err.replace("\n", "")

@@ -126,10 +126,13 @@ def test_what_got_worse_is_listed(vto, tmp_path):
 
 def test_results_older_than_their_code_are_listed(vto, tmp_path):
     own = contents_of([ROOT / "vto_pipeline/errors.py"])
+    rows = [{"method": "a", "seconds": 2.0, "runs": 3, "compile_s": 1.5}, {"method": "b", "seconds": 4.0}]
+    rows.append({"method": "all stages", "seconds": 6.0})  # the others once more
     heads = {"fresh": own, "old": {**own, "vto_pipeline/units.py": "0" * 40}, "older": None}
     for name, sources in heads.items():
         kept = {} if sources is None else {"sources": sources}
-        (tmp_path / f"{name}.json").write_text(json.dumps({"date": "2026-11-24", "commit": "abc", **kept}))
+        head = {"date": "2026-11-24", "commit": "abc", "rows": rows}
+        (tmp_path / f"{name}.json").write_text(json.dumps({**head, **kept}))
     said = vto("bench", "--stale", "--out", tmp_path)
     assert (said.code, [line.split()[0] for line in said.out.splitlines()[2:]]) == (0, ["fresh", "old", "older"])
     fresh, old, older = said.out.splitlines()[2:]
@@ -137,5 +140,6 @@ def test_results_older_than_their_code_are_listed(vto, tmp_path):
     assert old.endswith("1 of 2 changed: vto_pipeline/units.py")
     assert older.endswith("not kept: measured by an earlier version")
     data = vto("bench", "--stale", "--out", tmp_path, "--json").data
+    assert [one["least_s"] for one in data] == [2.0 * 3 + 1.5 + 4.0] * 3
     assert [one["changed"] for one in data] == [[], ["vto_pipeline/units.py"], None]
     assert vto("bench", "--stale", "--out", tmp_path / "nowhere").code == 3

@@ -75,6 +75,7 @@ class Standing:
     """A cloth that does not move, with so much of its weight not in balance; its method has the exact rest."""
 
     has_exact_rest, can_use_exact_stiffness, was_positive_definite, contact_memory = True, False, False, None
+    out_of_time = False
     substeps, step, steps, pushing_contacts = 1.0, 0.1, 0, 7
 
     def __init__(self, residual):

@@ -16,6 +16,7 @@ class Steps:
     has_exact_rest = can_use_exact_stiffness = True
     pushing_contacts = steps = 0
     contact_memory = None
+    out_of_time = False
 
     def __init__(self):
         self.substeps, self.was_positive_definite, self.exact = 0.5, False, False

@@ -20,6 +20,7 @@ from vto_pipeline.io.files import check_inside
 from vto_pipeline.pipeline.batch import ledger as ledger_module
 from vto_pipeline.pipeline.batch.ledger import LEDGER, Ledger, read_ledger
 from vto_pipeline.pipeline.batch.order import read_order
+from vto_pipeline.pipeline.batch.roots import Roots
 from vto_pipeline.pipeline.batch.row import RowResult, RowTask, run_row
 from vto_pipeline.pipeline.execution.store import Store
 from vto_pipeline.stages.entry import planning
@@ -100,8 +101,8 @@ def fenced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 
     def plan(text: str) -> list:
         order(home, text)
-        rows = read_order(home / "batch.yaml", home)
-        return plan_rows(rows, Store(tmp_path / "cache"), lambda *_: False, False, home)
+        rows = read_order(home / "batch.yaml", Roots((str(home),)))
+        return plan_rows(rows, Store(tmp_path / "cache"), lambda *_: False, False, Roots((str(home),)))
 
     return plan
 
@@ -141,7 +142,7 @@ def test_the_parts_of_a_batch_with_a_root_lie_in_it(fenced, tmp_path: Path, text
     (tmp_path / "table.csv").write_text("name\na\n")
     (tmp_path / "home/batch.yaml").write_text(f"schema: 1\n{text}")
     with pytest.raises(ConfigError, match="lies outside"):
-        read_order(tmp_path / "home/batch.yaml", tmp_path / "home")
+        read_order(tmp_path / "home/batch.yaml", Roots((str(tmp_path / "home"),)))
 
 
 def test_links_in_a_folder_do_not_lead_out_of_a_root(tmp_path: Path) -> None:
@@ -149,10 +150,10 @@ def test_links_in_a_folder_do_not_lead_out_of_a_root(tmp_path: Path) -> None:
     (tmp_path / "home/a.png").write_bytes(b"1")
     (tmp_path / "b.png").write_bytes(b"2")
     (tmp_path / "home/photos/a.png").symlink_to(tmp_path / "home/a.png")
-    check_inside(tmp_path / "home/photos", tmp_path / "home", "here")
+    check_inside(tmp_path / "home/photos", [tmp_path / "home"], "here")
     (tmp_path / "home/photos/b.png").symlink_to("../../b.png")
     with pytest.raises(ConfigError, match="lies outside"):
-        check_inside(tmp_path / "home/photos", tmp_path / "home", "here")
+        check_inside(tmp_path / "home/photos", [tmp_path / "home"], "here")
 
 
 def task(folder: Path, program: str, **limits: float) -> RowTask:

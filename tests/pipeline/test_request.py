@@ -68,6 +68,13 @@ def test_a_missing_file_is_an_input_error_with_its_neighbour(ask):
     assert caught.value.hint.endswith("left.txt?")
 
 
+def test_an_address_is_for_batches(ask):
+    with pytest.raises(InputError, match=r"given.left.number: s3://bucket/left.txt lies in a store") as caught:
+        ask("schema: 1\ngiven:\n  left:\n    number: s3://bucket/left.txt\nwant: [total]")
+    assert caught.value.where.endswith("line 4")
+    assert "vto batch" in caught.value.hint
+
+
 def test_a_preset_may_stand_where_the_kind_allows_one(ask):
     assert ask("schema: 1\ngiven: {word: seven}\nwant: [total]").given["word"].read(Job()) == 7
     assert ask("schema: 1\ngiven: {word: {value: 5}}\nwant: [total]").given["word"].read(Job()) == 5

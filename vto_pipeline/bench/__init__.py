@@ -5,7 +5,7 @@ sources: the files that figures depend on, and which have changed since
 measures: what several benches read off a cloth
 own_process, live_rows: commands that are run one by one, and their rows
 sample_runs: the sample documents, run and held against the truth
-changes: what got better or worse since earlier results
+report_card/: what results say as a whole: the fronts of error against run time, what got better or worse
 cloth/, scaling/, physics/, stability/, collision/, drape/, body/, scan/, peers/: the benches
 samples/: the sample data and its truth
 motion/: how clean motions come out on five bodies; garments in motion

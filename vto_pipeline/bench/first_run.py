@@ -34,6 +34,7 @@ def main() -> None:
         **provenance("make first-run"),
         "machine": this_machine(),
         "rows": [row.as_json() for row in rows],
+        "fronts": "an installation, not an error that time buys",
     }
     write_json(arguments.results / f"first_run_{identity}.json", document)
 

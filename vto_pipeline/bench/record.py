@@ -12,6 +12,7 @@ from vto_pipeline.bench.bench import Bench, Row, Watch
 from vto_pipeline.bench.cloth.comparison import compare, level_as_json
 from vto_pipeline.bench.machine import same_machine, this_machine
 from vto_pipeline.bench.provenance import provenance
+from vto_pipeline.bench.report_card.fronts import fronts
 from vto_pipeline.bench.sources import sources_of
 from vto_pipeline.io.documents import write_json
 from vto_pipeline.io.files import replacing
@@ -59,8 +60,8 @@ def run_bench(
         say: Takes one line of progress.
 
     Returns:
-        The document: {"bench", "command", "commit", "date", "machine", "sources", "quick", "rows"}; with peers also
-        "peers" and "levels", see `comparison`.
+        The document: {"bench", "command", "commit", "date", "machine", "sources", "quick", "rows", "fronts"}; with
+        peers also "peers" and "levels", see `comparison`.
     """
     files = Files.of(name, folder)
     head = {"machine": this_machine(), "sources": sources_of([bench.module])}
@@ -79,6 +80,7 @@ def run_bench(
     measured = [row.as_json() for row in rows.values()]
     command = f"vto bench {name}{' --quick' if quick else ''}"
     document = {"bench": name, "quick": quick, **provenance(command), **head, "rows": measured}
+    document["fronts"] = fronts(bench.module, rows.values(), quick)
     if peers:
         document["peers"] = [row.as_json() for row in peers]
         document["levels"] = [level_as_json(level) for level in compare(rows.values(), peers)]

@@ -3,7 +3,7 @@
 main: the command `vto`, and the one place where errors become messages
 commands/: one file a command
 interrupts: Ctrl-C and SIGTERM, wherever they arrive
-results, budgets: running a document, what it found, and what its budgets bought, in words
+results: running a document, and what it found, in words
 describe: what a file or folder holds
 options, session, progress, tables: options, streams, bars, tables
 setup_system: what the system must hold before the package can be installed

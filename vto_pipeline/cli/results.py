@@ -6,11 +6,12 @@ from collections.abc import Iterator, Mapping
 from itertools import chain
 from typing import Any
 
-from vto_pipeline.cli.budgets import budget_lines
 from vto_pipeline.cli.progress import show_progress
 from vto_pipeline.cli.session import Session
 from vto_pipeline.cli.tables import table_lines
 from vto_pipeline.model.body import Measurements
+from vto_pipeline.pipeline.execution.budget import TimeBudget
+from vto_pipeline.report.budgets import budget_lines
 from vto_pipeline.stages.entry.commands import run_order
 from vto_pipeline.stages.entry.documents import Order
 from vto_pipeline.stages.entry.outcome import Outcome
@@ -19,13 +20,14 @@ _COVERED = 1.96
 """Standard deviations on either side that hold 95 % of a normal distribution."""
 
 
-def perform(session: Session, order: Order, **options: Any) -> None:
+def perform(session: Session, order: Order, time_budget: float | None = None, **options: Any) -> None:
     """Run a document, and print the outcome to stdout.
 
     Args:
         session: Of the command line.
         order: What to run.
-        options: As `run_order` takes them.
+        time_budget: Wall time of the command [s].
+        options: As `run_order` takes them, besides.
 
     Raises:
         VtoError: of whatever kind.
@@ -33,7 +35,8 @@ def perform(session: Session, order: Order, **options: Any) -> None:
     for note in order.notes:
         session.say(note)
     with show_progress(session) as listener:
-        outcome = run_order(order, listener=listener, **options)
+        whole = None if time_budget is None else TimeBudget(time_budget, session.began)
+        outcome = run_order(order, listener=listener, time_budget=whole, **options)
     session.enter("done", run=str(outcome.folder), seconds=outcome.seconds, verdicts=outcome.verdicts)
     session.answer({**outcome.record, "run": str(outcome.folder)}, chain(outcome_lines(outcome), result_lines(outcome)))
 
@@ -45,7 +48,8 @@ def outcome_lines(outcome: Outcome) -> Iterator[str]:
     width = max(len(artifact) for artifact in record["wanted"])
     for artifact in record["wanted"]:
         yield f"  {artifact:<{width}}  {outcome.path(artifact) if outcome.made(artifact) else 'as given'}"
-    yield from budget_lines(outcome)
+    trace = outcome.read("trace") if outcome.made("trace") else ()
+    yield from (f"  {line}" for line in budget_lines(record, trace))
     for name, text in outcome.warnings:
         yield f"  warning from {name.replace('_', ' ')}: {text}"
 

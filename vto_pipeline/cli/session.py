@@ -6,7 +6,7 @@ import json
 import time
 from collections.abc import Iterable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -24,12 +24,14 @@ class Session:
         verbose: Say more.
         quiet: Say nothing but results and errors.
         log: File that receives each event as a line of JSON, or None.
+        began: `time.perf_counter` when the command was given.
     """
 
     json: bool = False
     verbose: bool = False
     quiet: bool = False
     log: Path | None = None
+    began: float = field(default_factory=time.perf_counter)
 
     def answer(self, data: Any, lines: Iterable[str]) -> None:
         """Print the command's result to stdout, as JSON if requested, else as plain lines."""

@@ -11,5 +11,6 @@ sniff: what a path holds
 sandbox: untrusted bytes are parsed in a limited child process
 files, arrays, documents, text_numbers: what readers and writers share
 stalls: folders that do not answer
+stores: object stores and web servers
 lengths: the unit of a file without one
 """

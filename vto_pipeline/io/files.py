@@ -66,22 +66,23 @@ def resolved(path: Path) -> Path:
         raise InputError(f"not a path that can be opened: {e}", where=ascii(str(path))) from None
 
 
-def check_inside(path: Path, root: Path, where: str) -> None:
-    """Refuse a file or folder that lies outside a folder, or that links lead out of.
+def check_inside(path: Path, roots: Collection[Path], where: str) -> None:
+    """Refuse a file or folder that lies in none of some folders, or that links lead out of.
 
     Args:
         path: What is to be read; there need be nothing.
-        root: The folder.
+        roots: The folders.
         where: What names it, for the message.
 
     Raises:
         ConfigError: it does.
     """
-    inside = resolved(root)
+    inside = [resolved(root) for root in roots]
     links = (entry for entry in path.rglob("*") if entry.is_symlink()) if path.is_dir() else ()
     for one in (path, *links):
-        if not resolved(one).is_relative_to(inside):
-            raise ConfigError(f"{one} lies outside {inside}, or links lead there", where=where, hint="see --root")
+        if not any(resolved(one).is_relative_to(root) for root in inside):
+            named = ", ".join(map(str, inside)) or "what may be read"
+            raise ConfigError(f"{one} lies outside {named}, or links lead there", where=where, hint="see --root")
 
 
 def listed(folder: Path, suffixes: Collection[str]) -> tuple[Path, ...]:

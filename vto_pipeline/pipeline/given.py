@@ -13,6 +13,7 @@ from vto_pipeline.errors import ConfigError, InputError, VtoError
 from vto_pipeline.io.documents import Document
 from vto_pipeline.io.files import resolved
 from vto_pipeline.io.stalls import check_answers
+from vto_pipeline.io.stores import is_address
 from vto_pipeline.model.artifact import ArtifactKind
 from vto_pipeline.model.job import Job
 from vto_pipeline.pipeline.catalogue import Catalogue
@@ -79,6 +80,9 @@ def resolve(key: str, value: Any, base: Path, kind: ArtifactKind, where: str) ->
         ConfigError, InputError: as `find_given`.
     """
     if isinstance(value, str):
+        if is_address(value):
+            hint = "`vto batch` copies from stores; elsewhere give files and folders"
+            raise InputError(f"given.{key}: {value} lies in a store, not on a disk", where=where, hint=hint)
         check_answers(base / Path(value).expanduser())
         path = resolved(base / Path(value).expanduser())
         if path.is_dir() and not (kind.in_folder and kind.in_folder(path)):

@@ -1,6 +1,7 @@
 """The report: one page with a 3D view.
 
 page, tables, wording, verdicts, chart: the page and its parts
+budgets: what a run bought with its budgets, in words
 batch_page: the summary of a batch
 scene, layers, packing, scales, render_colors, body_loops: its 3D view
 """

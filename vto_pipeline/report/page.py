@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from vto_pipeline.model.cloth import TraceRow, seconds_within
+from vto_pipeline.report.budgets import budget_lines
 from vto_pipeline.report.chart import log_chart
 from vto_pipeline.report.layers import list_layers
 from vto_pipeline.report.scene import build_page_scene, script_json
@@ -50,6 +51,7 @@ def build_page(run_record: Mapping[str, Any], parts: Mapping[str, Any]) -> str:
         chart=log_chart([row.seconds for row in trace], _distances(trace), "run time [s]", "distance [mm]"),
         trace_end=trace[-1] if trace else None,
         good_enough=[(distance, seconds_within(trace, distance)) for distance in _GOOD_MM],
+        budgets=list(budget_lines(run_record, trace)),
         run=run_record,
         stages=[stage for stage in run_record.get("stages", []) if stage["status"] not in ("left_out", "planned")],
         left_out=left_out_table(run_record),

@@ -25,3 +25,6 @@ def rows(quick: bool, watch: Watch) -> Iterator[Row]:
     """Measure all of them."""
     for part in (scan_rows, coverage_rows, clothed_rows, repeat_rows, measurement_rows, silhouette_rows, extreme_rows):
         yield from part(quick, watch)
+
+
+TRADE = "every way has another input: who has a scan needs no tape, and who has a tape has no scan"

@@ -194,3 +194,6 @@ def _sheet(name: str, swing: Swing, h: float) -> Measured:
         "distance_mm": float(np.sqrt(np.mean(away**2))),
     }
     return timing, errors
+
+
+TRADE = "no integrator is a default here; the default method is measured against all in solvers"

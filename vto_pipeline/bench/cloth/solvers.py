@@ -25,6 +25,7 @@ from vto_pipeline.bench.bench import Measured, Row, Value, Watch
 from vto_pipeline.bench.cloth.iterations import iteration_rows
 from vto_pipeline.bench.cloth.scenes import Scene, hang, measures, shirt, sphere
 from vto_pipeline.bench.measures import distance_mm
+from vto_pipeline.bench.report_card.fronts import Default, Trade
 from vto_pipeline.bench.timing import Timing, clocked, timed
 from vto_pipeline.cloth.dynamics.methods import FRAME, METHODS, choose_method
 from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
@@ -189,3 +190,21 @@ def _reference(case: SolverCase, scene: Scene) -> tuple[ClothState, Measured]:
     coarse, _ = run_scene(scene, half)
     ended, timing = timed(lambda: run_scene(scene, fine), runs=1)
     return ended[0], (timing, _errors(scene, ended, coarse))
+
+
+def _default(quick: bool) -> Default:
+    """Return what tells the method, steps and iterations that each scene takes by itself."""
+    chosen = {}
+    for case in _cases(quick):
+        scene = case.make()
+        found = choose_method(scene.model, scene.start, None, None, None)
+        chosen[case.name, case.settings.get("stiffness")] = (found.method, found.substeps, found.sweeps)
+
+    def is_default(row: Row) -> bool:
+        spent = (row.method, row.settings.get("substeps"), row.settings.get("sweeps"))
+        return chosen.get((row.scene, row.settings.get("stiffness"))) == spent
+
+    return is_default
+
+
+TRADE = Trade(("rms_stretch", "distance_mm"), _default, scene=("stiffness",))

@@ -25,3 +25,6 @@ def rows(quick: bool, watch: Watch) -> Iterator[Row]:
     """Measure all of them."""
     for part in (query_rows, broad_rows, scene_rows, collision_left_out_rows, untangling_rows, friction_rows):
         yield from part(quick, watch)
+
+
+TRADE = "every way finds the same pairs, and all that touch; only their time differs"

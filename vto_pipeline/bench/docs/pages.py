@@ -55,6 +55,8 @@ def _fill(source: Path, results: Results) -> str:
         figure=results.figure,
         rows=results.rows,
         source=results.source,
+        fronts=results.fronts,
+        no_fronts=results.no_fronts,
         day=lambda name: results.document(name)["date"],
         chosen=lambda text: text,
     )

@@ -62,11 +62,33 @@ class Results:
         """
         if name not in self._documents:
             found = read_json(self.folder / f"{name}.json")
-            missing = [key for key in ("command", "commit", "date", "machine", "rows") if key not in found]
+            missing = [key for key in ("command", "commit", "date", "machine", "rows", "fronts") if key not in found]
             if missing:
                 raise InputError(f"results without {', '.join(missing)}", where=str(self.folder / f"{name}.json"))
             self._documents[name] = found
         return self._documents[name]
+
+    def fronts(self, name: str) -> list[Mapping[str, Any]]:
+        """Return where a bench's default stands against its fronts, see `report_card.fronts`; maybe nowhere."""
+        found = self.document(name)["fronts"]
+        return [self._noted(name, entry) for entry in found] if isinstance(found, list) else []
+
+    def no_fronts(self) -> Iterator[tuple[str, str]]:
+        """Yield the results files without fronts, and why."""
+        for name in self.names("*"):
+            if isinstance(why := self.document(name)["fronts"], str):
+                yield name, why
+
+    def _noted(self, name: str, entry: Mapping[str, Any]) -> Mapping[str, Any]:
+        what = f"{entry['scene']}: the default against the front of {entry['error']}"
+        self.note(name, what, entry["verdict"])
+        return entry
+
+    def note(self, name: str, what: str, text: str) -> None:
+        """Record what is quoted from a results file."""
+        document = self.document(name)
+        version = f"{document['date']}, `{document['commit']}`"
+        self.quoted.append(Quoted(text, what, f"{name}.json", version, str(document["command"])))
 
     def rows(self, name: str, **wanted: Value) -> Selection:
         """Return the rows that match.
@@ -208,11 +230,7 @@ class Selection:
         return chosen[0] if len(chosen) == 1 else f"{len(chosen)} rows, {chosen[0]} ..."
 
     def _note(self, key: str, text: str) -> str:
-        document = self.results.document(self.name)
-        version = f"{document['date']}, `{document['commit']}`"
-        self.results.quoted.append(
-            Quoted(text, f"{self._what()}: {key}", f"{self.name}.json", version, str(document["command"]))
-        )
+        self.results.note(self.name, f"{self._what()}: {key}", text)
         return text
 
 

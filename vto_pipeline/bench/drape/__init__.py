@@ -13,6 +13,8 @@ from vto_pipeline.bench.drape.case import DrapeCase
 from vto_pipeline.bench.drape.left_out import drape_left_out_rows
 from vto_pipeline.bench.drape.refinement import refinement_rows
 from vto_pipeline.bench.drape.scanned import scanned_rows
+from vto_pipeline.bench.report_card.fronts import Default, Trade
+from vto_pipeline.cloth.drape_config import DrapeConfig
 
 
 def rows(quick: bool, watch: Watch) -> Iterator[Row]:
@@ -20,3 +22,11 @@ def rows(quick: bool, watch: Watch) -> Iterator[Row]:
     DrapeCase("skirt", "slim", "denim", edge_mm=60.0).drape({"target_error_mm": 0.5})
     for part in (budget_rows, refinement_rows, scanned_rows, drape_left_out_rows):
         yield from part(quick, watch)
+
+
+def _default(quick: bool) -> Default:
+    usual = DrapeConfig.model_validate({}).target_error_mm
+    return lambda row: row.method == "drape" and row.settings.get("target_error_mm") == usual
+
+
+TRADE = Trade(("distance_mm",), _default)

@@ -13,7 +13,9 @@ from vto_pipeline.bench.bench import Measured, Row, Value, Watch
 from vto_pipeline.bench.cloth.scenes import Scene, hang, measures, sphere
 from vto_pipeline.bench.cloth.solvers import timed_run
 from vto_pipeline.bench.peers.peer import Peer, measure_peer
+from vto_pipeline.bench.report_card.fronts import Default, Trade
 from vto_pipeline.bench.timing import Timing
+from vto_pipeline.cloth.dynamics.methods import choose_method
 from vto_pipeline.cloth.dynamics.stepper import StepConfig
 from vto_pipeline.errors import DivergedError, MissingDependencyError
 
@@ -54,7 +56,7 @@ def rows(quick: bool, watch: Watch) -> Iterator[Row]:
     for absent in (peer for peer in PEERS if not peer.installed):
         watch(f"{absent.name} is left out: no package {absent.package}")
     _own(sphere(8), {"self_collision": True})  # compiles
-    for scene in (hang(32), sphere(32)) if quick else (hang(32), hang(64), hang(128), sphere(32), sphere(64)):
+    for scene in _scenes(quick):
         for substeps in _OWN_SUBSTEPS:
             own: dict[str, Value] = {"substeps": substeps, "self_collision": scene.ball is not None}
             yield watch.row(scene.name, "default", own, len(scene.start), partial(_own, scene, own))
@@ -65,6 +67,10 @@ def rows(quick: bool, watch: Watch) -> Iterator[Row]:
                 )
 
 
+def _scenes(quick: bool) -> tuple[Scene, ...]:
+    return (hang(32), sphere(32)) if quick else (hang(32), hang(64), hang(128), sphere(32), sphere(64))
+
+
 def _own(scene: Scene, settings: Mapping[str, Value]) -> Measured:
     try:
         ended, timing = timed_run(scene, StepConfig.model_validate(settings), budget=_PATIENCE)
@@ -72,3 +78,12 @@ def _own(scene: Scene, settings: Mapping[str, Value]) -> Measured:
         return Timing(0.0), {"status": "diverged"}
     assert ended is not None  # only a limit on the time would leave it out
     return timing, {"status": "ended", **measures(scene, ended[0])}
+
+
+def _default(quick: bool) -> Default:
+    """Return what tells our own row with the steps that each scene takes by itself."""
+    usual = {scene.name: choose_method(scene.model, scene.start, None, None, None).substeps for scene in _scenes(quick)}
+    return lambda row: row.method == "default" and row.settings.get("substeps") == usual.get(row.scene)
+
+
+TRADE = Trade(("rms_stretch",), _default)

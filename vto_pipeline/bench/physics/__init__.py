@@ -22,3 +22,6 @@ def rows(quick: bool, watch: Watch) -> Iterator[Row]:
     """Measure all of them. Errors are relative ("_share"); "order" is that of convergence from the row before."""
     for part in (hanging_rows, cantilever_rows, mode_rows, buckling_rows, cusick_rows):
         yield from part(quick, watch)
+
+
+TRADE = "one formulation on finer and finer meshes; how fine a mesh is, the garment decides"

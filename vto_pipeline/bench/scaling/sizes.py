@@ -11,6 +11,7 @@ import numpy as np
 from vto_pipeline.bench.bench import Measured, Row, Value, Watch
 from vto_pipeline.bench.cloth.scenes import hang, measures
 from vto_pipeline.bench.cloth.solvers import timed_run
+from vto_pipeline.bench.report_card.fronts import Trade
 from vto_pipeline.bench.scaling.batches import batch_rows
 from vto_pipeline.bench.scaling.direct_solvers import direct_rows
 from vto_pipeline.bench.scaling.overhead import overhead_rows
@@ -97,3 +98,6 @@ def _cheapest(count: int, substeps: int, patience: float) -> Measured:
             break
         substeps *= 2
     return timing, {**errors, "status": "not reached"}
+
+
+TRADE = Trade(("residual",), lambda quick: lambda row: row.method == "own Cholesky")

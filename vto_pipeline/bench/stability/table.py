@@ -106,3 +106,6 @@ def measured_limit(name: str, case: StabilityCase) -> Measured:
     else:
         verdict = "limited" if LIMIT[name] else "always grows"
     return timing, {"verdict": verdict, **found, **theory}
+
+
+TRADE = "whether a method survives is a yes or a no, not an error that time buys"

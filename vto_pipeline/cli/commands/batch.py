@@ -13,11 +13,12 @@ import click
 
 from vto_pipeline.cli.options import PATH, force_option, log_option, message_options, quiet_option
 from vto_pipeline.cli.session import Session, pass_session
-from vto_pipeline.errors import BatchError
+from vto_pipeline.errors import BatchError, VtoError
 
 if TYPE_CHECKING:
     from vto_pipeline.pipeline.batch.ledger import Ledger
     from vto_pipeline.pipeline.batch.order import Row
+    from vto_pipeline.pipeline.batch.publish import Publisher
     from vto_pipeline.pipeline.batch.row import RowTask
     from vto_pipeline.pipeline.execution.store import Store
     from vto_pipeline.stages.entry.batches import PlannedRow
@@ -35,7 +36,15 @@ PROGRAM = (sys.executable, "-c", "import sys; from vto_pipeline.cli.main import 
 @click.option("--memory", type=click.FloatRange(0.1, 4096), default=6.0, show_default=True, help="Limit of a row [GB].")
 @click.option("--time-limit", type=click.FloatRange(1), default=3600.0, show_default=True, help="Limit of a row [s].")
 @click.option("--retries", type=click.IntRange(0, 10), default=1, show_default=True, help="After a crash of a row.")
-@click.option("--root", type=PATH, metavar="FOLDER", help="Refuse files outside it, for batches from strangers.")
+@click.option(
+    "--root",
+    multiple=True,
+    metavar="FOLDER|ADDRESS",
+    help="Refuse what lies in no such folder or address, for batches from strangers; may be repeated.",
+)
+@click.option(
+    "--publish", metavar="ADDRESS", help="Copy what the rows make to an object store, such as s3://bucket/nov."
+)
 @force_option
 @log_option
 @quiet_option
@@ -50,33 +59,45 @@ def batch_command(
     memory: float,
     time_limit: float,
     retries: int,
-    root: Path | None,
+    root: tuple[str, ...],
+    publish: str | None,
     force_all: bool,
 ) -> None:
     """Run a pipeline document many times, each time with the changes of one row of a table.
 
     All rows are checked before the first one runs. What several rows need is made once. Rows that are done, and whose
     inputs have not changed, are not run again. Exit code 6: some rows failed; the others are whole.
+    Given files may lie in object stores, as in s3://bucket/shirt.ply; each is copied here once.
 
     \b
     vto batch orders.yaml -o batches/november
+    vto batch orders.yaml -o batches/november --publish s3://bucket/november
     vto status batches/november
     """
     from vto_pipeline.pipeline.batch.cluster import default_workers, run_rows
-    from vto_pipeline.pipeline.batch.ledger import Ledger
+    from vto_pipeline.pipeline.batch.inputs import Inputs
+    from vto_pipeline.pipeline.batch.ledger import LEDGER, Ledger, read_ledger
     from vto_pipeline.pipeline.batch.order import read_order
+    from vto_pipeline.pipeline.batch.publish import Publisher
+    from vto_pipeline.pipeline.batch.roots import Roots
     from vto_pipeline.pipeline.batch.time_left import TimeLeft
     from vto_pipeline.pipeline.execution.folder import locked_run_folder
     from vto_pipeline.pipeline.execution.store import Store
     from vto_pipeline.stages.entry.batches import plan_rows
     from vto_pipeline.stages.entry.outcome import open_run
 
-    rows = read_order(document, root)
+    roots = Roots(root)
+    rows = read_order(document, roots)
     folder = (output or Path("runs") / document.stem).absolute()
+    inputs = Inputs(folder / "inputs", roots, session.say)
+    if inputs.check(rows):
+        with locked_run_folder(folder):
+            rows = inputs.of_rows(rows)
     names, store = [row.name for row in rows], Store(folder / "cache")
-    planned = plan_rows(rows, store, Ledger(folder, names).is_done, force_all, root)
+    planned = plan_rows(rows, store, Ledger(folder, names).is_done, force_all, roots.with_folder(folder / "inputs"))
     with locked_run_folder(folder):
         ledger = Ledger(folder, names)
+        publisher = Publisher(folder, publish) if publish else None
         missing = [one for one in planned if not ledger.is_done(one.row.name, one.key)]
         expected = {one.row.name: _expected(one, ledger) for one in missing}
         missing.sort(key=lambda one: -expected[one.row.name])  # the longest first; stable
@@ -85,6 +106,8 @@ def batch_command(
         for one in missing:
             ledger.wait(one.row.name)
         ledger.save()
+        if publisher:
+            publisher.put([LEDGER])  # before hours of work: whether it can be written to
         try:
             missing = list(_finish_stored(session, missing, folder, store, force_all, ledger))
             count = workers or default_workers(1e3 * memory)
@@ -107,10 +130,22 @@ def batch_command(
                     f"{': ' if result.problem or words else ''}{result.problem or words}"
                     f"; about {left.seconds() or 0.0:.0f} s left"
                 )
+                if publisher:
+                    _publish_row(session, publisher, ledger.rows[result.name])
         finally:  # also where it is cancelled
             ledger.save()
             _write_tables(session, folder)
+        if publisher:
+            session.say(publisher.put_batch(read_ledger(folder)))
         _answer(session, folder, ledger)
+
+
+def _publish_row(session: Session, publisher: Publisher, row: Mapping[str, Any]) -> None:
+    """Copy what a row made to the store; where that fails, it is tried again at the end."""
+    try:
+        publisher.put_row(row)
+    except VtoError as error:
+        session.say(f"{row['name']} is not published yet: {error.problem}")
 
 
 def _expected(one: PlannedRow, ledger: Ledger) -> float:

@@ -110,7 +110,7 @@ def _tell_changes(session: Session, earlier: Path, folder: Path, names: tuple[st
     """Print what got better or worse."""
     from dataclasses import asdict
 
-    from vto_pipeline.bench.changes import compare_folders
+    from vto_pipeline.bench.report_card.changes import compare_folders
     from vto_pipeline.cli.tables import table_lines
 
     found = compare_folders(earlier, folder, names)
@@ -137,6 +137,7 @@ def _tell_changes(session: Session, earlier: Path, folder: Path, names: tuple[st
 
 def _tell_stale(session: Session, folder: Path, names: tuple[str, ...]) -> None:
     """Print which results files are older than the code that they measure."""
+    from vto_pipeline.bench.bench import least_seconds
     from vto_pipeline.bench.sources import changed_sources
     from vto_pipeline.cli.tables import table_lines
     from vto_pipeline.errors import InputError
@@ -150,9 +151,12 @@ def _tell_stale(session: Session, folder: Path, names: tuple[str, ...]) -> None:
         document = read_json(folder / f"{name}.json")
         kept, changed = document.get("sources", {}), changed_sources(document)
         facts = {key: document.get(key) for key in ("command", "date", "commit")}
-        data.append({"results": name, **facts, "sources": len(kept), "changed": changed})
-    rows = [(one["results"], one["date"] or "", _staleness(one, session.verbose)) for one in data]
-    session.answer(data, table_lines(("results", "measured", "files it depends on"), rows))
+        taken = {"least_s": round(least_seconds(document["rows"]), 1)}
+        data.append({"results": name, **facts, **taken, "sources": len(kept), "changed": changed})
+    rows = [
+        (one["results"], one["date"] or "", f"{one['least_s']:.0f}", _staleness(one, session.verbose)) for one in data
+    ]
+    session.answer(data, table_lines(("results", "measured", "at least s", "files it depends on"), rows))
 
 
 def _staleness(one: Mapping[str, Any], verbose: bool) -> str:

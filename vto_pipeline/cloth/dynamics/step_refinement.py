@@ -12,8 +12,6 @@ from vto_pipeline.cloth.dynamics.stepper import Stepper
 from vto_pipeline.cloth.model.build import ClothState
 from vto_pipeline.model.cloth import TraceRow
 
-_LOOK = 0.1  # s of cloth time between looks at the clock
-
 
 @dataclass
 class RefinedTrajectory:
@@ -54,7 +52,8 @@ def refine_time_step(
     """
     began = time.perf_counter()
     stepper = make(None)
-    result = RefinedTrajectory(_run(stepper, start, seconds, deadline), stepper)
+    stepper.deadline = deadline
+    result = RefinedTrajectory(stepper.run(start, seconds), stepper)
     while True:
         spent = time.perf_counter() - began
         rms = float(1e3 * result.error)
@@ -64,16 +63,7 @@ def refine_time_step(
         if result.error <= error or late or 2 * result.stepper.substeps > finest:
             return result
         stepper = make(2 * result.stepper.substeps)
-        state = _run(stepper, start, seconds, np.inf)
+        state = stepper.run(start, seconds)
         moved = state.positions - result.state.positions
         result.error = float(np.sqrt((moved**2).sum(axis=1).mean()))
         result.state, result.stepper = state, stepper
-
-
-def _run(stepper: Stepper, state: ClothState, seconds: float, deadline: float) -> ClothState:
-    end = state.time + seconds
-    if deadline == np.inf:
-        return stepper.run(state, seconds)
-    while state.time < end - 1e-9 and time.perf_counter() < deadline:
-        state = stepper.run(state, min(_LOOK, end - state.time))
-    return state

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import ceil
@@ -92,6 +93,7 @@ class Stepper:
         skin: Distance each vertex keeps from surfaces [m], shape (V,); may be raised between runs.
         loose: Vertices that slide on surfaces without friction, shape (V,); none, but may be changed between runs.
         substeps: Steps per 1/60 s; after `prepare`, and may be changed between runs.
+        deadline: `time.perf_counter` by which runs are to be done; may be set between runs.
         steps: Steps taken so far.
         contact_spans: Times contacts were found.
         self_contact: What keeps the cloth from itself, None if nothing does.
@@ -115,8 +117,10 @@ class Stepper:
     ) -> None:
         self.skin = skin
         self.loose = np.zeros(len(skin), np.bool_)
+        self.deadline = np.inf
         self.steps = 0
         self.contact_spans = 0
+        self._last_took = 0.0
         self._model = model
         self._colliders = colliders
         self._config = config
@@ -164,7 +168,7 @@ class Stepper:
             self._method.self_contact = self.self_contact
 
     def run(self, state: ClothState, seconds: float) -> ClothState:
-        """Return the state after so much simulated time [s].
+        """Return the state after so much simulated time [s]; earlier where it is `out_of_time`.
 
         Raises:
             DivergedError: a position is no longer finite.
@@ -174,11 +178,18 @@ class Stepper:
         left = ceil(seconds / h - _WHOLE)
         if abs(left * h - seconds) > _WHOLE * h:  # not a whole number of steps: they are a little shorter
             h = seconds / left
-        while left > 0:
+        while left > 0 and not self.out_of_time:
+            began = time.perf_counter()
             count = min(left, self._steps_per_span(state, h))
             state = self._advance_span(state, h, count)
             left -= count
+            self._last_took = time.perf_counter() - began
         return state
+
+    @property
+    def out_of_time(self) -> bool:
+        """Whether more steps would not be done by the deadline, if they take as long as the last."""
+        return time.perf_counter() + self._last_took > self.deadline
 
     def residual(self, state: ClothState) -> float:
         """Return the residual force; see `residual.relative_residual`."""

@@ -22,6 +22,7 @@ _VAGUE = 3e-3  # m: what is not known to be stable may still buckle by as much, 
 _NEAR = 1e-3  # m a look: slow enough to ask whether it is
 _JAMMED = 100.0  # weights left over: cloth on its way to rest has forces of the order of its weight
 _JAM_LOOKS, _JAM_FALL = 5, 0.8  # looks, and the share that their least residual has to fall below
+_WHOLE = 0.999  # of a look's time: more than rounding takes off
 _SLOWEST = 0.95  # a decay slower than this cannot be told from none
 
 
@@ -111,7 +112,7 @@ def relax_to_rest(
 
     Args:
         stepper: The cloth among its colliders; its steps are changed, and as they were at the end if the rest does not
-            depend on them.
+            depend on them. Its deadline is none at the end.
         state: Where to begin.
         limits: When to stop.
         watch: Receives the share of time used and the error [m] at each look.
@@ -129,16 +130,18 @@ def relax_to_rest(
     coarse: FloatArray | None = None
     quiet = still = 0
     stepper.prepare(state.positions)
+    stepper.deadline = limits.deadline
     exact, newton_steps = stepper.has_exact_rest, StableNewtonSteps(stepper, limits.residual)
     looks, share = 0, 0.0
-    while share < 1.0 and time.perf_counter() < limits.deadline:
+    while share < 1.0 and not stepper.out_of_time:
         before, known = result.state.positions, stepper.contact_memory
         span = newton_steps.span
         after = stepper.run(result.state, span)
         residual = stepper.residual(after)
         looks += 1
         share = looks * LOOK / limits.seconds
-        moved, brief = _rms(after.positions - before), span < LOOK
+        cut_short = stepper.out_of_time and after.time < result.state.time + _WHOLE * span
+        moved, brief = _rms(after.positions - before), span < LOOK or cut_short
         if newton_steps.diverged(residual, moved):
             stepper.contact_memory = known
             continue
@@ -190,6 +193,7 @@ def relax_to_rest(
         stepper.substeps *= 2
     if exact:
         newton_steps.end()
+    stepper.deadline = np.inf
     return result
 
 

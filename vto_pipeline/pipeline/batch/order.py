@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import prod
@@ -16,9 +16,11 @@ from pydantic import Field
 
 from vto_pipeline.errors import ConfigError, MissingDependencyError
 from vto_pipeline.io.documents import Document, check_schema, load_yaml
-from vto_pipeline.io.files import check_file, check_inside
+from vto_pipeline.io.files import check_file
 from vto_pipeline.io.stalls import check_answers
+from vto_pipeline.io.stores import is_address
 from vto_pipeline.model.settings import Config
+from vto_pipeline.pipeline.batch.roots import ANYWHERE, Roots
 from vto_pipeline.pipeline.request import number_or_word
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
@@ -56,15 +58,15 @@ class Row:
     base: Path
 
 
-def read_order(path: Path, root: Path | None = None) -> list[Row]:
+def read_order(path: Path, roots: Roots = ANYWHERE) -> list[Row]:
     """Read a batch document and its table.
 
     Args:
         path: YAML; paths in it, in its pipeline document and in its table start from its own folder.
-        root: Folder that its pipeline document and its table must lie in; None: they may lie anywhere.
+        roots: Where its pipeline document and its table must lie.
 
     Returns:
-        The rows, in their order; `every` repeats each of them.
+        The rows, in their order; `every` repeats each of them. Addresses in stores are as they were written.
 
     Raises:
         ConfigError: an unknown key, a name that is there twice, no row; with file and line.
@@ -76,8 +78,7 @@ def read_order(path: Path, root: Path | None = None) -> list[Row]:
     for name in (batch.run, batch.rows):
         if isinstance(name, str):
             check_answers(base / name)
-            if root is not None:
-                check_inside(base / name, root, str(path))
+            roots.check_path(base / name, str(path))
     whole = _pipeline_document(batch.run, document, base)
     changes = list(_changes(batch, document, base))
     rows: list[Row] = []
@@ -192,19 +193,31 @@ def _changed(document: Mapping[str, Any], change: Mapping[str, Any], where: str)
 
 def _absolute(data: Mapping[str, Any], base: Path) -> dict[str, Any]:
     """Return a document whose given files and folders have absolute paths."""
-    return {**data, "given": _mapped(data.get("given", {}), lambda text: _path(text, base) or text)}
+    return {**data, "given": with_strings_changed(data.get("given", {}), lambda text: _path(text, base) or text)}
 
 
-def _mapped(value: Any, change: Any) -> Any:
+def strings_in(value: Any) -> Iterator[str]:
+    """Yield every string that a document holds as a value."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, Mapping | Sequence):
+        for item in value.values() if isinstance(value, Mapping) else value:
+            yield from strings_in(item)
+
+
+def with_strings_changed(value: Any, change: Callable[[str], str]) -> Any:
+    """Return what a document holds with every string in it changed."""
     if isinstance(value, Mapping):
-        return {key: _mapped(item, change) for key, item in value.items()}
+        return {key: with_strings_changed(item, change) for key, item in value.items()}
     if isinstance(value, Sequence) and not isinstance(value, str):
-        return [_mapped(item, change) for item in value]
+        return [with_strings_changed(item, change) for item in value]
     return change(value) if isinstance(value, str) else value
 
 
 def _path(text: str, base: Path) -> str | None:
     """Return the absolute path of what is there under that name, or None."""
+    if is_address(text):
+        return None
     path = base / Path(text).expanduser()
     try:
         check_answers(path)

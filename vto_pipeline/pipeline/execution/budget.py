@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Collection, Sequence
-
-import numpy as np
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
 
 from vto_pipeline.errors import ConfigError
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.settings import Config
-from vto_pipeline.pipeline.execution.forecast import forecast, latest_record
+from vto_pipeline.pipeline.execution.cost_model import CostModel, step_figures
+from vto_pipeline.pipeline.execution.forecast import forecast
 from vto_pipeline.pipeline.execution.store import Store
 from vto_pipeline.pipeline.plan import Plan, Step
 from vto_pipeline.pipeline.request import Request
@@ -18,27 +18,48 @@ from vto_pipeline.pipeline.request import Request
 SETTING = "time_budget_s"
 """A stage whose settings have this can stop in time; all others take as long as they take."""
 _AT_LEAST = 0.001  # s; the setting is positive
-_FEWEST = 3  # errors that a rate is taken from
+
+
+@dataclass(frozen=True)
+class TimeBudget:
+    """The wall time that a run may take, from the time that this is made.
+
+    Args:
+        seconds: As chosen [s].
+        began: `time.perf_counter` when the user began to wait.
+    """
+
+    seconds: float
+    began: float = field(default_factory=time.perf_counter)
+
+    @property
+    def spent(self) -> float:
+        """Wall time since it began [s]."""
+        return time.perf_counter() - self.began
 
 
 class Budget:
-    """The budget of one run, from the time that this is made.
+    """A time budget, shared out over the stages of one run.
 
     Args:
-        seconds: Wall time of the whole run [s].
+        whole: Of the run.
+        request: What is given.
         plan: Its stages.
-        store: Tells what later stages took before; of one that never ran, nothing is kept back.
+        store: Tells what later stages take, by the cost model; of one that never ran, nothing is kept back.
+        finals: Stage -> time [s] of final stages when they last ran in this folder; the store has none of them.
     """
 
-    def __init__(self, seconds: float, plan: Plan, store: Store) -> None:
-        self.seconds, self._plan, self._store = seconds, plan, store
-        self._began = time.perf_counter()
+    def __init__(
+        self, whole: TimeBudget, request: Request, plan: Plan, store: Store, finals: Mapping[str, float]
+    ) -> None:
+        self.whole, self._plan = whole, plan
+        model, figures = CostModel(store), step_figures(request, plan)
+        self._expected = {name: model.seconds(name, known) or 0.0 for name, known in figures.items()} | dict(finals)
 
     def left_for(self, step: Step) -> float:
         """Return what is left for a stage [s]: neither spent, nor needed by those after it; maybe less than none."""
         later = self._plan.steps[self._plan.steps.index(step) + 1 :]
-        kept = sum(latest_record(self._store, one.stage.name).get("seconds", 0.0) for one in later)
-        return self.seconds - (time.perf_counter() - self._began) - kept
+        return self.whole.seconds - self.whole.spent - sum(self._expected[one.stage.name] for one in later)
 
     def share(self, step: Step, job: Job) -> Config:
         """Return a stage's settings, with what is left as its own budget if it can stop in time.
@@ -50,7 +71,7 @@ class Budget:
         left = self.left_for(step)
         job.measure(time_budget_s=round(left, 1))
         if left <= 0.0:
-            job.warn(f"nothing is left for it of the time budget of {self.seconds:g} s")
+            job.warn(f"nothing is left for it of the time budget of {self.whole.seconds:g} s")
         return step.settings.model_copy(update={SETTING: max(left, _AT_LEAST)})
 
 
@@ -79,25 +100,3 @@ def check_memory(
                 f"the budget is {budget / 1e9:.3g} GB",
                 hint="give more memory, or less to do: `vto plan` shows what each stage takes",
             )
-
-
-def error_after(seconds: Sequence[float], errors: Sequence[float], more: float) -> float | None:
-    """Return the error after more time, if it goes on falling as in the latter half: exponentially, by least squares.
-
-    Args:
-        seconds, errors: Error against run time, in its order; what is not finite does not count.
-        more: Time after the last of them [s].
-
-    Returns:
-        In the unit of the errors; None where it did not fall, or where there are too few to tell.
-    """
-    times, values = np.asarray(seconds, dtype=np.float64), np.asarray(errors, dtype=np.float64)
-    known = np.isfinite(values) & (values > 0.0)
-    times, values = times[known], values[known]
-    if len(times) == 0:
-        return None
-    latter = times >= 0.5 * (times[0] + times[-1])
-    if latter.sum() < _FEWEST:
-        return None
-    rate = float(np.polyfit(times[latter] - times[-1], np.log(values[latter]), 1)[0])
-    return float(values[-1] * np.exp(rate * more)) if rate < 0.0 else None

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 from vto_pipeline.pipeline.execution.cost_model import CostModel, step_figures
 from vto_pipeline.pipeline.execution.digest import OfPath, digest_given, digest_path
 from vto_pipeline.pipeline.execution.key import result_key
-from vto_pipeline.pipeline.execution.store import MANIFEST, Result, Store
+from vto_pipeline.pipeline.execution.store import Result, Store
 from vto_pipeline.pipeline.plan import Plan, Step
 from vto_pipeline.pipeline.request import Request
 
@@ -70,14 +67,3 @@ def stored_results(
             mine = [a for a in stage.makes if plan.makers.get(a) == stage.name]
             digests |= {artifact: result.digest(artifact) for artifact in mine}
         yield step, result
-
-
-def latest_record(store: Store, stage: str) -> Mapping[str, Any]:
-    """Return the record of a stage's newest result that was not skipped, or an empty one."""
-    newest: tuple[float, Mapping[str, Any]] = (0.0, {})
-    for manifest in sorted((store.folder / stage).glob(f"*/{MANIFEST}")):
-        with suppress(OSError, ValueError, KeyError):  # gone meanwhile, or not ours
-            record = json.loads(manifest.read_text(encoding="utf-8"))["record"]
-            if not record["reason"]:
-                newest = max(newest, (manifest.stat().st_mtime, record), key=lambda one: one[0])
-    return newest[1]

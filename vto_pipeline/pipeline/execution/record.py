@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 
 import vto_pipeline
-from vto_pipeline.io.documents import write_json
+from vto_pipeline.errors import InputError
+from vto_pipeline.io.documents import read_json, write_json
 from vto_pipeline.model.job import Job
+from vto_pipeline.pipeline.execution.budget import TimeBudget
 from vto_pipeline.pipeline.execution.cost import Meter, machine, thread_count
 from vto_pipeline.pipeline.execution.cost_model import step_figures
 from vto_pipeline.pipeline.execution.key import versions
@@ -66,9 +68,14 @@ class RunRecord:
     """All of run.json, kept in step with the run."""
 
     def __init__(
-        self, path: Path, request: Request, plan: Plan, time_budget: float | None = None, memory: float | None = None
+        self,
+        path: Path,
+        request: Request,
+        plan: Plan,
+        time_budget: TimeBudget | None = None,
+        memory: float | None = None,
     ) -> None:
-        self._path, self._meter = path, Meter()
+        self._path, self._meter, self._time_budget = path, Meter(), time_budget
         uses = sorted({name for step in plan.steps for name in step.stage.uses})
         figures = step_figures(request, plan)
         self.stages = {name: StageRecord(name, figures=known) for name, known in figures.items()}
@@ -82,18 +89,29 @@ class RunRecord:
             "wanted": list(request.want),
             "given": {artifact: _given(one) for artifact, one in request.given.items()},
             "seed": request.seed,
-            "time_budget_s": time_budget,
+            "time_budget_s": time_budget and time_budget.seconds,
             "memory_budget_mb": None if memory is None else memory / 1e6,
         }
 
     def as_dict(self) -> dict[str, Any]:
         """What run.json holds."""
         stages = [asdict(stage) for stage in self.stages.values()]
-        return {**self._head, "stages": stages, "seconds": self._meter.seconds()}
+        spent = self._time_budget and round(self._time_budget.spent, 3)
+        return {**self._head, "stages": stages, "seconds": self._meter.seconds(), "time_spent_s": spent}
 
     def save(self) -> None:
         """Write run.json, whole or not at all."""
         write_json(self._path, self.as_dict())
+
+
+def final_seconds(path: Path, plan: Plan) -> dict[str, float]:
+    """Return what the final stages of a plan took when they last ran [s], as far as run.json tells."""
+    names = {step.stage.name for step in plan.steps if step.stage.final}
+    try:
+        stages = read_json(path)["stages"]
+        return {one["name"]: float(one["seconds"]) for one in stages if one["name"] in names and one["status"] == "ran"}
+    except (InputError, KeyError, TypeError, ValueError):  # none yet, or not ours
+        return {}
 
 
 def plain(value: Any) -> Any:

@@ -13,7 +13,7 @@ from vto_pipeline.errors import ComputationError, ConfigError, InputError, VtoEr
 from vto_pipeline.io.documents import suggest
 from vto_pipeline.model.job import Job
 from vto_pipeline.pipeline.catalogue import Catalogue
-from vto_pipeline.pipeline.execution.budget import Budget, check_memory
+from vto_pipeline.pipeline.execution.budget import Budget, TimeBudget, check_memory
 from vto_pipeline.pipeline.execution.cost import Meter
 from vto_pipeline.pipeline.execution.digest import digest_given
 from vto_pipeline.pipeline.execution.final import make_final
@@ -21,7 +21,7 @@ from vto_pipeline.pipeline.execution.folder import RECORD, locked_run_folder
 from vto_pipeline.pipeline.execution.key import result_key
 from vto_pipeline.pipeline.execution.listener import Listener
 from vto_pipeline.pipeline.execution.out import OutputFolder, write_value
-from vto_pipeline.pipeline.execution.record import RunRecord, StageRecord
+from vto_pipeline.pipeline.execution.record import RunRecord, StageRecord, final_seconds
 from vto_pipeline.pipeline.execution.store import Result, Store
 from vto_pipeline.pipeline.plan import Plan, Step
 from vto_pipeline.pipeline.request import Request
@@ -37,7 +37,7 @@ def run(
     listener: Listener | None = None,
     cache: Path | None = None,
     afresh: str | None = None,
-    time_budget: float | None = None,
+    time_budget: TimeBudget | None = None,
     memory: float | None = None,
 ) -> dict[str, Any]:
     """Run a plan in a folder, resuming from the results of earlier runs.
@@ -51,8 +51,8 @@ def run(
         listener: Receives how it goes.
         cache: Where results are kept, which several runs may share; None: in the run's folder.
         afresh: Stage that is made anew, with all that depends on it, though results are stored.
-        time_budget: Wall time of the whole run [s]; what other stages leave of it is the budget of one that can stop in
-            time. None: each has what its settings say.
+        time_budget: Of the whole run; what other stages leave of it is the budget of one that can stop in time. None:
+            each has what its settings say.
         memory: Budget of the process's resident memory [B], for each stage; None: what the machine has.
 
     Returns:
@@ -67,7 +67,8 @@ def run(
     renewed = _dependents(afresh, plan) if afresh is not None else frozenset()
     with locked_run_folder(folder, [path for one in request.given.values() for path in one.paths]):
         store = Store(folder / "cache" if cache is None else cache)
-        budget = None if time_budget is None else Budget(time_budget, plan, store)
+        finals = final_seconds(folder / RECORD, plan)
+        budget = None if time_budget is None else Budget(time_budget, request, plan, store, finals)
         if memory is not None:
             check_memory(memory, request, plan, store, force_all, renewed)
         runner = _Run(
@@ -110,7 +111,7 @@ class _Run:
         self.store, self.budget = store, budget
         self.memory = math.inf if memory is None else memory
         self.out = OutputFolder(folder / "out", catalogue)
-        self.record = RunRecord(folder / RECORD, request, plan, None if budget is None else budget.seconds, memory)
+        self.record = RunRecord(folder / RECORD, request, plan, None if budget is None else budget.whole, memory)
         self.results: dict[str, Result] = {}
         self.given_digests: dict[str, str] = {}
 

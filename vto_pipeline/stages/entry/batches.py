@@ -11,8 +11,8 @@ from typing import Any
 
 from vto_pipeline.errors import VtoError
 from vto_pipeline.io.documents import Document
-from vto_pipeline.io.files import check_inside
 from vto_pipeline.pipeline.batch.order import Row
+from vto_pipeline.pipeline.batch.roots import ANYWHERE, Roots
 from vto_pipeline.pipeline.catalogue import Catalogue
 from vto_pipeline.pipeline.execution.cost_model import CostModel, size_of, step_figures
 from vto_pipeline.pipeline.execution.digest import digest_path
@@ -51,7 +51,7 @@ def plan_rows(
     store: Store,
     is_done: Callable[[str, str], bool],
     force_all: bool,
-    root: Path | None = None,
+    roots: Roots = ANYWHERE,
 ) -> list[PlannedRow]:
     """Plan every row, so that no mistake waits until hours have passed. A file that rows share is read once.
 
@@ -60,7 +60,7 @@ def plan_rows(
         store: Where the rows keep their results.
         is_done: Name and key of a row -> whether it was done before.
         force_all: Of the runs.
-        root: Folder that all given files must lie in; None: they may lie anywhere.
+        roots: Where all given files must lie.
 
     Raises:
         VtoError: of the first row that is wrong.
@@ -71,9 +71,8 @@ def plan_rows(
     for row in rows:
         try:
             request, plan, _ = _plan(row, tables)
-            if root is not None:
-                for path in [path for one in request.given.values() for path in one.paths]:
-                    check_inside(path, root, row.where)
+            for path in [path for one in request.given.values() for path in one.paths]:
+                roots.check_path(path, row.where)
             key = run_key(request, plan, force_all, of_path)
         except VtoError as error:
             error.where = f"row {row.name}, {error.where or row.where}"

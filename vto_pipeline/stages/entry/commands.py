@@ -11,7 +11,7 @@ from typing import Any
 from vto_pipeline.errors import ComputationError, ConfigError
 from vto_pipeline.io.documents import Document, load_yaml
 from vto_pipeline.io.files import replacing
-from vto_pipeline.pipeline.execution.budget import SETTING
+from vto_pipeline.pipeline.execution.budget import SETTING, TimeBudget
 from vto_pipeline.pipeline.execution.listener import Listener
 from vto_pipeline.pipeline.execution.run import run as run_plan
 from vto_pipeline.stages.entry import planning
@@ -153,7 +153,7 @@ def run_order(
     cache: Path | None = None,
     until: str | None = None,
     afresh: str | None = None,
-    time_budget: float | None = None,
+    time_budget: TimeBudget | None = None,
     target_error: float | None = None,
     memory: float | None = None,
 ) -> Outcome:
@@ -169,7 +169,7 @@ def run_order(
         cache: Where results are kept, which several runs may share; None: in RUN.
         until: Stage to stop after; None: all that is wanted is made.
         afresh: Stage that is made anew with all that depends on it, though results are stored.
-        time_budget: Wall time of the whole run [s]: the drape takes what the other stages leave of it.
+        time_budget: Of the whole run: the drape takes what the other stages leave of it.
         target_error: Error of the drape [m] at which it may end.
         memory: Budget of memory [B], for each stage.
 
@@ -207,8 +207,8 @@ def run_order(
     return Outcome(folder, record, tables)
 
 
-def _budget_settings(time_budget: float | None, target_error: float | None) -> list[str]:
-    found = [] if time_budget is None else [f"{_DRAPE}.{SETTING}={time_budget}"]
+def _budget_settings(time_budget: TimeBudget | None, target_error: float | None) -> list[str]:
+    found = [] if time_budget is None else [f"{_DRAPE}.{SETTING}={time_budget.seconds}"]
     return found if target_error is None else [*found, f"{_DRAPE}.target_error_mm={1e3 * target_error:g}"]
 
 

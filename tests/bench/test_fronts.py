@@ -1,0 +1,95 @@
+"""Fronts of error against run time: against brute force, and the results files against their own rows."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vto_pipeline.bench import BENCHES, sample_runs
+from vto_pipeline.bench.bench import Row
+from vto_pipeline.bench.report_card import fronts as module
+from vto_pipeline.bench.report_card.fronts import NEAR, Trade, distance, fronts
+from vto_pipeline.bench.sample_runs import SAMPLES
+
+RESULTS = sorted((Path(__file__).parents[2] / "docs" / "results").glob("[!f]*.json"))  # first_run is no bench
+
+
+def row(method: str, seconds: float, error: object, scene: str = "hang", **settings) -> Row:
+    return Row(scene, method, settings, 9, seconds, {"error": error})
+
+
+def of(rows: list[Row], monkeypatch, trade: Trade | None = None):
+    trade = trade or Trade(("error",), lambda quick: lambda one: one.method == "ours")
+    monkeypatch.setattr(module, "import_module", lambda name: type("Bench", (), {"TRADE": trade}))
+    return fronts("a bench", rows, False)
+
+
+def nothing_beats(point: np.ndarray, others: np.ndarray) -> bool:
+    """By the definition of dominance, tie by tie."""
+    return not any((o <= point).all() and (o < point).any() for o in others)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_front_is_what_nothing_beats_and_the_distance_is_the_shrinking_it_takes(seed, monkeypatch):
+    rng = np.random.default_rng(seed)
+    points = np.round(rng.uniform(0.5, 3.0, (12, 2)), 1)  # so coarse that there are ties
+    rows = [row("ours" if k == 0 else f"other {k}", *map(float, point)) for k, point in enumerate(points)]
+    (entry,) = of(rows, monkeypatch)
+    front = [r.method for r, point in zip(rows, points, strict=True) if nothing_beats(point, points)]
+    assert sorted(entry["front"]) == sorted(front)
+    shrunk = np.linspace(1.0, 7.0, 60001)
+    first = next(s for s in shrunk if nothing_beats(points[0] / s, points[1:]))
+    assert distance(*points[0], points) == pytest.approx(first, abs=2e-4)  # the step of the search, and its last
+    assert entry["factor"] == pytest.approx(first, abs=7e-4)  # rounded
+    assert (entry["verdict"] == "on the front") == ("ours" in front)
+
+
+def test_the_verdict_is_in_words(monkeypatch):
+    def said(seconds: float) -> str:
+        return of([row("ours", seconds, 2.0), row("other", 1.0, 1.0)], monkeypatch)[0]["verdict"]
+
+    assert said(0.9) == "on the front"
+    assert said(1.08) == "within 10 % of the front: 8 % off"
+    assert said(1.5) == "50 % off the front"
+    assert NEAR == 1.1
+    entry = of([row("ours", 1.0, "nan"), row("other", 1.0, 1.0), row("third", 2.0, 0.5)], monkeypatch)[0]
+    assert entry["verdict"] == "the default was not measured"
+    assert entry["front"] == ["other", "third"]
+
+
+def test_truth_failures_and_other_scenes_do_not_count(monkeypatch):
+    rows = [row("ours", 1.0, 1.0), row("other", 2.0, 2.0), row("reference", 0.1, 0.0), row("failed", 0.0, 0.0)]
+    (entry,) = of([*rows, row("alone", 0.1, 0.1, "sphere")], monkeypatch)
+    assert (entry["scene"], entry["front"]) == ("hang", ["ours"])
+    trade = Trade(("error",), lambda quick: lambda one: True, scene=("stiffness",))
+    rows = [row("a", 1.0, 1.0, stiffness=s, steps=n) for s in (10.0, 20.0) for n in (1, 2)]
+    found = of(rows, monkeypatch, trade)
+    assert [one["scene"] for one in found] == ["hang, stiffness 10", "hang, stiffness 20"]
+    assert found[0]["default"] == "a, steps 1"
+
+
+def test_an_error_of_nothing_at_all_leaves_the_time_to_compare():
+    assert distance(3.0, 0.0, [(1.0, 0.0)]) == 3.0
+    assert distance(3.0, 1.0, [(1.0, 0.0)]) == 3.0
+    assert distance(1.0, 0.0, [(3.0, 0.0)]) == 1.0
+
+
+@pytest.mark.parametrize("path", RESULTS, ids=lambda path: path.stem)
+def test_every_results_file_says_where_todays_default_stands(path):
+    """Against its own rows, by the benches as they are."""
+    document = json.loads(path.read_text())
+    name = document["bench"]
+    bench = BENCHES[name].module if name in BENCHES else sample_runs.__name__
+    assert name in (*BENCHES, *SAMPLES)
+    found = fronts(bench, [Row.from_json(one) for one in document["rows"]], document["quick"])
+    assert document["fronts"] == found, f"{path.name} does not say so: measure it again"
+    assert found, "neither a front nor a reason"
+
+
+@pytest.mark.parametrize("name", BENCHES)
+def test_every_bench_has_a_trade_or_a_reason(name):
+    trade = module.import_module(BENCHES[name].module).TRADE
+    assert isinstance(trade, Trade) or len(trade.split()) > 5
