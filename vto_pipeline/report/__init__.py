@@ -2,5 +2,6 @@
 
 page, tables, wording, verdicts, chart: the page and its parts
 batch_page: the summary of a batch
+card, facts: a card for notebooks; the numbers of a surface
 scene, layers, packing, scales, render_colors, body_loops: its 3D view
 """
