@@ -10,7 +10,8 @@ from pathlib import Path
 from vto_pipeline.errors import FormatError
 from vto_pipeline.io.formats.mtl import find_beside, library_files, named_pictures
 
-_LIBRARY = re.compile(rb"^[ \t]*mtllib[ \t]+(.*?)\s*$", re.MULTILINE)
+_LARGEST_TREE = 100_000_000  # bytes of JSON; a file of that size holds its buffers itself
+_LIBRARY = re.compile(rb"^[ \t]*mtllib[ \t](.*)$", re.MULTILINE)
 
 
 def companions(path: Path) -> dict[str, Path]:
@@ -23,7 +24,7 @@ def companions(path: Path) -> dict[str, Path]:
 
 
 def _of_obj(path: Path) -> Iterator[Path]:
-    names = [line.decode("utf-8", errors="replace") for line in _LIBRARY.findall(path.read_bytes())]
+    names = [line.decode("utf-8", errors="replace").strip() for line in _LIBRARY.findall(path.read_bytes())]
     for library in library_files(path, names):
         yield library
         try:
@@ -35,6 +36,8 @@ def _of_obj(path: Path) -> Iterator[Path]:
 def _of_gltf(path: Path) -> Iterator[Path]:
     from urllib.parse import unquote
 
+    if path.stat().st_size > _LARGEST_TREE:
+        return
     try:
         tree = json.loads(path.read_bytes().decode("utf-8-sig"))
         named = [one["uri"] for key in ("buffers", "images") for one in tree.get(key, []) if "uri" in one]
