@@ -41,6 +41,8 @@ def test_brightness_is_levelled_and_blur_is_less_sharp() -> None:
     assert_allclose(found["sharpness"], 1.0, rtol=0.02)  # a darker picture is as sharp; rounding to bytes
     bright = camera_curve(3.0 * light_of(PHOTO))  # what is clipped is lost, and no fit brings it back
     assert found["psnr_levelled_db"] > 5 + likeness(PHOTO, bright, EVERYWHERE)["psnr_levelled_db"]
+    over = camera_curve(2.5 * light_of(PHOTO)).reshape(-1, 3)  # the clipped part of a photo does not bias the fit
+    assert_allclose(fit_gains(over, PHOTO.reshape(-1, 3)), 2.5, rtol=0.01)  # rounding to bytes
     shifted = np.roll(PHOTO, 3, axis=1)  # nor does it forgive a pattern in the wrong place
     assert (
         likeness(PHOTO, shifted, EVERYWHERE)["psnr_levelled_db"] < likeness(PHOTO, shifted, EVERYWHERE)["psnr_db"] + 4

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -100,7 +102,7 @@ def test_a_picture_that_parts_share_is_taken_once_and_may_repeat_beside_others(t
     parts = [part(1.5 * k, shared) for k in range(5)] + [part(7.5, other)]
     for one in parts[:5]:
         one.visual.material = material
-    parts[2].visual.uv = 1.7 * parts[2].visual.uv - 3.3  # from picture to picture within a triangle
+    parts[2].visual.uv = np.array([2.6, 0.7]) * parts[2].visual.uv - 3.3  # from picture to picture within a triangle
     mesh = read_mesh(written(tmp_path / "a.glb", *parts), unit="m")
     assert mesh.skin is not None
     assert mesh.skin.picture.size < 3 * (5 * shared.size)
@@ -124,6 +126,18 @@ def test_pictures_that_are_too_large_together_are_halved(tmp_path: Path, monkeyp
         atlas.join_pictures(pictures, [100 * place for place in places])
 
 
+def rewrite(path: Path, edit: Callable[[dict[str, Any]], None]) -> None:
+    """Change the JSON of a GLB, whatever its length."""
+    data = path.read_bytes()
+    length = int.from_bytes(data[12:16], "little")
+    tree = json.loads(data[20 : 20 + length])
+    edit(tree)
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    head = data[:8] + (len(data) - length + len(text)).to_bytes(4, "little") + len(text).to_bytes(4, "little")
+    path.write_bytes(head + data[16:20] + text + data[20 + length :])
+
+
 def test_plain_parts_have_their_materials_colours(tmp_path: Path) -> None:
     """Base colours are linear light, and multiply the vertices' own."""
     plain, white = part(0.0, None), part(2.0, None)
@@ -139,6 +153,18 @@ def test_plain_parts_have_their_materials_colours(tmp_path: Path) -> None:
     assert_allclose(found[0], np.broadcast_to(255 * (1.055 * linear ** (1 / 2.4) - 0.055), found[0].shape), atol=1)
     assert (found[1] == 255).all()
     assert np.ptp(found[2].astype(int), axis=0).min() > 50
+
+    def dye(tree):
+        for shape in tree["meshes"]:
+            shape["primitives"][0]["material"] = 0  # that of the plain part
+
+    rewrite(tmp_path / "a.glb", dye)
+    both = read_mesh(tmp_path / "a.glb", unit="m")
+    assert both.colors is not None
+    order = np.argsort(both.vertices[:, 0] > 3.4, kind="stable")[-len(dyed.vertices) :]
+    light = colors[:, :3] / 255 * linear
+    curve = np.where(light <= 0.0031308, 12.92 * light, 1.055 * np.maximum(light, 1e-9) ** (1 / 2.4) - 0.055)
+    assert_allclose(both.colors[order], 255 * curve, atol=2)  # bytes between
     only = read_mesh(written(tmp_path / "b.glb", white), unit="m")
     assert only.colors is None
 
@@ -147,18 +173,14 @@ def test_a_moved_texture_lies_where_the_extension_says(tmp_path: Path) -> None:
     """A quarter turn on paper: (u, v), v down, goes to offset + (v, -u) times scale: counter-clockwise."""
     picture = RNG.integers(0, 256, (40, 40, 3)).astype(np.uint8)
     path = written(tmp_path / "a.glb", part(0.0, picture))
-    data = path.read_bytes()
-    length = int.from_bytes(data[12:16], "little")
-    tree = json.loads(data[20 : 20 + length])
-    chosen = tree["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]
-    chosen["extensions"] = {
-        "KHR_texture_transform": {"offset": [0.25, 0.5], "scale": [0.5, 0.25], "rotation": np.pi / 2}
-    }
-    tree["extensionsUsed"] = ["KHR_texture_transform"]
-    text = json.dumps(tree).encode()
-    text += b" " * (-len(text) % 4)
-    head = data[:8] + (len(data) - length + len(text)).to_bytes(4, "little") + len(text).to_bytes(4, "little")
-    path.write_bytes(head + data[16:20] + text + data[20 + length :])
+
+    def move(tree):
+        chosen = tree["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]
+        change = {"offset": [0.25, 0.5], "scale": [0.5, 0.25], "rotation": np.pi / 2}
+        chosen["extensions"] = {"KHR_texture_transform": change}
+        tree["extensionsUsed"] = ["KHR_texture_transform"]
+
+    rewrite(path, move)
     mesh = read_mesh(path, unit="m")
     assert mesh.skin is not None
     assert mesh.texture is not None

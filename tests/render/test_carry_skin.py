@@ -51,10 +51,11 @@ def test_finer_triangles_lie_between_the_places_and_no_face_bridges_two_charts()
 
 def test_what_was_filled_has_the_one_colour_beside_it() -> None:
     surface = scanned()
-    cap = np.array([[-0.2, 0.9, 0.0], [0.2, 0.9, 0.0], [0.0, 0.9, 0.3]])
-    found = carry_skin(surface, TriangleMesh(cap, np.array([[0, 1, 2]]))).mesh.texture
-    assert np.ptp(found, axis=1).max() == 0
-    assert 0.34 < found[0, 0, 0] % 0.5 < 0.36  # near the top: y = 0.5
+    for size in (1.0, 0.02):
+        cap = np.array([0.0, 0.9, 0.0]) + size * np.array([[-0.2, 0.0, 0.0], [0.2, 0.0, 0.0], [0.0, 0.0, 0.3]])
+        found = carry_skin(surface, TriangleMesh(cap, np.array([[0, 1, 2]]))).mesh.texture
+        assert np.ptp(found, axis=1).max() == 0
+        assert 0.34 < found[0, 0, 0] % 0.5 < 0.36  # near the top: y = 0.5
 
 
 def test_the_row_takes_the_scans_picture_where_the_garment_stands() -> None:
