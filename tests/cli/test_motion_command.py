@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import json
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +13,8 @@ from vto_pipeline.avatar.template.template import template
 from vto_pipeline.io.bodies.avatars import write_avatar
 from vto_pipeline.io.motion.archive import read_avatar_motion
 from vto_pipeline.io.motion.read import read_motion
+from vto_pipeline.io.motion.tracked.lines import LANDMARKS
+from vto_pipeline.numerics.kinematics import quaternion_matrices, world_transforms
 
 HEAD = """HIERARCHY
 ROOT Hips
@@ -66,3 +70,18 @@ def test_presets_have_names_and_mistakes_have_exit_codes(vto):
     Path("file").write_text("")
     assert vto("motion", "sitting", "-o", "file").code == 2
     assert vto("motion", "sitting", "--lead-in", "3").code == 2
+
+
+def test_joints_come_from_standard_input(vto, monkeypatch):
+    step = read_motion("walking_step")
+    _, places = world_transforms(step.clip.parents, quaternion_matrices(step.clip.rotations), step.clip.translations)
+    joints = {name: places[:, k] for name, k in step.joints.indices.items() if name in LANDMARKS}
+    lines = [json.dumps({"joints": {name: place[t].tolist() for name, place in joints.items()}}) for t in range(5)]
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO("\n".join(lines).encode())))
+    said = vto("motion", "-", "-o", "live", "--json")
+    assert said.code == 0
+    assert (said.data["path"], said.data["frames"], said.data["unit"]) == ("-", 5, "m")
+    assert len(read_avatar_motion(Path("live/motion.npz")).poses) == 5
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"nonsense")))
+    said = vto("motion", "-")
+    assert (said.code, "standard_input.jsonl, line 1" in said.err) == (3, True)

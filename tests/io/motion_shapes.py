@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -140,3 +141,35 @@ def write_bvh(path: Path, moves: Moves, **options) -> Path:
     """Write a BVH file; see `bvh_text`."""
     path.write_bytes(bvh_text(moves, **options).encode())
     return path
+
+
+TRACKED = {
+    "shoulder": "Arm",
+    "elbow": "ForeArm",
+    "wrist": "Hand",
+    "hip": "UpLeg",
+    "knee": "Leg",
+    "ankle": "Foot",
+    "toe": "ToeBase",
+}
+"""What a camera follows: our joint -> the bone that begins there."""
+
+
+def tracked_places(moves: Moves) -> dict[str, np.ndarray]:
+    """World places of the joints that a camera follows [m], shape (T, 3) each."""
+    places = moves.places()
+    return {
+        f"{side.lower()}_{ours}": places[:, NAMES.index(f"{side}{bone}")]
+        for ours, bone in TRACKED.items()
+        for side in ("Left", "Right")
+    }
+
+
+def tracked_text(moves: Moves, step_s: float | None = 0.04, size: float = 1.0) -> str:
+    """The same as JSON lines, of a person so many times as large."""
+    found = tracked_places(moves)
+    lines = []
+    for t in range(len(moves.turns)):
+        time = {} if step_s is None else {"time_s": step_s * t}
+        lines.append(json.dumps(time | {"joints": {name: (size * place[t]).tolist() for name, place in found.items()}}))
+    return "\n".join(lines) + "\n"

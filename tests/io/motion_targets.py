@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from motion_shapes import bvh_text, random_moves
+from motion_shapes import bvh_text, random_moves, tracked_text
 from test_motion_formats import person_gltf
 
 from vto_pipeline.io.arrays import Arrays
@@ -17,6 +17,7 @@ from vto_pipeline.io.motion.gltf_animation import parse_animation
 from vto_pipeline.io.motion.keyframes import parse_keyframes
 from vto_pipeline.io.motion.read import presets, understood
 from vto_pipeline.io.motion.smpl_poses import parse_smpl_poses
+from vto_pipeline.io.motion.tracked.parse import parse_tracked
 from vto_pipeline.model.job import Job
 
 
@@ -37,6 +38,7 @@ def write_smpl(path: Path) -> tuple[Path, Callable[[Path], Any]]:
 
 
 MOTIONS: dict[str, tuple[str, str, Callable[[Path], Any]]] = {
+    "motion_jsonl": ("a.jsonl", tracked_text(random_moves(3)), _read(parse_tracked)),
     "motion_bvh": ("a.bvh", bvh_text(random_moves(3), places="all"), _read(parse_bvh)),
     "motion_gltf": ("a.gltf", _gltf(), _read(parse_animation)),
     "motion_yaml": ("a.yaml", presets()["walking_step"].read_text(), _read(parse_keyframes)),

@@ -87,6 +87,22 @@ def test_the_body_is_a_part_of_its_own_unless_it_is_not_wanted() -> None:
     assert len(row.run(inputs, DressConfig(body=False), Job())["render_mesh"]) == 1
 
 
+def test_detail_that_follows_a_coarse_drape_is_not_inside_the_body() -> None:
+    """The simulation's triangles lie about a ball; its detail, 3 mm farther in, would cut into it."""
+    ball, cage = trimesh.creation.icosphere(5, 0.3), trimesh.creation.icosphere(2, 0.31)
+    detail = trimesh.creation.icosphere(5, 0.297)
+    sim, fine = (TriangleMesh(one.vertices, one.faces) for one in (cage, detail))
+    row = next(stage for stage in CATALOGUE.stages if stage.name == "transfer")
+    inputs = {"garment": fine, "sim_mesh": sim, "draped": sim, "collider": MovingBody(ball.vertices[None], ball.faces)}
+    for config, parts in ((DressConfig(), 2), (DressConfig(body=False), 1)):
+        made = row.run(inputs, config, job := Job())["render_mesh"]
+        assert len(made) == parts
+        away = np.linalg.norm(made[0].mesh.vertices, axis=1)
+        assert away.min() > 0.3
+        assert away.max() < 0.302
+        assert job.metrics["moved_out_of_body"] == len(fine.vertices)
+
+
 def test_the_page_shows_the_body_of_a_drape_without_an_avatar() -> None:
     sim = TriangleMesh(sheet().vertices, sheet().faces)
     parts = [GlbPart("garment", sim), GlbPart("body", sim)]

@@ -16,8 +16,9 @@ from vto_pipeline.io.gltf.web import LIMIT_BYTES, write_web_glb
 from vto_pipeline.io.meshes import read_mesh
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.render import GlbPart
+from vto_pipeline.render.clear_body import clear_body
 from vto_pipeline.render.dress import BODY
-from vto_pipeline.render.web import clear_body, shrink_pictures, thin_parts
+from vto_pipeline.render.web import shrink_pictures, thin_parts
 
 RADIUS, TALL = 0.3, 0.8
 RNG = np.random.default_rng(3)

@@ -24,11 +24,11 @@ SOFTWARE_WEBGL = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-
 pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
 
 
-def photograph(folder: Path, parts: dict, *flags: str) -> tuple[np.ndarray, list[str]]:
+def photograph(folder: Path, parts: dict, *flags: str, at: str = "") -> tuple[np.ndarray, list[str]]:
     """The page as pixels, shape (1000, 1000, 3), and what the console said."""
     (folder / "page.html").write_text(build_page(run_record(), parts), encoding="utf-8")
     places = (f"--user-data-dir={folder / 'profile'}", f"--screenshot={folder / 'page.png'}", "--window-size=1000,1000")
-    command = [str(BROWSER), *FLAGS, *flags, *places, (folder / "page.html").as_uri()]
+    command = [str(BROWSER), *FLAGS, *flags, *places, (folder / "page.html").as_uri() + at]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
     said = [line for line in done.stderr.splitlines() if "CONSOLE" in line and "GL Driver Message" not in line]
     with Image.open(folder / "page.png") as image:

@@ -16,8 +16,9 @@ from vto_pipeline.geometry.topology import boundary_loops
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 
+TIGHTER = 0.01
+"""Of stretch beyond that while standing: less is no change that anyone feels."""
 _LEAST = 0.02  # of the garment's area: less of it over a part of the body is no zone
-_TIGHTER = 0.01  # of stretch beyond that while standing: less is no change that anyone feels
 _SLIDES = 0.01  # m: an opening that slides by less stays where it is
 
 
@@ -103,7 +104,7 @@ def verdict(
         for part, found in posed.items()
         if found["p95"] > limit
     }
-    new = {part: both for part, both in tight.items() if both[0] > both[1] + _TIGHTER}
+    new = {part: both for part, both in tight.items() if both[0] > both[1] + TIGHTER}
     parts = [
         f"tight at the {part} (stretched by {now:.0%}, {was:.0%} before)"
         for part, (now, was) in sorted(new.items(), key=lambda item: -item[1][0])

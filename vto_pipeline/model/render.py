@@ -8,6 +8,9 @@ from vto_pipeline.errors import InputError
 from vto_pipeline.model.arrays import ByteArray, FloatArray, freeze
 from vto_pipeline.model.mesh import TriangleMesh
 
+SKIN = (214, 181, 156)
+"""Colour of a body that has none of its own, sRGB."""
+
 
 @dataclass(frozen=True)
 class GlbPart:

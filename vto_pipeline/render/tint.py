@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.render import SKIN
+
+__all__ = ["CLOTH", "MARK", "SKIN", "Rgb", "tint"]
 
 Rgb = tuple[int, int, int]
 
-SKIN: Rgb = (214, 181, 156)
 CLOTH: Rgb = (106, 143, 192)
 MARK: Rgb = (214, 39, 40)
 

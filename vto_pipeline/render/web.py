@@ -1,4 +1,4 @@
-"""Parts within the limits of a web page: fewer triangles, smaller pictures, and no vertex inside the body."""
+"""Parts within the limits of a web page: fewer triangles, smaller pictures."""
 
 from __future__ import annotations
 
@@ -10,24 +10,16 @@ import numpy as np
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.closest import barycentric, closest_points
 from vto_pipeline.geometry.remeshing.decimate import decimate
-from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import concatenate, face_components, face_normals, submesh
+from vto_pipeline.geometry.topology import concatenate, face_components, submesh
 from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.render import GlbPart
-from vto_pipeline.render.dress import BODY
-
-_CLEAR = 0.0005
-"""So far outside of the body garments are held [m]: more than the half step by which a file rounds."""
 
 _TRIES = 4
 """Of thinning out; borders may keep more than was wanted."""
 
 _FEW = 32
 """Triangles that every chart keeps."""
-
-_ROUNDS = 8
-"""Of moving vertices out of the body; in a crease one face's outside may be another's inside."""
 
 
 def thin_parts(parts: Sequence[GlbPart], triangles: int) -> list[GlbPart]:
@@ -54,37 +46,6 @@ def thin_parts(parts: Sequence[GlbPart], triangles: int) -> list[GlbPart]:
 def shrink_pictures(parts: Sequence[GlbPart], side: int) -> list[GlbPart]:
     """Return parts whose pictures are at most so many pixels wide and high."""
     return [part if part.texture is None else replace(part, texture=_shrunk(part.texture, side)) for part in parts]
-
-
-def clear_body(parts: Sequence[GlbPart]) -> tuple[list[GlbPart], int]:
-    """Move what lies inside the body, or all but touches it, just outside.
-
-    Args:
-        parts: One of them may be the body; without it they stay as they are.
-
-    Returns:
-        The parts, and how many vertices were moved.
-    """
-    bodies = [part.mesh for part in parts if part.name == BODY]
-    if not bodies:
-        return list(parts), 0
-    body = concatenate(bodies)
-    distance, outward = SurfaceDistance(body), face_normals(body)
-    cleared, moved = [], 0
-    for part in parts:
-        if part.name == BODY:
-            cleared.append(part)
-            continue
-        vertices = np.array(part.mesh.vertices)
-        for _ in range(_ROUNDS):
-            found = distance.signed(vertices)
-            close = found.distance < 0.5 * _CLEAR
-            if not close.any():
-                break
-            vertices[close] = found.point[close] + _CLEAR * outward[found.face[close]]
-        moved += int((vertices != part.mesh.vertices).any(axis=1).sum())
-        cleared.append(replace(part, mesh=replace(part.mesh, vertices=vertices)))
-    return cleared, moved
 
 
 def _shrunk(picture: ByteArray, side: int) -> ByteArray:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from vto_pipeline.model.arrays import ByteArray
+from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.body import Avatar
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.render import GlbPart
@@ -29,6 +29,7 @@ _PLAIN = (  # artifact, name, group, colour where it has none of its own
     ("garment_surface", "Garment scan", "scan", _CLOTH),
     ("body_surface", "Body scan", "scan", _SKIN),
 )
+_MOVING = (("Garment in motion", "garment", _CLOTH), ("Body in motion", "body", _SKIN))
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,7 @@ class PageLayer:
         paint: Colour of all, as #rrggbb, or of each vertex, shape (V, 3).
         skin: The part with the picture on it, where there is one; it has the mesh's vertices.
         scale: Explains the colours.
+        frames: Where its vertices are in each frame of a motion [m], shape (T, V, 3); None where it stands still.
     """
 
     name: str
@@ -50,6 +52,7 @@ class PageLayer:
     paint: str | ByteArray
     scale: Ramp | Key | None = None
     skin: GlbPart | None = None
+    frames: FloatArray | None = None
 
 
 def list_layers(parts: Mapping[str, Any]) -> list[PageLayer]:
@@ -70,6 +73,13 @@ def list_layers(parts: Mapping[str, Any]) -> list[PageLayer]:
         maps, draped = parts["fit_maps"], parts["draped"]
         layers.append(PageLayer("Stretch", draped, "garment", STRETCH.paint(100 * (maps["stretch"] - 1)), STRETCH))
         layers.append(PageLayer("Clearance", draped, "garment", CLEARANCE.paint(maps["clearance_mm"]), CLEARANCE))
+    if "motion" in parts:
+        for moving, (name, group, color) in zip(parts["motion"], _MOVING, strict=True):
+            first = TriangleMesh(moving.frames[0], moving.faces)
+            layers.append(PageLayer(name, first, group, color, frames=moving.frames))
+            if group == "garment" and "motion_maps" in parts:
+                most = STRETCH.paint(100 * (parts["motion_maps"]["stretch"] - 1))
+                layers.append(PageLayer("Most stretch in motion", first, group, most, STRETCH, frames=moving.frames))
     if "garment_surface" in parts and "labels" in parts:
         surface = parts["garment_surface"]
         layers.append(PageLayer("Labels", surface, "scan", SCAN.paint(np.where(parts["labels"].garment, 0, 1)), SCAN))

@@ -25,7 +25,8 @@ def build_page(run_record: Mapping[str, Any], parts: Mapping[str, Any]) -> str:
         run_record: What run.json holds.
         parts: Artifact -> value, as far as there are any: meshes and avatar for the 3D view with "fit_maps" and
             "labels" for its colours and "crossings" where cloth crosses something, "fit_report" or, of several
-            garments, "fit_reports" by name, "measurements", "openings", "audit", "trace". Others are ignored.
+            garments, "fit_reports" by name, "measurements", "openings", "audit", "trace", and "motion", of garment and
+            body. Others are ignored.
     """
     from jinja2 import Environment, StrictUndefined
 
@@ -34,11 +35,13 @@ def build_page(run_record: Mapping[str, Any], parts: Mapping[str, Any]) -> str:
     environment.globals |= {"figure": figure}
     layers = list_layers(parts)
     trace = parts.get("trace", [])
+    frame_time = parts["motion"][0].frame_time if "motion" in parts else None
     return environment.from_string(_asset("page.html")).render(
         title=_title(parts),
         style=_asset("page.css"),
         viewer=_asset("viewer.js"),
-        scene=script_json(build_page_scene(layers)) if layers else "",
+        scene=script_json(build_page_scene(layers, frame_time)) if layers else "",
+        moves=frame_time is not None,
         verdicts=collect_verdicts(run_record, parts),
         fits=fit_reports(parts),
         measurements=measurement_table(parts.get("measurements"), parts.get("body_measurements")),

@@ -13,8 +13,8 @@ _TRIANGLES = 60_000  # of one mesh
 _TRIANGLES_ALL = 240_000  # of all meshes; keeps the page under 8 MB
 
 
-def build_page_scene(layers: Sequence[PageLayer]) -> dict[str, Any]:
-    """Return geometries, and layers that refer to them by number.
+def build_page_scene(layers: Sequence[PageLayer], frame_time: float | None = None) -> dict[str, Any]:
+    """Return geometries, layers that refer to them by number, and the time between frames of those that move [s].
 
     A mesh that several layers show is packed once. The first layer of each group starts visible, a scan only when there
     is nothing else: what was made from it lies in the same place. A mesh with a picture keeps its triangles.
@@ -23,6 +23,7 @@ def build_page_scene(layers: Sequence[PageLayer]) -> dict[str, Any]:
     whole = {id(layer.mesh) for layer in layers if layer.skin is not None}
     budget = min(_TRIANGLES, _TRIANGLES_ALL // max(len(meshes), 1))
     packed = {key: pack(mesh, len(mesh.faces) if key in whole else budget) for key, mesh in meshes.items()}
+    frames = {id(layer.mesh): layer.frames for layer in layers if layer.frames is not None}
     numbers = {key: number for number, key in enumerate(packed)}
     groups: set[str] = set()
     described = []
@@ -46,7 +47,8 @@ def build_page_scene(layers: Sequence[PageLayer]) -> dict[str, Any]:
                 **paint,
             }
         )
-    return {"geometries": [one.geometry() for one in packed.values()], "layers": described}
+    geometries = [one.moving_geometry(frames[key]) if key in frames else one.geometry() for key, one in packed.items()]
+    return {"geometries": geometries, "layers": described, "frameTime": frame_time}
 
 
 def script_json(value: Any) -> str:

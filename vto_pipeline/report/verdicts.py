@@ -42,6 +42,14 @@ def collect_verdicts(run_record: Mapping[str, Any], parts: Mapping[str, Any]) ->
     for name, report in fit_reports(parts).items():
         tone = "warn" if any(zone["verdict"] in _POOR for zone in report.get("zones", [])) else "good"
         found.append(Verdict(tone, report["verdict"], f"fit of {name}" if name else "fit"))
+    if "motion_report" in parts:
+        report = parts["motion_report"]
+        tight = any(one["most"] > report["stretch_limit"] for one in report["parts"].values())
+        found.append(Verdict("warn" if tight else "good", report["verdict"], "fit"))
+    for record in parts.get("pose_report", {}).get("poses", ()):
+        tight = any(one["p95"] > record["stretch_limit"] for one in record.get("parts", {}).values())
+        tone = "bad" if not record["reached"] else "warn" if tight else "good"
+        found.append(Verdict(tone, record["verdict"], "fit"))
     if not found:
         found.append(Verdict("good", "No stage failed or gave a warning.", "run"))
     return sorted(found, key=lambda verdict: _ORDER.index(verdict.tone))

@@ -19,10 +19,10 @@
 
   const bytes = (base64) => Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
 
-  /** Unit vertex normals, weighted by area, from positions (4 per vertex, 16 bit) and their scale. */
-  function vertexNormals(positions, size, indices) {
-    const normals = new Float32Array((positions.length / 4) * 3);
-    const edge = (p, q, k) => (positions[4 * q + k] - positions[4 * p + k]) * size[k];
+  /** Unit vertex normals, weighted by area, from positions (`stride` numbers a vertex) and their scale. */
+  function vertexNormals(positions, stride, size, indices) {
+    const normals = new Float32Array((positions.length / stride) * 3);
+    const edge = (p, q, k) => (positions[stride * q + k] - positions[stride * p + k]) * size[k];
     for (let t = 0; t < indices.length; t += 3) {
       const [a, b, c] = [indices[t], indices[t + 1], indices[t + 2]];
       const ux = edge(a, b, 0), uy = edge(a, b, 1), uz = edge(a, b, 2);
@@ -55,11 +55,40 @@
       low: packed.low,
       size: packed.size,
       positions: buffer(gl.ARRAY_BUFFER, positions),
-      normals: buffer(gl.ARRAY_BUFFER, vertexNormals(positions, packed.size, indices)),
+      normals: buffer(gl.ARRAY_BUFFER, vertexNormals(positions, 4, packed.size, indices)),
       indices: buffer(gl.ELEMENT_ARRAY_BUFFER, indices),
       count: indices.length,
+      motion: packed.shapes ? unpackMotion(packed, positions, indices) : null,
     };
   });
+
+  /** The mean of a moving mesh [m], three numbers a vertex, and the shapes that are added to it. */
+  function unpackMotion(packed, positions, indices) {
+    const mean = new Float32Array((positions.length / 4) * 3);
+    for (let i = 0; i < mean.length; i++) {
+      const k = i % 3;
+      mean[i] = packed.low[k] + (packed.size[k] * positions[4 * ((i - k) / 3) + k]) / 65535;
+    }
+    const shapes = packed.shapes.map((shape) => new Int16Array(bytes(shape).buffer));
+    return { mean, shapes, step: packed.step, weights: packed.weights, indices };
+  }
+
+  /** Put a moving mesh where it is in a frame; between two frames, in between. */
+  function moveTo(geometry, frame) {
+    const motion = geometry.motion;
+    const first = Math.min(Math.floor(frame), motion.weights.length - 1);
+    const next = Math.min(first + 1, motion.weights.length - 1);
+    const placed = motion.mean.slice();
+    motion.shapes.forEach((shape, k) => {
+      const [a, b] = [motion.weights[first][k], motion.weights[next][k]];
+      const weight = motion.step * (a + (b - a) * (frame - first));
+      for (let i = 0; i < placed.length; i++) placed[i] += weight * shape[i];
+    });
+    for (const [data, into] of [[placed, "positions"], [vertexNormals(placed, 3, [1, 1, 1], motion.indices), "normals"]]) {
+      gl.bindBuffer(gl.ARRAY_BUFFER, geometry[into]);
+      gl.bufferData(gl.ARRAY_BUFFER, data, gl.DYNAMIC_DRAW);
+    }
+  }
 
   const channels = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255);
   const layers = scene.layers.map((layer) => ({
@@ -176,9 +205,10 @@
     gl.uniformMatrix4fv(lensAt, false, lensMatrix());
     for (const layer of layers.filter((one) => one.visible)) {
       const shape = layer.shape;
-      gl.uniform3fv(lowAt, shape.low);
-      gl.uniform3fv(sizeAt, shape.size);
-      attribute(0, shape.positions, 3, gl.UNSIGNED_SHORT, true, 8);
+      gl.uniform3fv(lowAt, shape.motion ? [0, 0, 0] : shape.low);
+      gl.uniform3fv(sizeAt, shape.motion ? [1, 1, 1] : shape.size);
+      if (shape.motion) attribute(0, shape.positions, 3, gl.FLOAT, false, 0);
+      else attribute(0, shape.positions, 3, gl.UNSIGNED_SHORT, true, 8);
       attribute(1, shape.normals, 3, gl.FLOAT, false, 0);
       const skinned = Boolean(layer.skin && layer.skin.ready);
       gl.uniform1i(skinnedAt, skinned);
@@ -312,11 +342,22 @@
     if (layer.group !== group) element("span", "", byId("layers")).className = "gap";
     group = layer.group;
     layer.button = button(layer.name, byId("layers"), () => {
-      const shown = !layer.visible;
-      for (const other of layers) if (other.group === layer.group) other.visible = false;
-      layer.visible = shown;
+      choose(layer, !layer.visible);
       refresh();
     });
+  }
+
+  /** Show or hide a layer. Of each group one is seen, and what moves is not seen beside what stands still. */
+  function choose(layer, shown) {
+    const moves = Boolean(layer.shape.motion);
+    for (const other of layers) if (other.group === layer.group) other.visible = false;
+    layer.visible = shown;
+    if (!shown) return;
+    for (const other of layers.filter((one) => one.visible && Boolean(one.shape.motion) !== moves)) {
+      other.visible = false;
+      const alike = layers.find((one) => one.group === other.group && Boolean(one.shape.motion) === moves);
+      if (alike) alike.visible = true;
+    }
   }
 
   function refresh() {
@@ -345,6 +386,49 @@
     const ticks = element("div", "", box);
     ticks.className = "ticks";
     for (const value of legend.values) element("span", value, ticks);
+  }
+
+  // ---- time --------------------------------------------------------------------------------------------------
+
+  const moving = geometries.filter((one) => one.motion);
+  if (moving.length && byId("time")) {
+    const [slider, clock] = [byId("frame"), byId("clock")];
+    const last = moving[0].motion.weights.length - 1;
+    slider.max = last;
+    let playedAt = null; // when it began, as if from frame 0 [ms]; null while it stands
+
+    const seek = (frame) => {
+      for (const geometry of moving) moveTo(geometry, frame);
+      slider.value = frame;
+      clock.textContent = `${(frame * scene.frameTime).toFixed(2)} s`;
+      if (layers.some((one) => one.visible && one.shape.motion)) {
+        redraw();
+      } else {
+        choose(layers.find((one) => one.shape.motion), true);
+        refresh();
+      }
+    };
+    const step = (now) => {
+      if (playedAt === null) return;
+      seek(((now - playedAt) / (1000 * scene.frameTime)) % (last + 1e-6));
+      requestAnimationFrame(step);
+    };
+    const play = button("Play", byId("time"), () => {
+      const stands = playedAt === null;
+      play.textContent = stands ? "Pause" : "Play";
+      playedAt = stands ? performance.now() - 1000 * scene.frameTime * slider.value : null;
+      if (stands) requestAnimationFrame(step);
+    });
+    byId("time").prepend(play);
+    slider.addEventListener("input", () => {
+      playedAt = null;
+      play.textContent = "Play";
+      seek(Number(slider.value));
+    });
+    for (const geometry of moving) moveTo(geometry, 0);
+    clock.textContent = "0.00 s";
+    const asked = /^#t=(\d+(\.\d+)?)$/.exec(location.hash); // page.html#t=0.8 opens at that time
+    if (asked) seek(Math.min(Number(asked[1]) / scene.frameTime, last));
   }
 
   const SIDES = { Reset: [20, 8], Front: [0, 0], Left: [90, 0], Back: [180, 0], Right: [270, 0] };

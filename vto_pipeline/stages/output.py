@@ -22,9 +22,11 @@ from vto_pipeline.model.settings import Config
 from vto_pipeline.model.texture import TexturedMesh
 from vto_pipeline.pipeline.stage import Stage
 from vto_pipeline.render.carry_skin import carry_skin
+from vto_pipeline.render.clear_body import clear_body
 from vto_pipeline.render.dress import BODY, DressConfig, body_part, deform_render_mesh
 from vto_pipeline.render.marks import mark_places
 from vto_pipeline.report.page import build_page
+from vto_pipeline.stages.motion import shown_motion
 
 Inputs = Mapping[str, Any]
 Outputs = Mapping[str, Any]
@@ -33,8 +35,11 @@ Outputs = Mapping[str, Any]
 def _transfer(inputs: Inputs, settings: DressConfig, job: Job) -> Outputs:
     garment = most_detailed(inputs)
     parts = deform_render_mesh(garment, inputs["sim_mesh"], inputs["draped"], settings, job)
-    if settings.body and "collider" in inputs:
-        parts.append(body_part(inputs["collider"].final, settings))
+    if "collider" in inputs:
+        parts, moved = clear_body([*parts, body_part(inputs["collider"].final, settings)])
+        job.measure(moved_out_of_body=moved)
+        if not settings.body:
+            parts.pop()
     return {"render_mesh": parts}
 
 
@@ -96,6 +101,8 @@ def _page(inputs: Inputs, settings: Config, job: Job) -> Outputs:
         parts["render_mesh"] = [part for part in shown if part.name != BODY]
         if "avatar" not in parts and len(parts["render_mesh"]) < len(shown):
             parts["worn_by"] = next(part.mesh for part in shown if part.name == BODY)
+    if all(name in inputs for name in ("draped_motion", "avatar", "avatar_motion")):
+        parts["motion"] = shown_motion(inputs["draped_motion"], inputs["avatar"], inputs["avatar_motion"])
     places = _crossings(inputs.get("audit", {}))
     if places:
         parts["crossings"] = mark_places(np.array(places))
@@ -151,6 +158,11 @@ STAGES: tuple[Stage, ...] = (
             "render_mesh",
             "fit_report",
             "fit_maps",
+            "draped_motion",
+            "avatar_motion",
+            "motion_maps",
+            "motion_report",
+            "pose_report",
         ),
         makes=("page",),
         run=_page,

@@ -30,6 +30,7 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.render import GlbPart
 from vto_pipeline.pipeline.stage import Stage
+from vto_pipeline.render.clear_body import clear_body
 from vto_pipeline.render.dress import DressConfig, body_part, deform_render_mesh
 from vto_pipeline.stages.output import most_detailed
 
@@ -118,7 +119,7 @@ def _shown(inputs: Inputs, draped: TriangleMesh, body: TriangleMesh, number: int
     shift = np.array([_BESIDE * number, 0.0, 0.0])
     return [
         replace(part, name=f"{name} {part.name}", mesh=replace(part.mesh, vertices=part.mesh.vertices + shift))
-        for part in (*parts, body_part(body, config))
+        for part in clear_body([*parts, body_part(body, config)])[0]
     ]
 
 

@@ -1,5 +1,6 @@
 """Motions and garments in motion, each a command of its own.
 
 __main__: how clean motions come out on five bodies
+tracked: the same motions given as places of their joints
 garments: garments carried through motions: crossings, stretch, time per frame
 """

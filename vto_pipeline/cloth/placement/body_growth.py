@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import diags
 from scipy.sparse.linalg import splu
 
@@ -32,7 +33,8 @@ _STEP = 1e-3  # m²: a limb of radius r shrinks by exp(-1e-3 / r²) a step, a wr
 _MOST = 12  # steps: an arm is a line long before, and a torso still two thirds
 _LINES = 6  # steps after which limbs are lines
 _LED_BY = (0, 3, 6)  # steps of thinning after which the garment is led about the body: the thin one leaves room
-_STILL_WORN = 0.8  # of the body's surface in the garment: with less, it has been led off the body
+_STILL_WORN = 0.5  # of the body's surface that was in the garment: with less, it is led to another part of the body
+_LARGER = (1.1, 1.2, 1.35, 1.5)  # times: so much it may start larger than it is
 
 
 class BodyGrowth(NamedTuple):
@@ -88,8 +90,9 @@ def plan_body_growth(body: TriangleMesh, garment: TriangleMesh, job: Job) -> Bod
 
     Where it crosses however thin, or a limb goes through another opening than is there for it, the garment is not about
     the body, and is led there: sleeve by sleeve onto the limbs, as a whole, part by part about the body, and about
-    thinner ones. Of all that was tried and is still worn, the one with the least crossing and the fewest limbs astray
-    is taken.
+    thinner ones. Of all that was tried and is still worn there, the one with the least crossing and the fewest limbs
+    astray is taken. A garment that is too small for where it is worn starts larger: tight is no reason to be worn
+    elsewhere, a skirt about the neck.
 
     Args:
         body: Closed or with holes [m].
@@ -100,9 +103,10 @@ def plan_body_growth(body: TriangleMesh, garment: TriangleMesh, job: Job) -> Bod
     first = best = thinning.growth(garment)
     if first.fault == (0, 0):
         return first
-    enough = _STILL_WORN * _enclosed(garment, body)
+    area, worn = laplacian(body)[1], _enclosed(garment, body)
+    enough = _STILL_WORN * area[worn].sum()
     for led in _led(first, thinning):
-        if _enclosed(led, body) >= enough:
+        if area[worn & _enclosed(led, body)].sum() >= enough:
             best = min(best, thinning.growth(led), key=lambda one: one.fault)
         if best.fault == (0, 0):
             break
@@ -112,6 +116,8 @@ def plan_body_growth(body: TriangleMesh, garment: TriangleMesh, job: Job) -> Bod
             f"the garment does not surround the body as it stands; it was moved by {np.median(way):.0f} mm (median), "
             f"{way.max():.0f} mm at most, before the body grows"
         )
+    if best.crossing > 0:
+        best = _larger(best, thinning, job)
     if best.crossing > 0:
         job.warn(
             f"the garment does not surround the body: {best.crossing} pairs of triangles cross it even at its thinnest"
@@ -133,10 +139,21 @@ def _led(first: BodyGrowth, thinning: Thinning) -> Iterator[TriangleMesh]:
             yield led
 
 
-def _enclosed(garment: TriangleMesh, body: TriangleMesh) -> float:
-    """Return how much of the body's surface lies inside the garment, its openings closed [m²]."""
-    inside = SurfaceDistance(close_openings(garment)).inside(body.vertices)
-    return float(laplacian(body)[1][inside].sum())
+def _larger(tight: BodyGrowth, thinning: Thinning, job: Job) -> BodyGrowth:
+    """Return the growth with the garment so much larger about its middle that nothing crosses; as it was if none is."""
+    positions = tight.garment.vertices
+    middle = positions.mean(axis=0)
+    for times in _LARGER:
+        larger = thinning.growth(TriangleMesh(middle + times * (positions - middle), tight.garment.faces))
+        if larger.fault == (0, 0):
+            job.warn(f"too small: it starts {times - 1:.0%} larger, where it is worn")
+            return larger
+    return tight
+
+
+def _enclosed(garment: TriangleMesh, body: TriangleMesh) -> NDArray[np.bool_]:
+    """Return which of the body's vertices lie inside the garment, its openings closed, shape (V,)."""
+    return SurfaceDistance(close_openings(garment)).inside(body.vertices)
 
 
 class Thinning:

@@ -11,7 +11,9 @@ from vto_pipeline.io.gltf.principal_shapes import PrincipalShapes, principal_sha
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.body import Avatar
 from vto_pipeline.model.motion import AvatarMotion, ClothMotion
+from vto_pipeline.model.render import SKIN
 from vto_pipeline.numerics.kinematics import continuous_signs, matrix_quaternions, vector_matrices
+from vto_pipeline.numerics.srgb import decode_srgb
 
 _TYPES = {"f4": 5126, "u4": 5125, "u1": 5121}
 _KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
@@ -20,6 +22,11 @@ _LIMIT_BYTES = 2_000_000_000
 _CLOTH_ERROR_M = 1e-3
 """How far the garment may be from its frames, for a file of few morph targets."""
 _CLOTH = {"baseColorFactor": [0.45, 0.55, 0.7, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.9}
+_BODY = {
+    "baseColorFactor": [*decode_srgb(np.array(SKIN, dtype=np.uint8)).tolist(), 1.0],
+    "metallicFactor": 0.0,
+    "roughnessFactor": 0.6,
+}
 _INFLUENCES = 4
 """Joints a vertex may follow: more need a second set of weights, which few viewers read."""
 
@@ -122,9 +129,9 @@ class _Scene:
             WEIGHTS_0=self.accessor(shares.astype("<f4"), _VERTICES),
         )
         faces = self.accessor(avatar.faces.astype("<u4").ravel(), _INDICES)
-        made.meshes.append(
-            g.Mesh(primitives=[g.Primitive(attributes=attributes, indices=faces, mode=4)], name="avatar")
-        )
+        made.materials.append(g.Material(pbrMetallicRoughness=g.PbrMetallicRoughness(**_BODY)))
+        primitive = g.Primitive(attributes=attributes, indices=faces, mode=4, material=len(made.materials) - 1)
+        made.meshes.append(g.Mesh(primitives=[primitive], name="avatar"))
         inverse = np.tile(np.eye(4), (joints, 1, 1))
         inverse[:, 3, :3] = -avatar.joints  # stored by columns
         for j, parent in enumerate(avatar.parents.tolist()):

@@ -69,6 +69,13 @@ def map_joints(names: Sequence[str], parents: Sequence[int], places: FloatArray,
     return JointMap(best, convention, rest)
 
 
+def joints_by_name(names: Sequence[str]) -> tuple[str, dict[str, str]]:
+    """Return the convention that names most joints, and our joint -> the name there."""
+    found = {convention: _by_name(_plain(names), table) for convention, table in _conventions().items()}
+    best = max(found, key=lambda convention: len(found[convention]))
+    return best, {joint: names[k] for joint, k in found[best].items()}
+
+
 @cache
 def _conventions() -> dict[str, dict[str, list[str]]]:
     """Convention -> our joint -> the names it may have, reduced."""

@@ -14,6 +14,7 @@ from vto_pipeline.io.motion.gltf_animation import parse_animation
 from vto_pipeline.io.motion.joint_map import JointMap, map_joints
 from vto_pipeline.io.motion.keyframes import parse_keyframes
 from vto_pipeline.io.motion.smpl_poses import parse_smpl_poses
+from vto_pipeline.io.motion.tracked.parse import parse_tracked
 from vto_pipeline.io.motion.upright import Axes, rest_places, upright
 from vto_pipeline.io.sandbox import run_limited
 from vto_pipeline.model.job import Job
@@ -24,6 +25,7 @@ _LIMIT_BYTES = 300_000_000
 
 PARSERS: dict[str, Callable[[str], Arrays]] = {
     ".bvh": parse_bvh,
+    ".jsonl": parse_tracked,
     ".glb": parse_animation,
     ".gltf": parse_animation,
     ".npz": parse_smpl_poses,
@@ -64,7 +66,8 @@ def read_motion(
     """Read a motion.
 
     Args:
-        path: BVH; glTF or GLB with a skeleton; poses of the SMPL family (.npz); poses in YAML; or the name of a preset.
+        path: BVH; glTF or GLB with a skeleton; poses of the SMPL family (.npz); poses in YAML;
+            joints followed by a camera, as JSON lines (.jsonl); or the name of a preset.
         unit: Unit of length, a key of `units.LENGTH_M`; None: found from the length of the legs.
         up: One of `UP_AXES`; None: the axis along which the body stands.
         job: Notified of what was found, guessed or filled.

@@ -321,6 +321,14 @@ ARTIFACTS: tuple[ArtifactKind, ...] = (
         write_glb_bytes,
     ),
     _json("motion_audit", "motion_audit.json", "checks of each frame of the motion"),
+    _json("motion_report", "motion_report.json", "the fit over the motion: where it gets tight, and when"),
+    ArtifactKind(
+        "motion_maps",
+        "motion_maps.npz",
+        "the most that each place of the draped mesh is stretched in the motion, and when",
+        garments.read_motion_maps,
+        garments.write_maps,
+    ),
     _json("pose_report", "pose_report.json", "the fit in other poses: where it is tight, what slides"),
     ArtifactKind("posed_scene", "poses.glb", "garment and avatar in other poses, side by side", read_glb, write_glb),
     ArtifactKind("trace", "trace.csv", "error against run time", traces.read_trace, traces.write_trace),
@@ -331,7 +339,7 @@ ARTIFACTS: tuple[ArtifactKind, ...] = (
         "fit_maps.npz",
         "stretch, strain, pressure, clearance and ease on the draped mesh",
         garments.read_fit_maps,
-        garments.write_fit_maps,
+        garments.write_maps,
     ),
     ArtifactKind("page", "page.html", "everything on one page", _read_page, _write_page),
 )

@@ -93,8 +93,8 @@ def read_observed(path: Path) -> NDArray[np.bool_]:
     return read_arrays(path, required=("observed",))["observed"].astype(bool)
 
 
-def write_fit_maps(path: Path, maps: Mapping[str, FloatArray]) -> None:
-    """Write fit_maps.npz: figures per vertex of the draped mesh, each of shape (V,)."""
+def write_maps(path: Path, maps: Mapping[str, FloatArray]) -> None:
+    """Write fit_maps.npz or motion_maps.npz: figures per vertex of the draped mesh, each of shape (V,)."""
     write_arrays(path, dict(maps))
 
 
@@ -105,6 +105,15 @@ def read_fit_maps(path: Path) -> dict[str, FloatArray]:
         FormatError: an array is missing.
     """
     return dict(read_arrays(path, required=("stretch", "clearance_mm")))
+
+
+def read_motion_maps(path: Path) -> dict[str, FloatArray]:
+    """Read motion_maps.npz.
+
+    Raises:
+        FormatError: an array is missing.
+    """
+    return dict(read_arrays(path, required=("stretch", "at_s")))
 
 
 def write_rest_shape(path: Path, rest: RestShape) -> None:

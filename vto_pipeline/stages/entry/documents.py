@@ -19,7 +19,7 @@ from vto_pipeline.stages.entry import planning
 _CAPTURES = ("photos", "video", "depth", "cloud", "surface")
 _DRAPED = ("draped", "audit", "trace", "render_mesh", "fit_report", "page")
 _POSED = ("pose_report", "posed_scene")
-_MOVED = ("draped_motion", "motion_audit", "moving_scene")
+_MOVED = ("draped_motion", "motion_audit", "motion_report", "moving_scene")
 
 
 @dataclass(frozen=True)

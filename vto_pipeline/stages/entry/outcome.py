@@ -47,6 +47,8 @@ class Outcome(Presented):
             if artifact.endswith("fit_report") and self.made(artifact):
                 garment = artifact.removesuffix("fit_report").rstrip("_")
                 found.append(f"fit{f' of {garment}' if garment else ''}: {self.read(artifact)['verdict']}")
+        if "motion_report" in self.record["wanted"] and self.made("motion_report"):
+            found.append(self.read("motion_report")["verdict"])
         if "pose_report" in self.record["wanted"] and self.made("pose_report"):
             found += [record["verdict"] for record in self.read("pose_report")["poses"]]
         return found

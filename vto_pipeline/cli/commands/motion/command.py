@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import click
 
@@ -12,6 +17,19 @@ from vto_pipeline.errors import ConfigError
 from vto_pipeline.units import LENGTH_M, TIME_S
 
 _UP = ("+X", "-X", "+Y", "-Y", "+Z", "-Z")
+
+
+@contextmanager
+def _file_of(source: str) -> Iterator[str]:
+    """The file, or what standard input holds, in one."""
+    if source != "-":
+        yield source
+        return
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "standard_input.jsonl"
+        with path.open("wb") as file:
+            shutil.copyfileobj(sys.stdin.buffer, file)
+        yield str(path)
 
 
 @click.command("motion")
@@ -36,13 +54,15 @@ def motion_command(
 ) -> None:
     """Show what a motion holds, and carry it over to an avatar.
 
-    Reads BVH, glTF and GLB with a skeleton, poses of the SMPL family (.npz), and poses in YAML. Presets have names:
-    t_pose, a_pose, arms_down, arms_up, sitting, walking_step.
+    Reads BVH, glTF and GLB with a skeleton, poses of the SMPL family (.npz), and poses in YAML. Also joints that a
+    camera follows, as JSON lines: from a file (.jsonl), or from standard input where FILE is a dash. Presets have
+    names: t_pose, a_pose, arms_down, arms_up, sitting, step, walking_step.
 
     \b
     vto motion walk.bvh
     vto motion walk.bvh --avatar runs/customer/out/avatar.npz -o walk/
     vto motion sitting --avatar avatar.npz -o sitting/
+    depth_camera | vto motion - --avatar avatar.npz -o live/
     """
     from vto_pipeline.avatar.motion.figures import crossing_frames
     from vto_pipeline.avatar.motion.retarget import RetargetConfig, retarget
@@ -59,7 +79,8 @@ def motion_command(
     if output is not None and output.exists() and not output.is_dir():
         raise ConfigError("expected a folder, found a file", where=str(output))
     job = Job()
-    read = read_motion(source, unit=unit, up=up, job=job)
+    with _file_of(source) as file:
+        read = read_motion(file, unit=unit, up=up, job=job)
     body = template() if avatar is None else receive_avatar(avatar)
     session.say(f"carrying over {len(read.clip.rotations)} frames")
     config = RetargetConfig(frames_per_second=fps or 0.0, lead_in_s=lead_in or 0.0)

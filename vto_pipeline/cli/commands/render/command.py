@@ -32,6 +32,7 @@ def _names(ctx: click.Context, param: click.Parameter, value: str) -> list[str]:
 @click.option(
     "--turntable", type=PATH, metavar="FILE.mp4|gif", help="Also a turn of 72 frames, 24 a second; at most 960 px high."
 )
+@click.option("--motion", type=PATH, metavar="FILE.mp4|gif", help="Also the run's motion; at most 960 px high.")
 @click.option(
     "--web", type=PATH, metavar="FILE.glb", help="Also a GLB for web pages: 5 MB, 100,000 triangles, 2048 px at most."
 )
@@ -46,6 +47,7 @@ def render_command(
     views: list[str],
     size: int,
     turntable: Path | None,
+    motion: Path | None,
     web: Path | None,
     obj: Path | None,
     folder: Path | None,
@@ -58,17 +60,19 @@ def render_command(
     \b
     vto render runs/demo --views front,closeup
     vto render runs/demo --turntable demo.mp4
+    vto render runs/walk --views "" --motion walk.mp4
     vto render runs/demo --views "" --web demo.glb
     vto render runs/demo --views "" --obj demo.obj
     """
-    from vto_pipeline.cli.commands.render.draw import draw_turn, draw_views, meshes_of
+    from vto_pipeline.cli.commands.render.draw import draw_motion, draw_turn, draw_views, meshes_of
     from vto_pipeline.cli.commands.render.obj import write_obj_files
     from vto_pipeline.cli.commands.render.parts import check_name
     from vto_pipeline.cli.commands.render.web import write_web
     from vto_pipeline.io.animations import animation_writer
 
-    if turntable is not None:
-        animation_writer(turntable)
+    for moving in (turntable, motion):
+        if moving is not None:
+            animation_writer(moving)
     if web is not None:
         check_name(path, web, ".glb")
     if obj is not None:
@@ -77,6 +81,8 @@ def render_command(
     written: dict[str, Any] = draw_views(session, meshes, views, size, folder or beside)
     if turntable is not None:
         written["turntable"] = draw_turn(session, meshes, turntable, size)
+    if motion is not None:
+        written["motion"] = draw_motion(session, path, motion, size)
     lines = [f"{name:10}{one['file']}  {one['seconds']:.1f} s" for name, one in written.items()]
     answer: dict[str, Any] = {"pictures": written}
     if web is not None:

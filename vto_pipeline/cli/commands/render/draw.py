@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from vto_pipeline.cli.session import Session
 from vto_pipeline.errors import InputError
 from vto_pipeline.model.arrays import ByteArray
 from vto_pipeline.model.mesh import TriangleMesh
 
+if TYPE_CHECKING:
+    from vto_pipeline.render.frames import Frame
+
 _FRAMES, _PER_SECOND = 72, 24.0
-_TURN_PX = 960  # height, at most
+_ANIMATED_PX = 960  # height, at most
+_ASIDE_DEG = 30.0  # towards the person's left: steps and arms are seen, and the front
 _SILENCE_S = 5.0  # between two lines on what is done
 
 
@@ -66,23 +70,46 @@ def draw_views(
 def draw_turn(session: Session, meshes: Sequence[TriangleMesh], path: Path, size: int) -> dict[str, Any]:
     """Draw a turn about the upright; return its file and seconds."""
     from vto_pipeline.io.animations import write_animation
+    from vto_pipeline.render.frames import frame_turn
 
     began = time.perf_counter()
-    write_animation(path, _turn(session, meshes, min(size, _TURN_PX)), _PER_SECOND)
+    scenes = ((meshes, frame) for frame in frame_turn(meshes, _FRAMES))
+    write_animation(path, _told(session, "turntable", scenes, _FRAMES, size), _PER_SECOND)
     return {"file": str(path), "frames": _FRAMES, "seconds": round(time.perf_counter() - began, 3)}
 
 
-def _turn(session: Session, meshes: Sequence[TriangleMesh], size: int) -> Iterator[ByteArray]:
-    from vto_pipeline.render.frames import frame_turn
+def draw_motion(session: Session, run: Path, path: Path, size: int) -> dict[str, Any]:
+    """Draw a run's garment in motion on its avatar, all of it in the picture; return its file and seconds.
+
+    Raises:
+        InputError: the run made no garment in motion.
+    """
+    from vto_pipeline.io.animations import write_animation
+    from vto_pipeline.render.frames import frame_box
+    from vto_pipeline.stages.entry.moving import moving_scene
+    from vto_pipeline.stages.entry.outcome import open_run
+
+    began = time.perf_counter()
+    scene = moving_scene(open_run(run))
+    frame = frame_box(*scene.bounds(), _ASIDE_DEG)
+    pictures = _told(session, "motion", ((scene.at(k), frame) for k in range(len(scene))), len(scene), size)
+    write_animation(path, pictures, scene.frames_per_second)
+    return {"file": str(path), "frames": len(scene), "seconds": round(time.perf_counter() - began, 3)}
+
+
+def _told(
+    session: Session, what: str, scenes: Iterable[tuple[Sequence[TriangleMesh], Frame]], count: int, size: int
+) -> Iterator[ByteArray]:
+    """Draw one picture after another, and say from time to time how many are left."""
     from vto_pipeline.render.pictures import render_picture
 
     began = last = time.perf_counter()
-    for done, frame in enumerate(frame_turn(meshes, _FRAMES)):
+    for done, (meshes, frame) in enumerate(scenes):
         now = time.perf_counter()
         if now - last > _SILENCE_S:
             last = now
-            session.say(f"turntable: {done} of {_FRAMES} frames, {(now - began) / done * (_FRAMES - done):.0f} s left")
-        yield render_picture(meshes, frame, size=_shape(size), shadows=True)
+            session.say(f"{what}: {done} of {count} frames, {(now - began) / done * (count - done):.0f} s left")
+        yield render_picture(meshes, frame, size=_shape(min(size, _ANIMATED_PX)), shadows=True)
 
 
 def _shape(height: int) -> tuple[int, int]:

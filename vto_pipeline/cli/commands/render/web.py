@@ -19,7 +19,8 @@ def write_web(source: Path, path: Path) -> dict[str, Any]:
         InputError: no render mesh, or it cannot be made small enough; FormatError: a broken file.
     """
     from vto_pipeline.io.gltf.web import write_web_glb
-    from vto_pipeline.render.web import clear_body, shrink_pictures, thin_parts
+    from vto_pipeline.render.clear_body import clear_body
+    from vto_pipeline.render.web import shrink_pictures, thin_parts
 
     began = time.perf_counter()
     parts, moved = clear_body(thin_parts(parts_of(source), TRIANGLES))

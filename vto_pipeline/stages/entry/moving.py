@@ -1,0 +1,80 @@
+"""The garment and the avatar of a run in motion, frame by frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from vto_pipeline.avatar.motion.path import avatar_path
+from vto_pipeline.errors import InputError
+from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.motion import BodyPath, ClothMotion
+from vto_pipeline.render.clear_body import outside
+from vto_pipeline.render.tint import SKIN, tint
+from vto_pipeline.render.transfer import Binding, apply, bind
+from vto_pipeline.stages.entry.outcome import Outcome
+from vto_pipeline.stages.entry.shown import shown_artifacts, shown_meshes
+
+
+@dataclass(frozen=True)
+class MovingScene:
+    """A garment and the body that wears it.
+
+    Args:
+        garment: Surfaces as draped, in full detail where the run made that [m].
+        draped: The simulation mesh there [m].
+        cloth: Its frames.
+        body: The avatar on its way.
+    """
+
+    garment: tuple[TriangleMesh, ...]
+    draped: TriangleMesh
+    cloth: ClothMotion
+    body: BodyPath
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        return len(self.cloth.frames)
+
+    @property
+    def frames_per_second(self) -> float:
+        """Of the motion."""
+        return 1.0 / self.cloth.frame_time
+
+    def at(self, frame: int) -> list[TriangleMesh]:
+        """Return the surfaces in a frame, the garment first [m]."""
+        body = TriangleMesh(self.body.at(frame * self.cloth.frame_time), self.body.faces)
+        worn = outside([apply(one, self.cloth.frames[frame]) for one in self._bound], body)
+        moved = [replace(mesh, vertices=place) for mesh, place in zip(self.garment, worn, strict=True)]
+        return [*moved, tint(body, SKIN)]
+
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Return the lowest and the highest corner of the box about all frames [m], each of shape (3,)."""
+        ends = [self.cloth.frames.min(axis=(0, 1)), self.cloth.frames.max(axis=(0, 1))]
+        for frame in range(len(self)):
+            body = self.body.at(frame * self.cloth.frame_time)
+            ends += [body.min(axis=0), body.max(axis=0)]
+        return np.min(ends, axis=0), np.max(ends, axis=0)
+
+    @cached_property
+    def _bound(self) -> list[Binding]:
+        return [bind(mesh, self.draped) for mesh in self.garment]
+
+
+def moving_scene(outcome: Outcome) -> MovingScene:
+    """Return what a run with a motion made.
+
+    Raises:
+        InputError: it made no garment in motion.
+    """
+    if not outcome.made("draped_motion"):
+        raise InputError(
+            "this run made no garment in motion", where=str(outcome.folder), hint="`vto drape --motion`, and let it end"
+        )
+    name = shown_artifacts(outcome, detailed=True)[0]
+    body = avatar_path(outcome.read("avatar"), outcome.read("avatar_motion"))
+    garment = tuple(shown_meshes(name, outcome.read(name)))
+    return MovingScene(garment, outcome.read("draped"), outcome.read("draped_motion"), body)
