@@ -1,11 +1,11 @@
-"""How a fine mesh rides on a coarser one: speed, triangles turned over, and layers taken for each other.
+"""How a fine mesh rides on a coarser one: speed, flipped triangles, and layers taken for each other.
 
 `python -m vto_pipeline.bench.drape.transfer GARMENT...` takes each file as the simulation mesh. The render mesh is the
 same with a vertex on each edge, and up to half a millimetre off along its normals. So it is known which triangles every
 vertex belongs to. A vertex is on the wrong layer where the triangle it rides on has no corner near them.
 
-Violent states are sums of four waves across the garment; the most squeezed and the most stretched edge of all are told.
-A triangle is turned over where it lay within 60 degrees of the surface that it rides on, and now faces against it. The
+Violent states are sums of four waves across the garment; rows have the most squeezed and the most stretched edge.
+A triangle is flipped where it lay within 60 degrees of the surface that it rides on, and now faces against it. The
 worst state counts. Speed is that of a mesh refined until it has 300,000 vertices or more, normals included.
 """
 

@@ -108,7 +108,7 @@ def _bytes(document: GltfDocument, image: Mapping[str, Any]) -> bytes:
             raise FormatError(f"the picture {uri[:80]!r} is not there, or too large", where=str(document.path))
         return beside.read_bytes()
     if not uri.startswith(_DATA):
-        raise FormatError("a picture is no PNG, JPEG or WebP", where=str(document.path))
+        raise FormatError("a picture is not a PNG, JPEG or WebP", where=str(document.path))
     try:
         return b64decode(uri.partition(",")[2], validate=True)
     except ValueError:
