@@ -19,12 +19,12 @@ from vto_pipeline.model.render import GlbPart
 from vto_pipeline.numerics.srgb import srgb_curve
 
 
-def obj_files(path: Path, parts: Sequence[GlbPart]) -> dict[str, Path]:
-    """Return where an OBJ file, its materials and its parts' pictures go: "obj", "mtl" and names of parts -> file."""
+def obj_files(path: Path, parts: Sequence[GlbPart]) -> dict[str | int, Path]:
+    """Return where an OBJ file, its materials and its pictures go: "obj", "mtl" and numbers of parts -> file."""
     stem = _plain_name(path.stem)
     pictured = [k for k, part in enumerate(parts) if part.texture is not None]
-    files = {"obj": path, "mtl": path.with_name(f"{stem}.mtl")}
-    return files | {parts[k].name: path.with_name(f"{stem}_{k}.png") for k in pictured}
+    pictures = {k: path.with_name(f"{stem}_{k}.png") for k in pictured}
+    return {"obj": path, "mtl": path.with_name(f"{stem}.mtl"), **pictures}
 
 
 def write_obj(path: Path, parts: Sequence[GlbPart]) -> None:
@@ -46,11 +46,11 @@ def write_obj(path: Path, parts: Sequence[GlbPart]) -> None:
     if not parts or len(set(names)) != len(names):
         raise InputError(f"an OBJ file needs parts of different names; got {names}")
     files = obj_files(path, parts)
-    for part in parts:
+    for k, part in enumerate(parts):
         if part.texture is not None:
-            with replacing(files[part.name]) as beside:
+            with replacing(files[k]) as beside:
                 Image.fromarray(part.texture).save(beside, format="png")
-    materials = [_material(k, part, files.get(part.name)) for k, part in enumerate(parts)]
+    materials = [_material(k, part, files.get(k)) for k, part in enumerate(parts)]
     with replacing(files["mtl"]) as beside:
         beside.write_text("\n".join(materials), encoding="utf-8")
     colored = any(part.mesh.colors is not None for part in parts)  # readers want as many numbers in every line
