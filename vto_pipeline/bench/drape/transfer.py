@@ -33,8 +33,10 @@ _LAY = 0.5  # cosine
 _MANY = 300_000  # vertices with which the speed is measured
 _REPEATS = 9
 
-_COLUMNS = ("garment", "vertices", "render_vertices", "mvertices_per_s", "bind_s", "rest_error_mm", "flipped")
-_COLUMNS += ("wrong_layer", "least_stretch", "largest_stretch")
+_COLUMNS = (
+    *("garment", "vertices", "render_vertices", "mvertices_per_s", "bind_s", "rest_error_mm", "flipped"),
+    *("wrong_layer", "least_stretch", "largest_stretch"),
+)
 
 
 def refine(mesh: TriangleMesh) -> tuple[TriangleMesh, IntArray]:

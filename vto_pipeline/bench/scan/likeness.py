@@ -63,7 +63,7 @@ def fit_gains(photo: ByteArray, picture: ByteArray) -> FloatArray:
     """
     light, gains = decode_srgb(np.arange(256).astype(np.uint8)), np.ones(3)
     for channel in range(3):  # a picture has 256 levels, so that sums over each are all that the fit needs
-        count = np.bincount(picture[:, channel], minlength=256)
+        count = np.bincount(picture[:, channel], minlength=256).astype(float)
         mean = np.bincount(picture[:, channel], photo[:, channel], 256) / np.maximum(count, 1)
 
         def error(log_gain: float, count: FloatArray = count, mean: FloatArray = mean) -> float:

@@ -23,7 +23,7 @@ def obj_files(path: Path, parts: Sequence[GlbPart]) -> dict[str | int, Path]:
     """Return where an OBJ file, its materials and its pictures go: "obj", "mtl" and numbers of parts -> file."""
     stem = _plain_name(path.stem)
     pictured = [k for k, part in enumerate(parts) if part.texture is not None]
-    pictures = {k: path.with_name(f"{stem}_{k}.png") for k in pictured}
+    pictures: dict[str | int, Path] = {k: path.with_name(f"{stem}_{k}.png") for k in pictured}
     return {"obj": path, "mtl": path.with_name(f"{stem}.mtl"), **pictures}
 
 
