@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.ndimage import gaussian_filter
 
 from vto_pipeline.bench.scan.drawn import draw, draw_vertex_colors, sample
-from vto_pipeline.bench.scan.likeness import likeness, seam_steps
+from vto_pipeline.bench.scan.likeness import fit_gains, likeness, seam_steps
 from vto_pipeline.bench.scan.look import as_row
 from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.mesh import TriangleMesh
@@ -31,12 +31,37 @@ def test_psnr_and_ssim_are_those_of_scikit_image() -> None:
 
 
 def test_brightness_is_levelled_and_blur_is_less_sharp() -> None:
-    dark = np.rint(0.7 * PHOTO).astype(np.uint8)
+    gains = np.array([0.4, 0.5, 0.35])  # linear light, as a camera's exposure and white balance
+    dark = camera_curve(gains * light_of(PHOTO))
     found = likeness(PHOTO, dark, EVERYWHERE)
-    assert found["psnr_db"] < 18 < 45 < found["psnr_levelled_db"]
-    assert_allclose(found["sharpness"], 1.0, rtol=0.01)  # a darker picture is as sharp; rounding to bytes
+    assert found["psnr_db"] < 18 < 42 < found["psnr_levelled_db"]
+    assert_allclose(fit_gains(PHOTO.reshape(-1, 3), dark.reshape(-1, 3)), 1 / gains, rtol=0.01)  # rounding to bytes
+    assert_allclose(found["exposure_ev"], 1.0, atol=0.01)  # half the light is one stop
+    assert_allclose(found["white_balance_ev"], np.log2(0.5 / 0.35), atol=0.02)
+    assert_allclose(found["sharpness"], 1.0, rtol=0.02)  # a darker picture is as sharp; rounding to bytes
+    bright = camera_curve(3.0 * light_of(PHOTO))  # what is clipped is lost, and no fit brings it back
+    assert found["psnr_levelled_db"] > 5 + likeness(PHOTO, bright, EVERYWHERE)["psnr_levelled_db"]
+    over = camera_curve(2.5 * light_of(PHOTO)).reshape(-1, 3)  # the clipped part of a photo does not bias the fit
+    assert_allclose(fit_gains(over, PHOTO.reshape(-1, 3)), 2.5, rtol=0.01)  # rounding to bytes
+    shifted = np.roll(PHOTO, 3, axis=1)  # nor does it forgive a pattern in the wrong place
+    assert (
+        likeness(PHOTO, shifted, EVERYWHERE)["psnr_levelled_db"] < likeness(PHOTO, shifted, EVERYWHERE)["psnr_db"] + 4
+    )
     blurred = gaussian_filter(PHOTO, (2, 2, 0))
     assert likeness(PHOTO, blurred, EVERYWHERE)["sharpness"] < 0.5
+
+
+def light_of(picture: np.ndarray) -> np.ndarray:
+    """Linear light of sRGB bytes: IEC 61966-2-1."""
+    share = picture / 255
+    return np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+
+
+def camera_curve(light: np.ndarray) -> np.ndarray:
+    """Bytes that a camera writes for linear light."""
+    kept = np.clip(light, 0, 1)
+    curve = np.where(kept <= 0.0031308, 12.92 * kept, 1.055 * np.maximum(kept, 1e-9) ** (1 / 2.4) - 0.055)
+    return np.rint(255 * curve).astype(np.uint8)
 
 
 def test_only_what_is_asked_for_is_compared() -> None:
@@ -51,7 +76,7 @@ def test_only_what_is_asked_for_is_compared() -> None:
 
 
 def test_a_row_names_the_bars_that_are_missed() -> None:
-    good, poor = ({"psnr_db": 27.0, "ssim": 0.86, "sharpness": share} for share in (0.9, 0.5))
+    good, poor = ({"psnr_levelled_db": 27.0, "ssim": 0.86, "sharpness": share} for share in (0.9, 0.5))
     assert as_row("texture", [good], 1.0, {})["missed"] is None
     row = as_row("texture", [good, poor], 1.0, {})
     assert row["missed"] == "sharpness 0.7 < 0.8"

@@ -63,12 +63,34 @@ def test_a_file_for_web_pages_holds_the_mesh(vto, tent):
     np.testing.assert_allclose(right.vertices, left.vertices, atol=1e-5)  # half a step of 0.6 m in 65535
 
 
+def test_an_obj_file_has_its_materials_and_pictures_beside_it(vto):
+    shape = trimesh.creation.icosphere(2, 0.5)
+    visual = trimesh.visual.TextureVisuals(
+        uv=shape.vertices[:, :2] + 0.5,
+        material=trimesh.visual.material.PBRMaterial(baseColorTexture=Image.new("RGB", (8, 8), (200, 30, 10))),
+    )
+    trimesh.Trimesh(shape.vertices, shape.faces, visual=visual, process=False).export("ball.glb")
+    said = vto("render", "ball.glb", "--views", "", "--obj", "new/ball.obj", "--json")
+    assert said.code == 0
+    assert sorted(said.data["obj"]["files"]) == ["new/ball.mtl", "new/ball.obj", "new/ball_0.png"]
+    read = trimesh.load("new/ball.obj", process=False)
+    assert len(read.faces) == said.data["obj"]["triangles"] == len(shape.faces)
+    assert read.visual.material.image.convert("RGB").getpixel((3, 3)) == (200, 30, 10)
+    said = vto("render", "new/ball.obj", "--views", "", "--obj", "new/Ball.obj")
+    assert said.code == 0  # another name, and so other files
+    Path("new/copy.obj").write_bytes(Path("new/ball.obj").read_bytes())
+    before = Path("new/ball.mtl").read_bytes()
+    said = vto("render", "new/copy.obj", "--views", "", "--obj", "new/ball.obj")  # its materials are those of copy.obj
+    assert (said.code, "would replace what it is made from" in said.err) == (2, True)
+    assert Path("new/ball.mtl").read_bytes() == before
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "text"),
     [
         (["tent.ply", "--views", "top"], 2, "no view 'top'; allowed: front, side, back, closeup"),
         (["tent.ply", "--turntable", "turn.avi"], 2, "'turn.avi' cannot hold a moving picture"),
-        (["tent.ply", "--web", "small.gltf"], 2, "'small.gltf' is not a name for a web page's file"),
+        (["tent.ply", "--web", "small.gltf"], 2, "'small.gltf' is not a name for this file"),
         (["tent.ply", "--size", "10"], 2, "64<=x<=4096"),
         (["none.ply"], 3, "no such file"),
     ],

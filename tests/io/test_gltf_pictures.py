@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +13,9 @@ import trimesh
 from numpy.testing import assert_allclose
 from PIL import Image
 
+from vto_pipeline.errors import FormatError
+from vto_pipeline.io.companions import companions
+from vto_pipeline.io.formats import atlas
 from vto_pipeline.io.meshes import read_mesh
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -86,6 +91,124 @@ def test_one_picture_may_repeat(tmp_path: Path) -> None:
     assert mesh.skin is not None
     assert (mesh.skin.picture == picture).all()
     assert_allclose(mesh.skin.places, wide.visual.uv[wide.faces], rtol=0, atol=1e-6)  # single precision in the file
+
+
+def test_a_picture_that_parts_share_is_taken_once_and_may_repeat_beside_others(tmp_path: Path) -> None:
+    shared, other = (
+        RNG.integers(0, 256, (64, 48, 3)).astype(np.uint8),
+        RNG.integers(0, 256, (16, 16, 3)).astype(np.uint8),
+    )
+    material = trimesh.visual.material.PBRMaterial(baseColorTexture=Image.fromarray(shared))
+    parts = [part(1.5 * k, shared) for k in range(5)] + [part(7.5, other)]
+    for one in parts[:5]:
+        one.visual.material = material
+    parts[2].visual.uv = np.array([2.6, 0.7]) * parts[2].visual.uv - 3.3  # from picture to picture within a triangle
+    mesh = read_mesh(written(tmp_path / "a.glb", *parts), unit="m")
+    assert mesh.skin is not None
+    assert mesh.skin.picture.size < 3 * (5 * shared.size)
+    found, count = color_at(mesh.skin.picture, mesh.skin.places), len(parts[0].faces)
+    for k, one in enumerate(parts):
+        wanted = color_at(other if k == 5 else shared, one.visual.uv[one.faces])
+        assert (found[k * count : (k + 1) * count] == wanted).mean() > 0.99  # rounding at a pixel's edge
+
+
+def test_pictures_that_are_too_large_together_are_halved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pictures = [np.full((256, 200, 3), color, np.uint8) for color in ((250, 0, 0), (0, 250, 0))]
+    monkeypatch.setattr(atlas, "LARGEST_PX", 300)
+    places = [RNG.uniform(0, 1, (10, 3, 2)) for _ in pictures]
+    whole, moved = atlas.join_pictures(pictures, places)
+    assert max(whole.shape) <= 300
+    found = color_at(whole, moved)
+    assert (found[:10] == (250, 0, 0)).all()
+    assert (found[10:] == (0, 250, 0)).all()
+    monkeypatch.setattr(atlas, "LARGEST_PX", 60)
+    with pytest.raises(FormatError, match="repeat too often"):
+        atlas.join_pictures(pictures, [100 * place for place in places])
+
+
+def rewrite(path: Path, edit: Callable[[dict[str, Any]], None]) -> None:
+    """Change the JSON of a GLB, whatever its length."""
+    data = path.read_bytes()
+    length = int.from_bytes(data[12:16], "little")
+    tree = json.loads(data[20 : 20 + length])
+    edit(tree)
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    head = data[:8] + (len(data) - length + len(text)).to_bytes(4, "little") + len(text).to_bytes(4, "little")
+    path.write_bytes(head + data[16:20] + text + data[20 + length :])
+
+
+def test_plain_parts_have_their_materials_colours(tmp_path: Path) -> None:
+    """Base colours are linear light, and multiply the vertices' own."""
+    plain, white = part(0.0, None), part(2.0, None)
+    white.visual = trimesh.visual.ColorVisuals(white)
+    dyed = part(4.0, None)
+    colors = RNG.integers(0, 256, (len(dyed.vertices), 4)).astype(np.uint8)
+    dyed.visual = trimesh.visual.ColorVisuals(dyed, vertex_colors=colors)
+    mesh = read_mesh(written(tmp_path / "a.glb", plain, white, dyed), unit="m")
+    assert mesh.skin is None
+    assert mesh.colors is not None
+    linear = np.array([64, 128, 255]) / 255  # IEC 61966-2-1
+    found = [mesh.colors[np.abs(mesh.vertices[:, 0] - at) < 0.6] for at in (0.0, 2.0, 4.0)]
+    assert_allclose(found[0], np.broadcast_to(255 * (1.055 * linear ** (1 / 2.4) - 0.055), found[0].shape), atol=1)
+    assert (found[1] == 255).all()
+    assert np.ptp(found[2].astype(int), axis=0).min() > 50
+
+    def dye(tree):
+        for shape in tree["meshes"]:
+            shape["primitives"][0]["material"] = 0  # that of the plain part
+
+    rewrite(tmp_path / "a.glb", dye)
+    both = read_mesh(tmp_path / "a.glb", unit="m")
+    assert both.colors is not None
+    order = np.argsort(both.vertices[:, 0] > 3.4, kind="stable")[-len(dyed.vertices) :]
+    light = colors[:, :3] / 255 * linear
+    curve = np.where(light <= 0.0031308, 12.92 * light, 1.055 * np.maximum(light, 1e-9) ** (1 / 2.4) - 0.055)
+    assert_allclose(both.colors[order], 255 * curve, atol=2)  # bytes between
+    only = read_mesh(written(tmp_path / "b.glb", white), unit="m")
+    assert only.colors is None
+
+
+def test_a_moved_texture_lies_where_the_extension_says(tmp_path: Path) -> None:
+    """A quarter turn on paper: (u, v), v down, goes to offset + (v, -u) times scale: counter-clockwise."""
+    picture = RNG.integers(0, 256, (40, 40, 3)).astype(np.uint8)
+    path = written(tmp_path / "a.glb", part(0.0, picture))
+
+    def move(tree):
+        chosen = tree["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]
+        change = {"offset": [0.25, 0.5], "scale": [0.5, 0.25], "rotation": np.pi / 2}
+        chosen["extensions"] = {"KHR_texture_transform": change}
+        tree["extensionsUsed"] = ["KHR_texture_transform"]
+
+    rewrite(path, move)
+    mesh = read_mesh(path, unit="m")
+    assert mesh.skin is not None
+    assert mesh.texture is not None
+    u, down = mesh.texture[..., 0], 1 - mesh.texture[..., 1]
+    wanted = np.stack([0.25 + 0.25 * down, 0.5 - 0.5 * u], axis=-1)
+    assert_allclose(mesh.skin.places * (1, -1) + (0, 1), wanted, rtol=0, atol=1e-6)  # single precision
+
+
+def test_pictures_beside_a_gltf_file_are_read_and_those_elsewhere_are_not(tmp_path: Path) -> None:
+    picture = RNG.integers(0, 256, (16, 16, 3)).astype(np.uint8)
+    files = trimesh.exchange.gltf.export_gltf(trimesh.Scene([part(0.0, picture)]))
+    folder = tmp_path / "in"
+    folder.mkdir()
+    for name, data in files.items():
+        (folder / name).write_bytes(data)
+    tree = json.loads(files["model.gltf"])
+    Image.fromarray(picture).save(folder / "cloth 1.png")
+    Image.fromarray(picture).save(tmp_path / "secret.png")
+    tree["images"][0] = {"uri": "cloth%201.png"}
+    (folder / "a.gltf").write_text(json.dumps(tree))
+    mesh = read_mesh(folder / "a.gltf", unit="m")
+    assert mesh.skin is not None
+    assert (mesh.skin.picture == picture).all()
+    assert "cloth 1.png" in companions(folder / "a.gltf")
+    tree["images"][0] = {"uri": "../secret.png"}
+    (folder / "b.gltf").write_text(json.dumps(tree))
+    with pytest.raises(FormatError, match="leads out of the folder"):
+        read_mesh(folder / "b.gltf", unit="m")
 
 
 def change(path: Path, edit: object) -> None:

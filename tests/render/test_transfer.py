@@ -1,13 +1,20 @@
 """The render mesh on the simulation mesh: exact at rest, rigid under rigid motion, right on a bend."""
 
+from pathlib import Path
+
+import numba
 import numpy as np
 import pytest
 import trimesh
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
+from vto_pipeline.bench.drape.transfer import measure_transfer
+from vto_pipeline.io.meshes import read_mesh
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.render.transfer import apply, bind
+
+GARMENTS = Path(__file__).parents[2].parent / "shared" / "data" / "garments"
 
 
 def coarse_and_fine():
@@ -76,3 +83,57 @@ def test_the_other_side_of_a_fold_is_not_taken():
     moved = sim.vertices.copy()
     moved[:121, 1] += 0.1
     assert_allclose(apply(binding, moved)[:, 1], 0.1002, rtol=0, atol=1e-9)
+
+
+def by_hand(binding, positions):
+    """The riding vertices by the formula, one at a time."""
+    tri = trimesh.Trimesh(positions, binding.faces, process=False)
+    corner_normals = np.zeros_like(positions)
+    for face, angles, normal in zip(tri.faces, tri.face_angles, tri.face_normals, strict=True):
+        corner_normals[face] += angles[:, None] * normal
+    corner_normals /= np.linalg.norm(corner_normals, axis=1, keepdims=True)
+    found = []
+    for corners, weights, height, residual in zip(
+        binding.corners, binding.weights, binding.height, binding.residual, strict=True
+    ):
+        a, b, c = positions[corners]
+        up = weights @ corner_normals[corners]
+        along = (b - a) / np.linalg.norm(b - a)
+        normal = np.cross(b - a, c - a) / np.linalg.norm(np.cross(b - a, c - a))
+        frame = np.array([along, np.cross(normal, along), normal])
+        found.append(weights @ positions[corners] + height * up / np.linalg.norm(up) + residual @ frame)
+    return np.array(found)
+
+
+def test_any_deformation_is_followed_by_the_formula_whatever_the_number_of_threads():
+    sim, render = coarse_and_fine()
+    binding = bind(render, sim)
+    moved = sim.vertices + 0.05 * np.sin(9 * sim.vertices[:, ::-1])
+    found = apply(binding, moved)
+    assert np.abs(binding.residual).max() > 1e-4
+    assert_allclose(found, by_hand(binding, moved), rtol=0, atol=1e-13)  # rounding only
+    threads = numba.get_num_threads()
+    try:
+        numba.set_num_threads(1)
+        assert np.array_equal(apply(binding, moved), found)
+    finally:
+        numba.set_num_threads(threads)
+
+
+def test_a_triangle_that_has_collapsed_carries_its_vertices_along():
+    sim, render = coarse_and_fine()
+    point = np.zeros_like(sim.vertices)
+    found = apply(bind(render, sim), point)
+    assert np.isfinite(found).all()
+    assert_allclose(found, 0.0, atol=1e-12)  # no direction is left for height and residual
+
+
+@pytest.mark.real_data
+@pytest.mark.skipif(not GARMENTS.is_dir(), reason="the data folder is absent")
+@pytest.mark.parametrize("name", ["tshirt.ply", "makehuman/female_sportsuit01.obj"])
+def test_no_triangle_turns_over_on_foreign_garments_that_are_shaken(name):
+    found = measure_transfer(read_mesh(GARMENTS / name))
+    assert found["flipped"] == 0
+    assert found["largest_stretch"] > 1.3  # they are violent
+    assert found["rest_error_mm"] < 1e-9
+    assert found["wrong_layer"] == 0

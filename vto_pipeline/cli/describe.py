@@ -10,22 +10,10 @@ from vto_pipeline.model.job import Job
 
 
 def _surface(path: Path, job: Job) -> dict[str, Any]:
-    import numpy as np
-
-    from vto_pipeline.geometry.topology import edge_face_counts, face_area_vectors, face_components
     from vto_pipeline.io.meshes import read_mesh
+    from vto_pipeline.report.facts import surface_facts
 
-    mesh = read_mesh(path, job=job)
-    faces = edge_face_counts(mesh)[1]
-    return {
-        "vertices": len(mesh.vertices),
-        "triangles": len(mesh.faces),
-        "size_m": [float(side) for side in mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)],
-        "area_m2": float(np.linalg.norm(face_area_vectors(mesh), axis=1).sum()),
-        "pieces": face_components(mesh)[0],
-        "closed": bool((faces != 1).all()),
-        "edges_of_more_than_two_faces": int((faces > 2).sum()),
-    }
+    return surface_facts(read_mesh(path, job=job))
 
 
 def _cloud(path: Path, job: Job) -> dict[str, Any]:

@@ -10,11 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit, prange
 
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import face_normals, vertex_normals
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.numerics.vector import axpy, cross, load, scale, store, sub, unit
 
 _FACING = 0.0  # least cosine between the normals of a vertex and its triangle: the other layer of a fold faces away
 
@@ -65,11 +67,24 @@ def bind(rider: TriangleMesh, mesh: TriangleMesh) -> Binding:
 
 def apply(binding: Binding, positions: FloatArray) -> FloatArray:
     """Return the riding vertices [m], shape (R, 3), for positions of the other mesh [m], shape (V, 3)."""
-    normals = vertex_normals(TriangleMesh(positions, binding.faces))
-    surface, up = _on_surface(positions, normals, binding.corners, binding.weights)
-    frames = _frames(positions[binding.corners])
-    left = np.einsum("nij,ni->nj", frames, binding.residual)
-    return surface + binding.height[:, None] * up + left
+    mesh = TriangleMesh(positions, binding.faces)
+    normals, kept = vertex_normals(mesh), (binding.corners, binding.weights, binding.height, binding.residual)
+    riding = np.empty((len(binding.corners), 3))
+    _ride(mesh.vertices, normals, *kept, riding)
+    return riding
+
+
+@njit(cache=True, error_model="numpy", parallel=True)
+def _ride(x, normals, corners, weights, height, residual, riding):  # type: ignore[no-untyped-def]  # typed by Numba
+    for r in prange(len(corners)):
+        i, j, k = load(corners, r)
+        u, v, w = load(weights, r)
+        p, q, s = load(residual, r)
+        a, b, c = load(x, i), load(x, j), load(x, k)
+        up = unit(axpy(u, load(normals, i), axpy(v, load(normals, j), scale(w, load(normals, k)))))
+        along, normal = unit(sub(b, a)), unit(cross(sub(b, a), sub(c, a)))
+        left = axpy(p, along, axpy(q, cross(normal, along), scale(s, normal)))
+        store(riding, r, axpy(u, a, axpy(v, b, axpy(w, c, axpy(height[r], up, left)))))
 
 
 def _facing_faces(

@@ -6,6 +6,7 @@ A half-edge 3f+k runs from corner k to corner k+1 of face f. Results never depen
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import acos
 
 import numpy as np
 from numba import njit
@@ -16,6 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from vto_pipeline.errors import InputError
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.numerics.vector import axpy, cross, dot, load, store, sub, unit
 
 
 def half_edges(mesh: TriangleMesh) -> IntArray:
@@ -189,14 +191,8 @@ def vertex_normals(mesh: TriangleMesh) -> FloatArray:
 
     Thürmer and Wüthrich 1998. Zero where a vertex has no face.
     """
-    corners = mesh.vertices[mesh.faces]
-    out = _unit(np.roll(corners, -1, axis=1) - corners)
-    back = _unit(np.roll(corners, 1, axis=1) - corners)
-    angle = np.arccos(np.clip(np.einsum("fkd,fkd->fk", out, back), -1.0, 1.0))
-    weighted = angle[:, :, None] * face_normals(mesh)[:, None, :]
-    flat = mesh.faces.reshape(-1)
-    total = [np.bincount(flat, weighted[:, :, d].reshape(-1), len(mesh.vertices)) for d in range(3)]
-    return _unit(np.column_stack(total))
+    normals: FloatArray = _vertex_normals(mesh.vertices, mesh.faces)
+    return normals
 
 
 def _unit(vectors: FloatArray) -> FloatArray:
@@ -244,3 +240,18 @@ def _walk_boundary(opposite):  # type: ignore[no-untyped-def]  # typed by Numba
         lengths[loops] = filled - first
         loops += 1
     return walk, lengths[:loops]
+
+
+@njit(cache=True, error_model="numpy")
+def _vertex_normals(x, faces):  # type: ignore[no-untyped-def]  # typed by Numba
+    normals = np.zeros_like(x)
+    for f in range(len(faces)):
+        i, j, k = load(faces, f)
+        a, b, c = load(x, i), load(x, j), load(x, k)
+        ab, bc, ca = unit(sub(b, a)), unit(sub(c, b)), unit(sub(a, c))
+        normal = unit(cross(sub(b, a), sub(c, a)))
+        for v, cosine in ((i, -dot(ab, ca)), (j, -dot(bc, ab)), (k, -dot(ca, bc))):
+            store(normals, v, axpy(acos(min(max(cosine, -1.0), 1.0)), normal, load(normals, v)))
+    for v in range(len(normals)):
+        store(normals, v, unit(load(normals, v)))
+    return normals

@@ -6,6 +6,7 @@ patterns/: sewing patterns in and out
 captures/, bodies/, motion/: what cameras deliver; what is known of a body, and how it moves
 runs/: the artifacts of a run
 animations: moving pictures
+companions: the files beside a mesh that are read with it
 size_charts: flat measurements of each size
 sniff: what a path holds
 sandbox: untrusted bytes are parsed in a limited child process

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from vto_pipeline.errors import InputError
 from vto_pipeline.model.arrays import FloatArray, IntArray, freeze
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.notebook import Presented
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Measurements:
 
 
 @dataclass(frozen=True)
-class Avatar:
+class Avatar(Presented):
     """A body of the project's own template: fixed topology, a skeleton, and named loops and landmarks.
 
     Args:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from vto_pipeline.errors import InputError
 from vto_pipeline.model.arrays import FloatArray, IntArray, freeze
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.notebook import Presented
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,7 @@ class RestShape:
 
 
 @dataclass(frozen=True)
-class Garment:
+class Garment(Presented):
     """A garment ready to simulate.
 
     Args:

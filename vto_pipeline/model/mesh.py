@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from vto_pipeline.errors import InputError
 from vto_pipeline.model.arrays import ByteArray, FloatArray, IntArray, freeze
+from vto_pipeline.notebook import Presented
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,7 @@ class Skin:
 
 
 @dataclass(frozen=True)
-class TriangleMesh:
+class TriangleMesh(Presented):
     """A triangle mesh in metres, +Y up.
 
     Args:

@@ -1,6 +1,7 @@
 """The detailed garment after the drape, and pictures.
 
 dress, transfer: the render mesh rides on the simulation mesh
+carry_skin: the picture of a scanned surface on the garment cut out of it
 clear_body: none of it inside the body
 web: the render mesh within the limits of a web page
 pictures, frames: pictures without a display, and what they frame

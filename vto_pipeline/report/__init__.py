@@ -3,5 +3,6 @@
 page, tables, wording, verdicts, chart: the page and its parts
 budgets: what a run bought with its budgets, in words
 batch_page: the summary of a batch
+card, facts: a card for notebooks; the numbers of a surface
 scene, layers, packing, scales, render_colors, body_loops: its 3D view
 """

@@ -14,12 +14,14 @@ from vto_pipeline.avatar.template.regions import trunk_vertices
 from vto_pipeline.cloth.judge.worn import vertex_maps
 from vto_pipeline.cloth.rest_shape.edge_length_embedding import lengths_in_space
 from vto_pipeline.geometry.remeshing.seams import cut_open
+from vto_pipeline.geometry.rigid import transform_mesh
 from vto_pipeline.geometry.topology import face_area_vectors
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
 from vto_pipeline.model.texture import TexturedMesh
 from vto_pipeline.pipeline.stage import Stage
+from vto_pipeline.render.carry_skin import carry_skin
 from vto_pipeline.render.clear_body import clear_body
 from vto_pipeline.render.dress import BODY, DressConfig, body_part, deform_render_mesh
 from vto_pipeline.render.marks import mark_places
@@ -42,7 +44,7 @@ def _transfer(inputs: Inputs, settings: DressConfig, job: Job) -> Outputs:
 
 
 def most_detailed(inputs: Inputs) -> TriangleMesh | TexturedMesh:
-    """Return the garment with its picture, from photos or from its file, or else as it was repaired."""
+    """Return the garment with its picture, from photos, its file or its scan, or else as it was repaired."""
     if "garment_texture" in inputs:
         textured: TexturedMesh = inputs["garment_texture"]
         return textured
@@ -50,6 +52,10 @@ def most_detailed(inputs: Inputs) -> TriangleMesh | TexturedMesh:
     if given is not None and given.skin is not None:
         mesh = replace(given, texture=given.skin.places, skin=None)
         return TexturedMesh(mesh, given.skin.picture, np.ones(given.skin.picture.shape[:2], dtype=bool))
+    scan: TriangleMesh | None = inputs.get("garment_surface")
+    if scan is not None and scan.skin is not None:
+        placed = transform_mesh(scan, inputs["garment_placement"]) if "garment_placement" in inputs else scan
+        return carry_skin(placed, inputs["garment"])
     garment: TriangleMesh = inputs["garment"] if given is None or given.texture is None else given
     return garment
 
@@ -86,9 +92,10 @@ def _observed_share(inputs: Inputs) -> float | None:
 
 def _page(inputs: Inputs, settings: Config, job: Job) -> Outputs:
     parts = {name: value for name, value in inputs.items() if name != "run_record"}
-    if "garment_texture" in parts and "render_mesh" not in parts:
-        textured: TexturedMesh = parts["garment_texture"]
-        parts["garment"] = [cut_open("garment", textured.mesh, textured.picture)]
+    if "garment" in parts and "render_mesh" not in parts:
+        detailed = most_detailed(parts)
+        if isinstance(detailed, TexturedMesh):
+            parts["garment"] = [cut_open("garment", detailed.mesh, detailed.picture)]
     if "render_mesh" in parts:
         shown = parts["render_mesh"]
         parts["render_mesh"] = [part for part in shown if part.name != BODY]
@@ -113,7 +120,7 @@ STAGES: tuple[Stage, ...] = (
         name="transfer",
         about="the detailed garment follows the draped simulation mesh, on the body",
         needs=("garment", "sim_mesh", "draped"),
-        optional=("garment_texture", "garment_mesh", "collider"),
+        optional=("garment_texture", "garment_mesh", "garment_surface", "garment_placement", "collider"),
         makes=("render_mesh",),
         run=_transfer,
         settings=DressConfig,
@@ -135,6 +142,7 @@ STAGES: tuple[Stage, ...] = (
         needs=(),
         optional=(
             "garment_surface",
+            "garment_placement",
             "body_surface",
             "mannequin_surface",
             "labels",

@@ -1,6 +1,7 @@
 """Draping: error against run time, accuracy of its prediction, refinement, rest shapes, and work left out.
 
-`garments` is no part of `vto bench`: it drapes the files that it is given.
+`garments` and `transfer` are no part of `vto bench`: they take the files that they are given. The
+first drapes them, and on the other finer meshes ride.
 """
 
 from __future__ import annotations

@@ -7,13 +7,17 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
+from scipy.optimize import minimize_scalar
 
 from vto_pipeline.geometry.topology import half_edges
 from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.texture import TexturedMesh
+from vto_pipeline.numerics.srgb import decode_srgb, encode_srgb, srgb_curve
 
 WRONG = 64
 """A pixel is wrong where a channel is off by more [of 255]."""
+
+_STOPS = 4.0  # exposure and white balance are looked for so far up and down
 
 _SIGMA, _TRUNCATE = 1.5, 3.5
 """Gaussian window of 11 pixels, and the constants of Wang et al. 2004, eq. 13."""
@@ -27,23 +31,47 @@ def likeness(photo: ByteArray, picture: ByteArray, where: NDArray[np.bool_]) -> 
     """Compare two pictures of shape (H, W, 3) at some pixels (H, W).
 
     Returns:
-        psnr_db over all channels, and with each channel's brightness fitted (psnr_levelled_db); ssim (Wang et al. 2004)
-        of the grey pictures; sharpness, the gradient energy as a share of the photo's, with the brightness fitted;
-        wrong_share; share of the picture's pixels that were compared.
+        psnr_db over all channels, and with the photo's exposure and white balance fitted (psnr_levelled_db); the fit:
+        exposure_ev by how many stops, white_balance_ev by how many red or blue differ from green; ssim (Wang et al.
+        2004) of the grey pictures; sharpness, the gradient energy as a share of the photo's, fitted too; wrong_share;
+        share of the picture's pixels that were compared.
     """
     one, other = photo.astype(float), picture.astype(float)
-    gain = (one * other)[where].sum(axis=0) / np.maximum((other**2)[where].sum(axis=0), 1e-9)
-    gray = [values @ (0.299, 0.587, 0.114) for values in (one, other, gain * other)]
+    gain = fit_gains(photo[where], picture[where])
+    levelled = encode_srgb(gain * decode_srgb(picture)).astype(float)
+    stops = np.log2(gain)
+    gray = [values @ (0.299, 0.587, 0.114) for values in (one, other, levelled)]
     inside = _interior(where)
     energy = [_gradient_energy(gray[k])[inside].sum() for k in (0, 2)]
     return {
         "psnr_db": _psnr((one - other)[where]),
-        "psnr_levelled_db": _psnr((one - gain * other)[where]),
+        "psnr_levelled_db": _psnr((one - levelled)[where]),
+        "exposure_ev": float(abs(stops[1])),
+        "white_balance_ev": float(np.abs(stops[[0, 2]] - stops[1]).max()),
         "ssim": float(_ssim(gray[0], gray[1])[inside].mean()),
         "sharpness": float(energy[1] / energy[0]),
         "wrong_share": float((np.abs(one - other).max(axis=2)[where] > WRONG).mean()),
         "compared_share": float(where.mean()),
     }
+
+
+def fit_gains(photo: ByteArray, picture: ByteArray) -> FloatArray:
+    """Return what multiplies a picture's linear light to come nearest to a photo in sRGB, for each channel, shape (3,).
+
+    Args:
+        photo, picture: Pixels, sRGB, shape (N, 3) each.
+    """
+    light, gains = decode_srgb(np.arange(256).astype(np.uint8)), np.ones(3)
+    for channel in range(3):  # a picture has 256 levels, so that sums over each are all that the fit needs
+        count = np.bincount(picture[:, channel], minlength=256).astype(float)
+        mean = np.bincount(picture[:, channel], photo[:, channel], 256) / np.maximum(count, 1)
+
+        def error(log_gain: float, count: FloatArray = count, mean: FloatArray = mean) -> float:
+            level = 255 * srgb_curve(np.minimum(np.exp2(log_gain) * light, 1.0))
+            return float((count * (level - mean) ** 2).sum())
+
+        gains[channel] = np.exp2(minimize_scalar(error, bounds=(-_STOPS, _STOPS), method="bounded").x)
+    return gains
 
 
 def seam_steps(textured: TexturedMesh, sample: Callable[[ByteArray, FloatArray], FloatArray]) -> dict[str, float]:

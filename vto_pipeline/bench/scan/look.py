@@ -40,14 +40,19 @@ from vto_pipeline.model.texture import TexturedMesh
 from vto_pipeline.scan.texture.project import TextureConfig, texture_surface
 from vto_pipeline.scan.texture.views import look
 
-BARS = {"psnr_db": 26.0, "ssim": 0.85, "sharpness": 0.80}
-"""The least likeness that is good enough, on average over the left-out photos."""
+BARS = {"psnr_levelled_db": 26.0, "ssim": 0.85, "sharpness": 0.80}
+"""The least likeness that is good enough, on average over the left-out photos.
+
+The exposure and white balance of a left-out photo are its own, and no texture can know them: they are fitted. The rows
+have the PSNR without that, too.
+"""
 
 CLEAR_PX = 2.0
 """Pixels nearer to the garment's outline are not compared: they show something else in part."""
 
 _COLUMNS = (
-    *("run", "method", "psnr_db", "ssim", "sharpness", "psnr_levelled_db", "wrong_share", "compared_share"),
+    *("run", "method", "psnr_levelled_db", "psnr_db", "exposure_ev", "white_balance_ev", "ssim", "sharpness"),
+    *("wrong_share", "compared_share"),
     *("seam_step_p95", "seconds", "missed"),
 )
 

@@ -1,7 +1,7 @@
-"""Wavefront OBJ: vertices, their colours, faces, and the texture coordinates of their corners.
+"""Wavefront OBJ: vertices, their colours, faces, the texture coordinates of their corners, and materials beside it.
 
-Materials and normals are ignored; `mtllib` is never followed. Programs add keywords of their own (a simulator its
-velocities): these lines are skipped, and counted. Vertices keep the numbering of the file, so that texture seams do not
+Normals are ignored. Programs add keywords of their own (a simulator its velocities): these lines are skipped, and
+counted. Vertices keep the numbering of the file, so that texture seams do not
 cut the surface.
 """
 
@@ -13,9 +13,10 @@ import numpy as np
 
 from vto_pipeline.errors import FormatError
 from vto_pipeline.io.arrays import Arrays
+from vto_pipeline.io.formats.mtl import material_picture
 from vto_pipeline.io.formats.polygons import CUT_OFF, fan_triangulation, triangulate_polygons
 from vto_pipeline.io.text_numbers import parse_numbers, parse_rows, read_lines
-from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.arrays import FloatArray, IntArray
 
 _NAMES = """
 vn vp o g s mg l p usemtl mtllib usemap maplib bevel c_interp d_interp lod shadow_obj
@@ -30,7 +31,8 @@ def parse_obj(name: str) -> Arrays:
         name: Path of the file.
 
     Returns:
-        vertices (V, 3); faces (F, 3); colors (V, 3) uint8 and texture (F, 3, 2), where given; notes.
+        vertices (V, 3); faces (F, 3); colors (V, 3) uint8 and texture (F, 3, 2), where given; where a material has a
+        colour or picture, picture (H, W, 3) uint8 and the places there (F, 3, 2); notes.
 
     Raises:
         FormatError: the file breaks the format.
@@ -57,20 +59,40 @@ def parse_obj(name: str) -> Arrays:
     arrays: Arrays = {"vertices": values[:, :3]}
     if values.shape[1] >= 6:
         arrays["colors"] = np.clip(np.nan_to_num(values[:, 3:6]) * 255, 0, 255).round().astype(np.uint8)
-    is_texture = keys == "vt"
+    is_texture, placed = keys == "vt", None
     face_rows = rest(is_face)
     corners = [row.split() for row in face_rows[0]]
     seen = np.cumsum(is_vertex)[is_face]
     triangles, notes = triangulate_polygons(_polygons(corners, *face_rows, seen, path), path)
     if is_texture.any():
         try:
-            arrays["texture"] = _texture(corners, face_rows[1], np.cumsum(is_texture)[is_face], rest(is_texture), path)
+            placed = _texture(corners, face_rows[1], np.cumsum(is_texture)[is_face], rest(is_texture), path)
+            if np.isfinite(placed).all():
+                arrays["texture"] = placed
+            else:
+                notes.append("texture coordinates are ignored: not every corner has one")
         except FormatError as e:  # the shape is whole without them
             notes.append(f"texture coordinates are ignored: {e.problem} ({e.where})")
+    try:
+        shown = material_picture(path, rest(keys == "mtllib")[0], *_materials(words, keys, corners), placed)
+        if shown is not None:
+            arrays["picture"], arrays["places"] = shown
+    except FormatError as e:  # the shape is whole without them
+        notes.append(f"materials are ignored: {e.problem}")
     if unknown.any():
         some = ", ".join(repr(str(key)[:20]) for key in np.unique(keys[unknown])[:8])
         notes.append(f"skipped {unknown.sum()} lines whose keywords OBJ does not define: {some}")
     return {**arrays, "faces": triangles, "notes": np.array(notes, dtype=np.str_)}
+
+
+def _materials(words: list[list[str]], keys: np.ndarray, corners: list[list[str]]) -> tuple[list[str], IntArray]:
+    """Return the names of `usemtl` lines, and which holds for each triangle that `_polygons` become, -1 for none."""
+    named = keys == "usemtl"
+    current = np.cumsum(named)[keys == "f"] - 1
+    sides = np.array([len(c) for c in corners])
+    used = [np.repeat(current[sides == n], n - 2) for n in np.unique(sides)]
+    names = [words[i][1] if len(words[i]) > 1 else "" for i in np.flatnonzero(named)]
+    return names, np.concatenate(used).astype(np.int32)
 
 
 def _join_continued(lines: list[str]) -> list[str]:
@@ -117,7 +139,7 @@ def _polygons(
 def _texture(
     corners: list[list[str]], at: list[int], seen: np.ndarray, given: tuple[list[str], list[int]], path: Path
 ) -> FloatArray:
-    """Return the texture coordinates of the triangles that `_polygons` become, shape (F, 3, 2).
+    """Return the texture coordinates of the triangles that `_polygons` become, NaN where none is given: (F, 3, 2).
 
     Args:
         corners: Of each face, as written: vertex/texture/normal.
@@ -127,7 +149,7 @@ def _texture(
         path: The file.
 
     Raises:
-        FormatError: a corner has none, or none of that number exists.
+        FormatError: none of that number exists.
     """
     values = parse_rows(*given, path)
     if values.shape[1] < 2 or not np.isfinite(values).all():
@@ -136,11 +158,14 @@ def _texture(
     found = []
     for n in np.unique(sides):
         chosen = np.flatnonzero(sides == n)
-        named = [" ".join("".join(corner.split("/")[1:2]) or "0" for corner in corners[i]) for i in chosen]
+        named = [" ".join("".join(corner.split("/")[1:2]) or "nan" for corner in corners[i]) for i in chosen]
         numbers = parse_numbers(named, [at[i] for i in chosen], path).reshape(-1, n)
         indices = np.where(numbers < 0, numbers + seen[chosen, None], numbers - 1)
-        wrong = (numbers == 0) | ~((indices >= 0) & (indices < len(values)) & (indices == np.trunc(indices)))
+        absent = np.isnan(numbers)
+        fits = (indices >= 0) & (indices < len(values)) & (indices == np.trunc(indices))
+        wrong = (numbers == 0) | ~(fits | absent)
         for i in np.flatnonzero(wrong.any(axis=1)):
-            raise FormatError("a corner has none of those given", where=f"{path}, line {at[chosen[i]]}")
-        found.append(values[fan_triangulation(indices), :2])
+            raise FormatError("a corner names one that is not there", where=f"{path}, line {at[chosen[i]]}")
+        last = np.vstack([values[:, :2], np.full((1, 2), np.nan)])
+        found.append(last[fan_triangulation(np.where(absent, len(values), indices))])
     return np.concatenate(found)

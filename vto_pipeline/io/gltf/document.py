@@ -144,7 +144,7 @@ def open_gltf(path: Path) -> GltfDocument:
     document = GltfDocument(path, parsed, ())
     for image in document.items("images"):
         if "uri" in image:
-            _contained(str(image["uri"]), path)
+            contained(str(image["uri"]), path)
     buffers = tuple(_buffer(b, i, binary, path) for i, b in enumerate(document.items("buffers")))
     return GltfDocument(path, parsed, buffers)
 
@@ -181,7 +181,7 @@ def _buffer(buffer: Mapping[str, Any], index: int, binary: bytes | None, path: P
         except (binascii.Error, ValueError) as e:
             raise FormatError(f"buffers[{index}]: {e}", where=str(path)) from None
     else:
-        beside = _contained(str(uri), path)
+        beside = contained(str(uri), path)
         if not beside.is_file() or beside.stat().st_size < length:
             size = beside.stat().st_size if beside.is_file() else "no"
             raise FormatError(f"buffer {uri} has {size} bytes; {length} are promised", where=str(path), hint=CUT_OFF)
@@ -193,8 +193,12 @@ def _buffer(buffer: Mapping[str, Any], index: int, binary: bytes | None, path: P
     return data[:length]
 
 
-def _contained(uri: str, path: Path) -> Path:
-    """The file a relative uri names, which must lie in the folder of the glTF or below."""
+def contained(uri: str, path: Path) -> Path:
+    """Return the file that a relative uri names, which must lie in the folder of the glTF or below; of data, the glTF.
+
+    Raises:
+        FormatError: it does not.
+    """
     if uri.startswith("data:"):
         return path
     folder = path.resolve().parent

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import warnings
 from base64 import b64decode
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,15 +9,28 @@ from typing import Any
 import numpy as np
 
 from vto_pipeline.errors import FormatError
-from vto_pipeline.io.gltf.document import GltfDocument
+from vto_pipeline.io.formats.atlas import decode_picture, join_pictures, plain_picture
+from vto_pipeline.io.gltf.document import GltfDocument, contained
 from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.numerics.srgb import decode_srgb, encode_srgb
 
-LARGEST_PX = 8192
-"""Longest side of a picture, alone or stacked."""
+_DATA = ("data:image/png;base64,", "data:image/jpeg;base64,", "data:image/webp;base64,")
+_LIMIT_BYTES = 200_000_000
+_MOVED, _WEBP = "KHR_texture_transform", "EXT_texture_webp"
 
-_PLAIN_PX = 4  # side of the patch of a part without a picture
-_DATA = ("data:image/png;base64,", "data:image/jpeg;base64,")
+
+def base_factor(document: GltfDocument, primitive: Mapping[str, Any]) -> FloatArray:
+    """Return the base colour that multiplies a part's picture and its vertices' colours, linear, shape (3,).
+
+    Raises:
+        FormatError: its material is broken.
+    """
+    try:
+        surface = _material(document, primitive).get("pbrMetallicRoughness", {})
+        factor = np.asarray(surface.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)), dtype=np.float64)
+        return np.clip(np.nan_to_num(factor.reshape(4)[:3]), 0.0, 1.0)
+    except (AttributeError, TypeError, ValueError) as e:
+        raise FormatError(f"a material is broken: {e!r}", where=str(document.path)) from None
 
 
 def scene_picture(
@@ -36,76 +47,69 @@ def scene_picture(
         sRGB, shape (H, W, 3); texture coordinates of all corners, v up, shape (F, 3, 2).
 
     Raises:
-        FormatError: a picture is outside the file, no PNG or JPEG, broken, or too large; or they cannot be joined.
+        FormatError: a picture is outside the file's folder, no PNG, JPEG or WebP, broken, or too large.
     """
-    found: dict[Any, tuple[ByteArray, bool]] = {}
+    found: dict[Any, tuple[ByteArray, Mapping[str, Any] | None]] = {}
+    moved = []
     try:
-        materials = [primitive.get("material") for primitive in primitives]
-        for material in materials:
+        for primitive, place in zip(primitives, places, strict=True):
+            material = primitive.get("material")
             if material not in found:
-                found[material] = _base_color(
-                    document, {} if material is None else document.item("materials", material)
-                )
+                found[material] = _base_color(document, primitive)
+            info = found[material][1]
+            moved.append(place if info is None else _moved(place, info))
     except (AttributeError, KeyError, TypeError, ValueError) as e:
         raise FormatError(f"a material is broken: {e!r}", where=str(document.path)) from None
-    if not any(shown for _, shown in found.values()):
+    if all(info is None for _, info in found.values()):
         return None
-    return _stack([found[material][0] for material in materials], places)
+    return join_pictures([found[primitive.get("material")][0] for primitive in primitives], moved)
 
 
-def _base_color(document: GltfDocument, material: Mapping[str, Any]) -> tuple[ByteArray, bool]:
-    """Return a material's base colour, sRGB, shape (H, W, 3), and whether it is a picture or one plain colour."""
-    surface = material.get("pbrMetallicRoughness", {})
-    factor = np.clip(np.asarray(surface.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)), dtype=np.float64)[:3], 0.0, 1.0)
-    chosen = surface.get("baseColorTexture")
-    if chosen is None or chosen.get("texCoord", 0) != 0 or "KHR_texture_transform" in chosen.get("extensions", {}):
-        return np.tile(encode_srgb(factor), (_PLAIN_PX, _PLAIN_PX, 1)), False
-    image = document.item("images", document.item("textures", chosen["index"]).get("source"))
-    picture = _decode(_bytes(document, image), str(document.path))
-    return (picture if (factor == 1.0).all() else encode_srgb(decode_srgb(picture) * factor)), True
+def _material(document: GltfDocument, primitive: Mapping[str, Any]) -> Mapping[str, Any]:
+    material = primitive.get("material")
+    return {} if material is None else document.item("materials", material)
 
 
-def _stack(pictures: Sequence[ByteArray], places: Sequence[FloatArray]) -> tuple[ByteArray, FloatArray]:
-    """Return the parts' pictures one above the other, and the texture coordinates there."""
-    if all(picture is pictures[0] for picture in pictures):
-        return pictures[0], np.concatenate(places)
-    height, width = sum(len(picture) for picture in pictures), max(picture.shape[1] for picture in pictures)
-    if max(height, width) > LARGEST_PX:
-        raise FormatError(f"the pictures have {width} x {height} pixels together; the limit is {LARGEST_PX} a side")
-    whole, moved, row = np.zeros((height, width, 3), np.uint8), [], 0
-    for picture, place in zip(pictures, places, strict=True):
-        own = place - np.floor(place.min(axis=1, keepdims=True) + 1e-6)
-        if own.max(initial=0.0) > 1.0 + 1e-4:
-            raise FormatError("a picture is repeated within a triangle, and there are several pictures")
-        tall, wide = picture.shape[:2]
-        whole[row : row + tall, :wide], whole[row : row + tall, wide:] = picture, picture[:, -1:]
-        u, v = own[..., 0] * wide / width, 1.0 - (row + (1.0 - own[..., 1]) * tall) / height
-        moved.append(np.stack([u, v], axis=-1))
-        row += tall
-    return whole, np.concatenate(moved)
+def _base_color(document: GltfDocument, primitive: Mapping[str, Any]) -> tuple[ByteArray, Mapping[str, Any] | None]:
+    """Return a material's base colour, sRGB, shape (H, W, 3), and how its picture lies; None where it is plain."""
+    factor = base_factor(document, primitive)
+    chosen = _material(document, primitive).get("pbrMetallicRoughness", {}).get("baseColorTexture")
+    if chosen is None or chosen.get("extensions", {}).get(_MOVED, chosen).get("texCoord", chosen.get("texCoord", 0)):
+        return plain_picture(encode_srgb(factor)), None
+    texture = document.item("textures", chosen["index"])
+    source = texture.get("extensions", {}).get(_WEBP, texture).get("source", texture.get("source"))
+    picture = decode_picture(_bytes(document, document.item("images", source)), str(document.path))
+    return (picture if (factor == 1.0).all() else encode_srgb(decode_srgb(picture) * factor)), chosen
+
+
+def _moved(place: FloatArray, chosen: Mapping[str, Any]) -> FloatArray:
+    """Return texture coordinates, v up, as KHR_texture_transform moves them: scaled, turned, shifted, with v down."""
+    change = chosen.get("extensions", {}).get(_MOVED)
+    if change is None:
+        return place
+    scale, shift = (
+        np.asarray(change.get(key, both), np.float64) for key, both in (("scale", (1, 1)), ("offset", (0, 0)))
+    )
+    sine, cosine = np.sin(float(change.get("rotation", 0.0))), np.cos(float(change.get("rotation", 0.0)))
+    down = (place * (1.0, -1.0) + (0.0, 1.0)) * scale
+    turned = down @ np.array([[cosine, -sine], [sine, cosine]]) + shift
+    if not np.isfinite(turned).all():
+        raise ValueError("a texture is moved out of reach")
+    return np.asarray(turned * (1.0, -1.0) + (0.0, 1.0))
 
 
 def _bytes(document: GltfDocument, image: Mapping[str, Any]) -> bytes:
     if "bufferView" in image:
         return document.view(image["bufferView"])[0]
     uri = str(image.get("uri", ""))
+    if not uri.startswith("data:"):
+        beside = contained(uri, document.path)
+        if not beside.is_file() or beside.stat().st_size > _LIMIT_BYTES:
+            raise FormatError(f"the picture {uri[:80]!r} is not there, or too large", where=str(document.path))
+        return beside.read_bytes()
     if not uri.startswith(_DATA):
-        raise FormatError("a picture lies in a file of its own", where=str(document.path), hint="save it as .glb")
+        raise FormatError("a picture is not a PNG, JPEG or WebP", where=str(document.path))
     try:
         return b64decode(uri.partition(",")[2], validate=True)
     except ValueError:
         raise FormatError("a picture is not base64", where=str(document.path)) from None
-
-
-def _decode(data: bytes, where: str) -> ByteArray:
-    from PIL import Image
-
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # our own limit is lower
-            with Image.open(io.BytesIO(data), formats=("PNG", "JPEG")) as image:
-                if max(image.size) > LARGEST_PX:
-                    raise FormatError(f"a picture has {image.width} x {image.height} pixels", where=where)
-                return np.array(image.convert("RGB"))
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as e:
-        raise FormatError(f"a picture is broken: {e}", where=where) from None

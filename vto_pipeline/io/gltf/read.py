@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +12,10 @@ from vto_pipeline.errors import FormatError
 from vto_pipeline.io.arrays import Arrays
 from vto_pipeline.io.gltf.document import GltfDocument, open_gltf
 from vto_pipeline.io.gltf.draco import unpack_draco
-from vto_pipeline.io.gltf.pictures import scene_picture
+from vto_pipeline.io.gltf.pictures import base_factor, scene_picture
 from vto_pipeline.io.gltf.skin import Skin, read_skin, read_weights
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.numerics.srgb import encode_srgb
+from vto_pipeline.numerics.srgb import decode_srgb, encode_srgb
 
 _TRIANGLES = 4
 _NODES = 10_000  # visits: a node may be reached by many parents in a broken file
@@ -30,9 +30,9 @@ def parse_gltf(name: str) -> Arrays:
         name: Path of a .gltf or .glb file.
 
     Returns:
-        vertices (V, 3), placed by their nodes; faces (F, 3); colors (V, 3) uint8 and texture (F, 3, 2), where every
-        part has them; if there is any, picture (H, W, 3) uint8 and the places there (F, 3, 2), where those without
-        texture coordinates are of one colour; notes.
+        vertices (V, 3), placed by their nodes; faces (F, 3); colors (V, 3) uint8, where any part has some or a base
+        colour other than white; texture (F, 3, 2), where every part has it; if there is any, picture (H, W, 3) uint8
+        and the places there (F, 3, 2), where those without texture coordinates are of one colour; notes.
         Where every part hangs on one skin also joint_names, joints (J, 3), parents (J,), weights (V, J).
 
     Raises:
@@ -40,7 +40,7 @@ def parse_gltf(name: str) -> Arrays:
     """
     document = unpack_draco(open_gltf(Path(name)))
     vertices, faces, notes = [], [], []
-    colors: list[np.ndarray] = []
+    colors: list[np.ndarray | None] = []
     textures: list[np.ndarray | None] = []
     parts = []
     count = 0
@@ -67,7 +67,7 @@ def parse_gltf(name: str) -> Arrays:
                 weights.append(shares)
             vertices.append(points)
             faces.append(triangles + count)
-            colors += [] if color is None else [color]
+            colors.append(color)
             textures.append(None if texture is None else texture[triangles])
             parts.append(primitive)
             count += len(points)
@@ -76,8 +76,12 @@ def parse_gltf(name: str) -> Arrays:
     if len(faces) > 1:
         notes.append(f"joined {len(faces)} parts into one mesh")
     arrays: Arrays = {"vertices": np.concatenate(vertices), "faces": np.concatenate(faces)}
-    if len(colors) == len(faces):
-        arrays["colors"] = np.concatenate(colors)
+    try:
+        shades = _shades(document, parts, colors, vertices)
+        if shades is not None:
+            arrays["colors"] = shades
+    except FormatError as e:  # the shape is whole without them
+        notes.append(f"colours are ignored: {e.problem}")
     placed = [place for place in textures if place is not None]
     if len(placed) == len(faces):
         arrays["texture"] = np.concatenate(placed)
@@ -102,6 +106,23 @@ def parse_gltf(name: str) -> Arrays:
             "weights": np.concatenate(weights),
         }
     return {**arrays, "notes": np.array(notes, dtype=np.str_)}
+
+
+def _shades(
+    document: GltfDocument,
+    parts: Sequence[Mapping[str, Any]],
+    colors: Sequence[np.ndarray | None],
+    vertices: Sequence[FloatArray],
+) -> np.ndarray | None:
+    """Return the colours of all vertices, sRGB, shape (V, 3), times their materials'; None where all is white."""
+    factors = [base_factor(document, part) for part in parts]
+    if all(color is None for color in colors) and all((factor == 1.0).all() for factor in factors):
+        return None
+    shades = []
+    for color, factor, points in zip(colors, factors, vertices, strict=True):
+        own = np.full((len(points), 3), 255, np.uint8) if color is None else color
+        shades.append(own if (factor == 1.0).all() else encode_srgb(decode_srgb(own) * factor))
+    return np.concatenate(shades)
 
 
 def _primitive(

@@ -11,6 +11,7 @@ from typing import Any
 
 import vto_pipeline
 from vto_pipeline.errors import InputError
+from vto_pipeline.io.companions import companions
 from vto_pipeline.io.stalls import Beat, answered
 from vto_pipeline.pipeline.given import Given
 
@@ -29,7 +30,7 @@ def digest_file(path: Path, beat: Beat = lambda: None) -> str:
 
 
 def digest_path(path: Path) -> str:
-    """Digest of a file (its type and bytes) or of a folder (names and bytes of its visible files).
+    """Digest of a file (its type and bytes, and those of files read with it) or a folder (of its visible files).
 
     Raises:
         InputError: a file is there no longer, or its folder does not answer.
@@ -42,7 +43,8 @@ def digest_path(path: Path) -> str:
 
 def _digest_path(path: Path, beat: Beat) -> str:
     if not path.is_dir():
-        return digest_value([path.suffix.lower(), digest_file(path, beat)])
+        beside = {name: digest_file(file, beat) for name, file in companions(path).items()}
+        return digest_value([path.suffix.lower(), digest_file(path, beat), *([beside] if beside else [])])
     digests = {}
     for file in path.rglob("*"):
         name = file.relative_to(path)

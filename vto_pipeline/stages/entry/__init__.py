@@ -6,5 +6,6 @@ planning: the tables, and the request and the plan of a document
 batches: the rows of a batch, planned, and finished at once where all is stored
 outcome: what a run made, and what it says
 shown, pictures: what of it can be drawn, and a small picture of that
+cards: what a notebook shows of it
 moving: its garment and avatar in motion, frame by frame
 """

@@ -9,13 +9,14 @@ from typing import Any
 
 from vto_pipeline.errors import InputError
 from vto_pipeline.io.documents import read_json
+from vto_pipeline.notebook import Presented
 from vto_pipeline.pipeline.catalogue import Catalogue
 from vto_pipeline.pipeline.execution.folder import RECORD, existing_run
 from vto_pipeline.stages.entry import planning
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Outcome(Presented):
     """A finished run.
 
     Args:

@@ -2,7 +2,8 @@
 
 command: the command
 draw: pictures of views, and of a turn
-web: a file for web pages
+parts: what goes into files for other programs
+web, obj: a file for web pages; an OBJ file
 """
 
 from vto_pipeline.cli.commands.render.command import render_command

@@ -36,6 +36,7 @@ def _names(ctx: click.Context, param: click.Parameter, value: str) -> list[str]:
 @click.option(
     "--web", type=PATH, metavar="FILE.glb", help="Also a GLB for web pages: 5 MB, 100,000 triangles, 2048 px at most."
 )
+@click.option("--obj", type=PATH, metavar="FILE.obj", help="Also an OBJ file, with materials and pictures beside it.")
 @click.option("-o", "folder", type=PATH, help="Where to; RUN/out/pictures, or `pictures` beside FILE.")
 @quiet_option
 @message_options
@@ -48,28 +49,34 @@ def render_command(
     turntable: Path | None,
     motion: Path | None,
     web: Path | None,
+    obj: Path | None,
     folder: Path | None,
 ) -> None:
     """Draw what a run made, or a mesh, without a display: garments with their textures on the body, soft shadows.
 
-    Pictures are three quarters as wide as they are high. An empty `--views ""` leaves only the turn or the GLB.
-    Of a run, that holds garments and body, and no vertex of a garment is inside the body.
+    Pictures are three quarters as wide as they are high. An empty `--views ""` leaves only the turn or the files.
+    Of a run, they hold garments and body. In the GLB, no vertex of a garment is inside the body.
 
     \b
     vto render runs/demo --views front,closeup
     vto render runs/demo --turntable demo.mp4
     vto render runs/walk --views "" --motion walk.mp4
     vto render runs/demo --views "" --web demo.glb
+    vto render runs/demo --views "" --obj demo.obj
     """
     from vto_pipeline.cli.commands.render.draw import draw_motion, draw_turn, draw_views, meshes_of
-    from vto_pipeline.cli.commands.render.web import check_name, write_web
+    from vto_pipeline.cli.commands.render.obj import write_obj_files
+    from vto_pipeline.cli.commands.render.parts import check_name
+    from vto_pipeline.cli.commands.render.web import write_web
     from vto_pipeline.io.animations import animation_writer
 
     for moving in (turntable, motion):
         if moving is not None:
             animation_writer(moving)
     if web is not None:
-        check_name(path, web)
+        check_name(path, web, ".glb")
+    if obj is not None:
+        check_name(path, obj, ".obj")
     meshes, beside = meshes_of(path)
     written: dict[str, Any] = draw_views(session, meshes, views, size, folder or beside)
     if turntable is not None:
@@ -81,4 +88,7 @@ def render_command(
     if web is not None:
         answer["web"] = made = write_web(path, web)
         lines.append(f"{'web':10}{made['file']}  {made['mb']:.1f} MB, {made['triangles']} triangles")
+    if obj is not None:
+        answer["obj"] = made = write_obj_files(path, obj)
+        lines.append(f"{'obj':10}{made['file']}  {len(made['files'])} files, {made['triangles']} triangles")
     session.answer(answer, lines)

@@ -1,0 +1,151 @@
+"""How a fine mesh rides on a coarser one: speed, flipped triangles, and layers taken for each other.
+
+`python -m vto_pipeline.bench.drape.transfer GARMENT...` takes each file as the simulation mesh. The render mesh is the
+same with a vertex on each edge, and up to half a millimetre off along its normals. So it is known which triangles every
+vertex belongs to. A vertex is on the wrong layer where the triangle it rides on has no corner near them.
+
+Violent states are sums of four waves across the garment; rows have the most squeezed and the most stretched edge.
+A triangle is flipped where it lay within 60 degrees of the surface that it rides on, and now faces against it. The
+worst state counts. Speed is that of a mesh refined until it has 300,000 vertices or more, normals included.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from scipy.sparse import coo_matrix, eye
+
+from vto_pipeline.bench.bench import Value
+from vto_pipeline.bench.live_rows import LiveRows
+from vto_pipeline.geometry.binding import Binding, apply, bind
+from vto_pipeline.geometry.topology import edges, face_normals, half_edges, vertex_normals
+from vto_pipeline.io.meshes import read_mesh
+from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.mesh import TriangleMesh
+
+_LIFT_M = 5e-4
+_STATES, _WAVES, _SLOPE = 20, 4, 0.35
+_LAY = 0.5  # cosine
+_MANY = 300_000  # vertices with which the speed is measured
+_REPEATS = 9
+
+_COLUMNS = (
+    *("garment", "vertices", "render_vertices", "mvertices_per_s", "bind_s", "rest_error_mm", "flipped"),
+    *("wrong_layer", "least_stretch", "largest_stretch"),
+)
+
+
+def refine(mesh: TriangleMesh) -> tuple[TriangleMesh, IntArray]:
+    """Return a mesh with a vertex in the middle of each edge, and the two vertices that each lies between, or is.
+
+    Args:
+        mesh: V vertices and E edges.
+
+    Returns:
+        V + E vertices and four times the faces; ends, shape (V + E, 2).
+    """
+    count, known = len(mesh.vertices), edges(mesh).astype(np.int64)
+    halves = np.sort(half_edges(mesh), axis=1).astype(np.int64)
+    number = np.searchsorted(known[:, 0] * count + known[:, 1], halves[:, 0] * count + halves[:, 1])
+    middle = (count + number).reshape(-1, 3)  # of the edges from each corner to the next
+    a, b, c = mesh.faces.T
+    ab, bc, ca = middle.T
+    faces = np.concatenate([np.column_stack(f) for f in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))])
+    ends = np.vstack([np.column_stack([np.arange(count)] * 2), known])
+    return TriangleMesh(mesh.vertices[ends].mean(axis=1), faces), ends.astype(np.int32)
+
+
+def violent_states(rest: FloatArray) -> Iterator[FloatArray]:
+    """Yield positions (V, 3) of a garment that is shaken hard, from its positions at rest [m]."""
+    rng = np.random.default_rng(0)
+    for _ in range(_STATES):
+        moved = np.array(rest)
+        for _ in range(_WAVES):
+            along, across = (v / np.linalg.norm(v) for v in rng.normal(size=(2, 3)))
+            length = rng.uniform(0.15, 0.6)
+            phase = 2 * np.pi * rest @ along / length + rng.uniform(0.0, 2 * np.pi)
+            moved += _SLOPE * length / (2 * np.pi) * np.sin(phase)[:, None] * across
+        yield moved
+
+
+def wrong_layer(sim: TriangleMesh, ends: IntArray, binding: Binding) -> int:
+    """Return how many vertices ride on a triangle none of whose corners is two edges or less from where they belong."""
+    count, links = len(sim.vertices), edges(sim)
+    step = coo_matrix((np.ones(len(links)), links.T), (count, count)).tocsr()
+    near = step + step.T + eye(count, format="csr")
+    near = (near @ near).tocsr()
+    pairs = [(end, corner) for end in ends.T for corner in binding.corners.T]
+    return int((~np.any([np.asarray(near[end, corner]).ravel() > 0 for end, corner in pairs], axis=0)).sum())
+
+
+def measure_transfer(sim: TriangleMesh) -> dict[str, Value]:
+    """Return the figures of one simulation mesh; see the module."""
+    fine, ends = refine(sim)
+    lift = np.random.default_rng(1).uniform(-_LIFT_M, _LIFT_M, (len(fine.vertices), 1))
+    fine = TriangleMesh(fine.vertices + lift * vertex_normals(fine), fine.faces)
+    binding = bind(fine, sim)
+    rest = apply(binding, sim.vertices)
+    with_surface = _facing(fine.faces, rest, binding, sim.vertices)
+    flipped, stretch = [], []
+    before = _lengths(sim, sim.vertices)
+    for moved in violent_states(sim.vertices):
+        facing = _facing(fine.faces, apply(binding, moved), binding, moved)
+        flipped.append(int(((facing < 0) & (with_surface > _LAY)).sum()))
+        stretch.append(_lengths(sim, moved) / before)
+    return {
+        "vertices": len(sim.vertices),
+        "render_vertices": len(fine.vertices),
+        **_speed(sim),
+        "rest_error_mm": float(1e3 * np.abs(rest - fine.vertices).max()),
+        "flipped": max(flipped),
+        "wrong_layer": wrong_layer(sim, ends, binding),
+        "least_stretch": float(np.min(stretch)),
+        "largest_stretch": float(np.max(stretch)),
+    }
+
+
+def _speed(sim: TriangleMesh) -> dict[str, Value]:
+    many = sim
+    while len(many.vertices) < _MANY:
+        many, _ = refine(many)
+    began = time.perf_counter()
+    binding = bind(many, sim)
+    bound = time.perf_counter() - began
+    apply(binding, sim.vertices)
+    spent = []
+    for _ in range(_REPEATS):
+        began = time.perf_counter()
+        apply(binding, sim.vertices)
+        spent.append(time.perf_counter() - began)
+    return {"mvertices_per_s": 1e-6 * len(many.vertices) / float(np.median(spent)), "bind_s": bound}
+
+
+def _facing(faces: IntArray, points: FloatArray, binding: Binding, positions: FloatArray) -> FloatArray:
+    """Cosine of each face with the surface that it rides on, shape (F,)."""
+    normals = vertex_normals(TriangleMesh(positions, binding.faces))
+    up = np.einsum("nk,nkj->nj", binding.weights, normals[binding.corners])
+    return np.einsum("fj,fj->f", face_normals(TriangleMesh(points, faces)), up[faces].mean(axis=1))
+
+
+def _lengths(mesh: TriangleMesh, positions: FloatArray) -> FloatArray:
+    one, other = positions[edges(mesh)].transpose(1, 0, 2)
+    return np.asarray(np.linalg.norm(one - other, axis=1))
+
+
+def main() -> None:
+    """Read the command line, measure, and print a row for each garment."""
+    parser = argparse.ArgumentParser(prog="python -m vto_pipeline.bench.drape.transfer", description=__doc__)
+    parser.add_argument("garment", type=Path, nargs="+", help="mesh files")
+    parser.add_argument("--out", type=Path, default=Path("runs/transfer"), metavar="DIR", help="for rows.jsonl")
+    arguments = parser.parse_args()
+    table = LiveRows(arguments.out, _COLUMNS)
+    for path in arguments.garment:
+        table.add({"garment": path.stem, **measure_transfer(read_mesh(path))})
+
+
+if __name__ == "__main__":
+    main()
