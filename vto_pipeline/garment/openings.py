@@ -90,13 +90,12 @@ def close_scan_holes(
     thinned = _thinned(shell, config.edge_mm * 1e-3, job)
     trimmed = thinned if mannequin is None else trim_ledges(thinned, mannequin, config.ledge_mm * 1e-3)
     edge = float(np.median(edge_lengths(trimmed)))
-    clean = repair(drop_flaps(trimmed, config.flap_edges * edge), RepairConfig(weld_mm=0.0), job)
+    least_perimeter = config.least_perimeter_mm * 1e-3
+    clean = repair(drop_flaps(trimmed, config.flap_edges * edge, least_perimeter), RepairConfig(weld_mm=0.0), job)
     distance = None if mannequin is None else SurfaceDistance(mannequin)
     bridged, notches = clean, 0
     if distance is not None:
-        bridged, notches = close_notches(
-            clean, distance, bare, config.least_perimeter_mm * 1e-3, config.reach_mm * 1e-3
-        )
+        bridged, notches = close_notches(clean, distance, bare, least_perimeter, config.reach_mm * 1e-3)
     shapes = measure_loops(bridged)
     is_opening = _classify(bridged, shapes, distance, config, job)
     if mannequin is not None and photos is not None and any(is_opening):

@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from vto_pipeline.geometry.geodesic import distance_from
 from vto_pipeline.geometry.laplace import extend_smoothly
 from vto_pipeline.geometry.remeshing.clip import clip_to_positive
+from vto_pipeline.geometry.remeshing.rims import perimeter
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import (
     boundary_loops,
@@ -56,10 +57,18 @@ def trim_ledges(shell: TriangleMesh, mannequin: TriangleMesh, widest: float) -> 
     return largest_piece(submesh(shell, ~ledge)[0]) if ledge.any() else shell
 
 
-def drop_flaps(shell: TriangleMesh, width: float) -> TriangleMesh:
-    """Return the shell without what hangs on it by less than `width` [m]: erode by half of it, keep the largest piece,
-    grow back."""
-    loops = boundary_loops(shell)
+def drop_flaps(shell: TriangleMesh, width: float, shortest: float) -> TriangleMesh:
+    """Return the shell without what hangs on it by less than a width: erode by half of it, keep the largest piece, grow
+    back.
+
+    Cloth between small holes hangs on nothing: they will be filled, and much of a patchy scan is such cloth.
+
+    Args:
+        shell: The cut-out garment.
+        width: [m].
+        shortest: Shorter loops are holes of the scan [m].
+    """
+    loops = [loop for loop in boundary_loops(shell) if perimeter(shell, loop) >= shortest]
     if not loops:
         return shell
     radius = 0.5 * width
