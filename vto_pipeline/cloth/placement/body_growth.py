@@ -7,7 +7,7 @@ Laplacian of the first shape kept, the flow does not pinch off necks.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import diags
 from scipy.sparse.linalg import splu
 
-from vto_pipeline.cloth.model.coarsening import coarsen
+from vto_pipeline.cloth.model.coarsening import CoarseGarment, coarsen
 from vto_pipeline.cloth.placement.flexible_escape import escape_flexibly
 from vto_pipeline.cloth.placement.limb_lead import lead_onto_limbs
 from vto_pipeline.cloth.placement.limb_openings import Piece, pieces_with_limbs
@@ -110,11 +110,22 @@ def plan_body_growth(body: TriangleMesh, garment: TriangleMesh, job: Job) -> Bod
         return first
     area, worn = laplacian(body)[1], _enclosed(garment, body)
     enough = _STILL_WORN * area[worn].sum()
-    for led in _led(first, thinning):
-        if area[worn & _enclosed(led, body)].sum() >= enough:
-            best = min(best, thinning.growth(led), key=lambda one: (one.pierced, *one.fault))
-        if best.fault == (0, 0):
-            break
+
+    def best_of(ways: Iterable[TriangleMesh], best: BodyGrowth) -> BodyGrowth:
+        for led in ways:
+            if area[worn & _enclosed(led, body)].sum() >= enough:
+                best = min(best, thinning.growth(led), key=lambda one: (one.pierced, *one.fault))
+            if best.fault == (0, 0):
+                break
+        return best
+
+    astray, few = first.fault[1] > 0, _few_vertices(garment)
+    if few is not None:
+        pieces = pieces_with_limbs(few.garment.mesh, thinning.limbs, thinning.after(_LINES))
+        ways = _led(few.garment.mesh, pieces, thinning, astray=astray)
+        best = best_of((TriangleMesh(few.prolong(led.vertices), garment.faces) for led in ways), best)
+    if few is None or (best.pierced == 0 and best.fault != (0, 0)):  # limbs that few do not free, all do not, either
+        best = best_of(_led(garment, first.pieces, thinning, astray=astray), best)
     if best is not first:
         way = 1e3 * np.linalg.norm(best.garment.vertices - garment.vertices, axis=1)
         job.warn(
@@ -130,21 +141,8 @@ def plan_body_growth(body: TriangleMesh, garment: TriangleMesh, job: Job) -> Bod
     return best
 
 
-def _led(first: BodyGrowth, thinning: Thinning) -> Iterator[TriangleMesh]:
-    """Yield the garment led onto the limbs, as a whole, and each of these and itself part by part.
-
-    It is led as one of few vertices first, which the others follow: cloth that keeps its shape goes a few edges a
-    round, so that a fine garment takes long, and may not get there. Where few are too few, all are led.
-    """
-    garment = first.garment
-    coarse, prolong = _few_vertices(garment)
-    if coarse is not garment:
-        pieces = pieces_with_limbs(coarse, thinning.limbs, thinning.after(_LINES))
-        yield from map(prolong, _ways(coarse, pieces, thinning, astray=first.fault[1] > 0))
-    yield from _ways(garment, first.pieces, thinning, astray=first.fault[1] > 0)
-
-
-def _ways(garment: TriangleMesh, pieces: list[Piece], thinning: Thinning, *, astray: bool) -> Iterator[TriangleMesh]:
+def _led(garment: TriangleMesh, pieces: list[Piece], thinning: Thinning, *, astray: bool) -> Iterator[TriangleMesh]:
+    """Yield the garment led onto the limbs, as a whole, and each of these and itself part by part."""
     body = thinning.after(0)
     onto = lead_onto_limbs(garment, body, thinning.limbs, thinning.after(_LINES), pieces)
     whole = TriangleMesh(escape_rigidly(body, garment), garment.faces)
@@ -156,15 +154,17 @@ def _ways(garment: TriangleMesh, pieces: list[Piece], thinning: Thinning, *, ast
             yield led
 
 
-def _few_vertices(garment: TriangleMesh) -> tuple[TriangleMesh, Callable[[TriangleMesh], TriangleMesh]]:
-    """Return a garment in fewer triangles, itself where it has few or must keep them, and what carries moves over."""
+def _few_vertices(garment: TriangleMesh) -> CoarseGarment | None:
+    """Return the garment in fewer triangles, which the others follow; None where it has few, or must keep them.
+
+    Cloth that keeps its shape goes a few edges a round: a fine garment takes long to be led, and may not get there.
+    """
     if len(garment.vertices) <= _FEW:
-        return garment, lambda led: led
+        return None
     try:
-        coarse = coarsen(Garment(garment, RestShape(garment.vertices)), _FEW)
+        return coarsen(Garment(garment, RestShape(garment.vertices)), _FEW)
     except (InputError, GarmentError):
-        return garment, lambda led: led
-    return coarse.garment.mesh, lambda led: TriangleMesh(coarse.prolong(led.vertices), garment.faces)
+        return None
 
 
 def _larger(tight: BodyGrowth, thinning: Thinning, job: Job) -> BodyGrowth:
