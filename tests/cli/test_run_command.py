@@ -190,14 +190,14 @@ def test_a_memory_budget_stands_beside_the_peak_and_is_not_begun_where_earlier_r
     record = json.loads(Path("runs/toy/run.json").read_text())
     most = max(record["stages"], key=lambda stage: stage["peak_mb"])
     found = f"at most {most['peak_mb'] / 1e3:.2g} GB, in {most['name']}"
-    assert line == f"  of the memory budget of 0.001 GB: {found}, which is over it"
+    assert line == f"  memory budget of 0.001 GB: {found}, which is over it"
     said = vto("run", "toy.yaml", "--memory", "1MB", "--set", "add.offset=1")
     assert (said.code, said.out, CALLS) == (2, "", [])  # and then it is
     assert "error: add takes about " in said.err
     said = vto("run", "toy.yaml", "--memory", "0.9 TB", "--set", "add.offset=1")
     assert said.code == 0
     (line,) = (line for line in said.out.splitlines() if "memory budget" in line)
-    assert line.startswith("  of the memory budget of 900 GB: at most ")
+    assert line.startswith("  memory budget of 900 GB: at most ")
     assert "over" not in line
     assert not any("memory budget" in line for line in vto("run", "toy.yaml").out.splitlines())
     for text in ("8", "8gb", "-1GB"):

@@ -59,8 +59,12 @@ class Outcome(Presented):
         return [self.folder / RECORD, *(self.path(name) for name in self.record["wanted"] if self.made(name))]
 
     def made(self, artifact: str) -> bool:
-        """Whether there is a file of an artifact; a run that was interrupted or failed has not made all it should."""
-        return (self.folder / "out" / self.tables.kind(artifact).filename).is_file()
+        """Whether there is a file of an artifact.
+
+        A run that was interrupted or failed has not made all it should, and not every table knows every artifact.
+        """
+        known = next((kind for kind in self.tables.kinds if kind.name == artifact), None)
+        return known is not None and (self.folder / "out" / known.filename).is_file()
 
     def path(self, artifact: str) -> Path:
         """Return the file of an artifact.
