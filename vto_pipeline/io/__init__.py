@@ -7,6 +7,7 @@ captures/, bodies/, motion/: what cameras deliver; what is known of a body, and 
 runs/: the artifacts of a run
 animations: moving pictures
 size_charts: flat measurements of each size
+strip_profiles: points along a hanging strip
 sniff: what a path holds
 sandbox: untrusted bytes are parsed in a limited child process
 files, arrays, documents, text_numbers: what readers and writers share
