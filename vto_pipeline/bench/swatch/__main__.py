@@ -12,8 +12,8 @@ import time
 import numpy as np
 
 from vto_pipeline.bench.swatch.strips import any_cloth, hung
+from vto_pipeline.cloth.swatch.fit import fit_strips
 from vto_pipeline.errors import VtoError
-from vto_pipeline.swatch.fit import fit_strips
 
 _HEADS = ("strips, faces", "shared noise mm", "fabrics", "refused", "error %: median", "p95", "most")
 _MORE = ("within 10 %", "covered", "interval ± %, median", "CPU s each")

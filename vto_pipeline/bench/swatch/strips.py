@@ -8,8 +8,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import OptimizeResult, brentq
 
+from vto_pipeline.cloth.swatch.strip import Strip
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.swatch.strip import Strip
 from vto_pipeline.units import GRAVITY
 
 _POINTS = 100

@@ -15,7 +15,7 @@ from vto_pipeline.errors import ConfigError
 from vto_pipeline.units import ANGLE_RAD, GRAVITY, GSM, LENGTH_M
 
 if TYPE_CHECKING:
-    from vto_pipeline.swatch.strip import Rigidity, Strip
+    from vto_pipeline.cloth.swatch.strip import Rigidity, Strip
 
 _FACES = {":up": 1, ":down": -1}
 
@@ -48,7 +48,7 @@ def fabric_command(
     vto fabric --mass 115 --strip up.csv --strip back.csv:down -o my_fabric.yaml
     vto fabric --mass 115 --overhang 96mm --angle 41.5deg
     """
-    from vto_pipeline.swatch.fit import fit_strips, from_angle
+    from vto_pipeline.cloth.swatch.fit import fit_strips, from_angle
 
     began = time.perf_counter()
     weight = mass * GSM * GRAVITY
@@ -69,8 +69,8 @@ def fabric_command(
 
 
 def _read(strip: str) -> Strip:
+    from vto_pipeline.cloth.swatch.strip import Strip
     from vto_pipeline.io.strip_profiles import read_strip_profile
-    from vto_pipeline.swatch.strip import Strip
 
     mark = next((mark for mark in _FACES if strip.endswith(mark)), "")
     path = strip.removesuffix(mark)

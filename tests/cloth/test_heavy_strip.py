@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose
 
 from vto_pipeline.bench.physics.elastica import bending_length, cantilever
 from vto_pipeline.bench.swatch.strips import exact_shape
+from vto_pipeline.cloth.swatch.elastica import gamma_of_angle, hanging, path
 from vto_pipeline.errors import InputError
-from vto_pipeline.swatch.elastica import gamma_of_angle, hanging, path
 
 PROFILES = Path(__file__).parents[3] / "shared" / "reference" / "data" / "elastica_profiles.json"
 

@@ -10,9 +10,9 @@ import pytest
 from vto_pipeline.bench.physics.cantilever import DENSITY, LENGTH, clamped_strip
 from vto_pipeline.bench.swatch.strips import any_cloth, hung
 from vto_pipeline.cloth.rest.equilibrium import equilibrium
+from vto_pipeline.cloth.swatch.fit import fit_strips, from_angle
+from vto_pipeline.cloth.swatch.strip import Strip
 from vto_pipeline.errors import InputError
-from vto_pipeline.swatch.fit import fit_strips, from_angle
-from vto_pipeline.swatch.strip import Strip
 from vto_pipeline.units import GRAVITY
 
 
@@ -22,11 +22,11 @@ def both_faces(seed, reach=0.005):
     return cloth, [hung(cloth, rng, face, reach) for face in (1, -1)]
 
 
-def coverage(seeds):
-    """Errors of the rigidity, and how many intervals hold the truth, of strips with shared noise."""
+def coverage(seeds, reach):
+    """Errors of the rigidity, and how many intervals hold the truth."""
     errors, covered = [], 0
     for seed in seeds:
-        cloth, strips = both_faces(seed)
+        cloth, strips = both_faces(seed, reach)
         found = fit_strips(strips, cloth.weight)
         errors.append(abs(found.rigidity / cloth.rigidity - 1.0))
         covered += found.interval[0] <= cloth.rigidity <= found.interval[1]
@@ -34,17 +34,19 @@ def coverage(seeds):
 
 
 def test_within_a_tenth_and_covered():
-    errors, covered = coverage(range(4))
+    errors, covered = coverage(range(4), 0.005)
     assert 0.001 < errors.max() < 0.10
     assert covered == 4
 
 
 @pytest.mark.slow
-def test_the_interval_covers_nineteen_of_twenty():
-    errors, covered = coverage(range(100, 160))
-    assert np.median(errors) < 0.05
-    assert np.mean(errors < 0.10) >= 0.95
-    assert covered >= 54  # 57 expected; fewer than 54 has a chance of 4 %
+@pytest.mark.parametrize(("reach", "within"), [(0.0, 57), (0.005, 51)])
+def test_the_interval_covers_nineteen_of_twenty(reach, within):
+    """Noise that points share over 5 mm tells less of a strip of 24 mm; the interval then has to say so."""
+    errors, covered = coverage(range(100, 160), reach)
+    assert 0.005 < np.median(errors) < 0.05
+    assert np.sum(errors < 0.10) >= within
+    assert covered >= 54  # 57 expected; fewer than 54 has a chance of 3 %
 
 
 def test_curl_is_told_from_rigidity_by_the_other_face():

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import t as student
 
+from vto_pipeline.cloth.swatch.elastica import gamma_of_angle
+from vto_pipeline.cloth.swatch.problem import CURL, LOG_RIGIDITY, Problem
+from vto_pipeline.cloth.swatch.strip import Rigidity, Strip
 from vto_pipeline.errors import InputError
-from vto_pipeline.swatch.elastica import gamma_of_angle
-from vto_pipeline.swatch.problem import CURL, LOG_RIGIDITY, Problem
-from vto_pipeline.swatch.strip import Rigidity, Strip
 
 RESOLVED = (0.7, 400.0)
 """Γ of strips that say something. Below, they hardly hang; above, all but a few millimetres at the edge are plumb."""

@@ -8,10 +8,10 @@ import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 from scipy.spatial import cKDTree
 
+from vto_pipeline.cloth.swatch.elastica import FLATTEST, STEEPEST, gamma_of_angle, hanging, path
+from vto_pipeline.cloth.swatch.noise import Noise, explain
+from vto_pipeline.cloth.swatch.strip import Strip
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.swatch.elastica import FLATTEST, STEEPEST, gamma_of_angle, hanging, path
-from vto_pipeline.swatch.noise import Noise, explain
-from vto_pipeline.swatch.strip import Strip
 
 LOG_RIGIDITY, CURL, _SHARED = 0, 1, 2
 """Places among the unknowns; then for each strip across and up of its edge, log of its overhang, angle of its edge."""
