@@ -11,6 +11,9 @@ TIME_S = {"s": 1.0, "min": 60.0, "h": 3600.0}
 MEMORY_B = {"MB": 1e6, "GB": 1e9, "TB": 1e12}
 """Bytes per unit of memory, by the unit's name."""
 
+ANGLE_RAD = {"deg": 0.017453292519943295, "rad": 1.0}
+"""Radians per unit of angle, by the unit's name."""
+
 GSM = 1e-3
 """kg/m² per g/m², the trade's "gsm"."""
 

@@ -30,6 +30,7 @@ COMMANDS = {
     "pattern": "Measure a sewing pattern, and write it in another format.",
     "between": "Make the size between two patterns, or between two meshes.",
     "advise": "Advise a customer on a size: the best one, the runner-up, and the reason.",
+    "fabric": "Measure a fabric's bending rigidity from hanging strips.",
     "motion": "Show what a motion holds, and carry it over to an avatar.",
     "info": "Describe a run, or a file or folder that may be given.",
     "prune": "Remove stored results that a run or a batch no longer needs.",

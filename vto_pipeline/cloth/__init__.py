@@ -7,6 +7,7 @@ solvers/, integrators/, implicit_step/, dynamics/: the ways to move it on in tim
 collision/, untangle/: contact, and starts that pass through themselves
 placement/, rest/: from where a garment was to a clean start; from there to rest
 rest_shape/, outfit/: shape without forces; several garments
+swatch/: a fabric's rigidity from strips that hang
 moving/: a draped garment on a body that moves
 judge/: what is true of the result, by formulas of its own
 """

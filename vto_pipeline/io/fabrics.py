@@ -11,6 +11,8 @@ from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from vto_pipeline.errors import ConfigError, InputError
 from vto_pipeline.io.documents import Document, load_yaml, suggest
 from vto_pipeline.io.fabric_formats.assumed import Figures, complete_fabric
@@ -19,6 +21,7 @@ from vto_pipeline.io.fabric_formats.fast import read_fast
 from vto_pipeline.io.fabric_formats.kes import read_kes
 from vto_pipeline.io.fabric_formats.sheets import load_csv
 from vto_pipeline.io.fabric_formats.u3m import is_u3m, load_u3m, read_u3m
+from vto_pipeline.io.files import replacing
 from vto_pipeline.model.fabric import Fabric
 
 _PRESETS = Path(__file__).parent / "fabric_presets"
@@ -67,6 +70,34 @@ def read_fabric(fabric: str | Path | Mapping[str, Any]) -> Fabric:
             raise ConfigError(problem, where="fabric", hint=suggest(str(fabric), names))
         return _read_preset(str(fabric))
     return complete_fabric(_read(_LOADERS[suffix](path)))
+
+
+def write_measured(path: Path, areal_density_gsm: float, direction: str, rigidity: float, source: str) -> None:
+    """Write a fabric file that holds a mass and a bending rigidity, and nothing that was not measured.
+
+    Args:
+        path: File, .yaml.
+        areal_density_gsm: [g/m²].
+        direction: warp or weft.
+        rigidity: In that direction [N·m].
+        source: Where the figures come from.
+
+    Raises:
+        ConfigError: the name does not end in .yaml.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in (".yaml", ".yml"):
+        raise ConfigError(
+            f"files of type {path.suffix or '(none)'} cannot hold a fabric; expected .yaml", where=str(path)
+        )
+    held = {
+        "name": path.stem,
+        "areal_density_gsm": areal_density_gsm,
+        "bending": {direction: float(f"{rigidity:.4g}")},
+        "source": source,
+    }
+    with replacing(path) as beside:
+        beside.write_text(yaml.safe_dump(held, sort_keys=False, allow_unicode=True), encoding="utf-8")
 
 
 @lru_cache(maxsize=64)  # the rows of a batch name the same few
