@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vto_pipeline.bench.swatch.strips import Cloth, hung
+from vto_pipeline.bench.physics.swatch.strips import Cloth, hung
 from vto_pipeline.io.fabrics import read_fabric
 from vto_pipeline.units import GRAVITY
 

@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from vto_pipeline.bench.physics.elastica import bending_length, cantilever
-from vto_pipeline.bench.swatch.strips import exact_shape
+from vto_pipeline.bench.physics.swatch.strips import exact_shape
 from vto_pipeline.cloth.swatch.elastica import gamma_of_angle, hanging, path
 from vto_pipeline.errors import InputError
 

@@ -10,11 +10,9 @@ cloth/, scaling/, physics/, stability/, collision/, drape/, body/, scan/, peers/
 samples/: the sample data and its truth
 motion/: how clean motions come out on five bodies; garments in motion
 unsewn/: patterns found from garments of known cut
-swatch/: rigidity measured from strips of known rigidity
 demo: how far a run on the sample data is from the truth
 first_run: what `make demo` and `make test` cost from nothing
 docs/: README and docs from templates and results
-measures: what several benches read off a cloth
 plots/: pictures of their rows
 picture, body_gallery: pictures of the docs
 """

@@ -8,7 +8,6 @@ runs/: the artifacts of a run
 animations: moving pictures
 companions: the files beside a mesh that are read with it
 size_charts: flat measurements of each size
-strip_profiles: points along a hanging strip
 sniff: what a path holds
 sandbox: untrusted bytes are parsed in a limited child process
 files, arrays, documents, text_numbers: what readers and writers share

@@ -4,6 +4,7 @@ closed_forms, elastica: what mechanics says
 meshes: flat strips and discs
 cantilever, buckling, cusick, hanging, modes: the scenes
 refinement: the order of convergence of one scene
+swatch/: rigidity measured from strips of known rigidity
 """
 
 from __future__ import annotations

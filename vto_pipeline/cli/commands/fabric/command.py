@@ -70,7 +70,7 @@ def fabric_command(
 
 def _read(strip: str) -> Strip:
     from vto_pipeline.cloth.swatch.strip import Strip
-    from vto_pipeline.io.strip_profiles import read_strip_profile
+    from vto_pipeline.io.fabric_formats.strip_profiles import read_strip_profile
 
     mark = next((mark for mark in _FACES if strip.endswith(mark)), "")
     path = strip.removesuffix(mark)

@@ -1,4 +1,4 @@
-"""`python -m vto_pipeline.bench.swatch` measures simulated strips of known rigidity, and prints errors and coverage.
+"""`python -m vto_pipeline.bench.physics.swatch` measures simulated strips of known rigidity: errors and coverage.
 
 Bars: rigidity within 10 %, and the interval of 95 % covers the truth 19 of 20 times.
 """
@@ -11,7 +11,7 @@ import time
 
 import numpy as np
 
-from vto_pipeline.bench.swatch.strips import any_cloth, hung
+from vto_pipeline.bench.physics.swatch.strips import any_cloth, hung
 from vto_pipeline.cloth.swatch.fit import fit_strips
 from vto_pipeline.errors import VtoError
 
@@ -50,7 +50,7 @@ def row(name: str, reach: float, runs: int) -> tuple[str, ...]:
 
 def main() -> int:
     """Read the command line and print the table."""
-    parser = argparse.ArgumentParser(prog="python -m vto_pipeline.bench.swatch", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m vto_pipeline.bench.physics.swatch", description=__doc__)
     parser.add_argument("--runs", type=int, default=100, help="fabrics of each scene")
     parser.add_argument("--scene", choices=list(_SCENES), action="append", help="only this; may be repeated")
     parser.add_argument("--reach-mm", type=float, action="append", help="over which noise is shared; may be repeated")
