@@ -225,6 +225,14 @@ def in_one_place(one: str, other: str) -> str:
     return json.dumps({"joints": {**ONE["joints"], one: ONE["joints"][other]}})
 
 
+def test_bytes_that_are_no_text_are_refused_with_the_line(tmp_path):
+    path = tmp_path / "a.jsonl"
+    path.write_bytes(b"\xef\xbb\xbf" + tracked_text(random_moves(1)).encode() + b"\xff{}\n")
+    with pytest.raises(FormatError, match="not a line of JSON") as caught:
+        read_motion(path)
+    assert "line 2" in caught.value.where
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [

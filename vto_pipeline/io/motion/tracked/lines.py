@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from codecs import BOM_UTF8
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
@@ -58,8 +59,9 @@ def read_lines(path: Path) -> TrackedFrames:
     """
     frames: list[dict[str, list[float]]] = []
     times: list[float] = []
-    with path.open(encoding="utf-8-sig") as file:
+    with path.open("rb") as file:
         for number, line in enumerate(file, 1):
+            line = line.removeprefix(BOM_UTF8)
             if not line.strip():
                 continue
             where = f"{path}, line {number}"
