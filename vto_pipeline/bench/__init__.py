@@ -4,6 +4,7 @@ bench, record, timing, machine, provenance: what a bench is, how it is carried o
 sources: the files that figures depend on, and which have changed since
 measures: what several benches read off a cloth
 own_process, live_rows: commands that are run one by one, and their rows
+printed_table: rows in Markdown as they come
 sample_runs: the sample documents, run and held against the truth
 report_card/: what results say as a whole: the fronts of error against run time, what got better or worse
 cloth/, scaling/, physics/, stability/, collision/, drape/, body/, scan/, peers/: the benches

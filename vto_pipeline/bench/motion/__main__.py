@@ -12,7 +12,7 @@ from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.motion.figures import crossing_frames
 from vto_pipeline.avatar.motion.retarget import retarget
 from vto_pipeline.avatar.template.template import template
-from vto_pipeline.errors import VtoError
+from vto_pipeline.bench.printed_table import print_table
 from vto_pipeline.io.motion.read import read_motion
 from vto_pipeline.model.body import Avatar, Measurements
 
@@ -81,13 +81,7 @@ def main() -> int:
     """Read the command line and print the table."""
     parser = argparse.ArgumentParser(prog="python -m vto_pipeline.bench.motion", description=__doc__)
     parser.add_argument("sources", nargs="+", metavar="FILE", help="a motion, or the name of a preset")
-    try:
-        for row in (_HEADS, ("---",) * len(_HEADS), *rows(parser.parse_args().sources)):
-            sys.stdout.write(f"| {' | '.join(row)} |\n")
-    except VtoError as error:
-        sys.stderr.write(f"{error}\n")
-        return error.exit_code
-    return 0
+    return print_table(_HEADS, rows(parser.parse_args().sources))
 
 
 if __name__ == "__main__":

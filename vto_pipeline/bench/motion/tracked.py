@@ -18,7 +18,7 @@ import numpy as np
 from vto_pipeline.avatar.model.pose import pose_avatar
 from vto_pipeline.avatar.motion.retarget import retarget
 from vto_pipeline.avatar.template.template import template
-from vto_pipeline.errors import VtoError
+from vto_pipeline.bench.printed_table import print_table
 from vto_pipeline.io.motion.read import MotionFile, read_motion
 from vto_pipeline.io.motion.tracked.lines import LANDMARKS
 from vto_pipeline.model.arrays import FloatArray
@@ -100,17 +100,9 @@ def main() -> int:
     """Read the command line and print the table."""
     parser = argparse.ArgumentParser(prog="python -m vto_pipeline.bench.motion.tracked", description=__doc__)
     parser.add_argument("sources", nargs="+", metavar="FILE", help="a motion of at least two frames")
-    try:
-        for line in (_HEADS, ("---",) * len(_HEADS)):
-            sys.stdout.write(f"| {' | '.join(line)} |\n")
-        with TemporaryDirectory() as folder:
-            for source in parser.parse_args().sources:
-                sys.stdout.write(f"| {' | '.join(row(source, Path(folder)))} |\n")
-                sys.stdout.flush()
-    except VtoError as error:
-        sys.stderr.write(f"{error}\n")
-        return error.exit_code
-    return 0
+    sources = parser.parse_args().sources
+    with TemporaryDirectory() as folder:
+        return print_table(_HEADS, (row(source, Path(folder)) for source in sources))
 
 
 if __name__ == "__main__":

@@ -15,9 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
+from vto_pipeline.bench.printed_table import print_table
 from vto_pipeline.bench.unsewn.compare import PanelErrors, compare
 from vto_pipeline.bench.unsewn.scans import draped_truth, scanned
-from vto_pipeline.errors import InputError, VtoError
+from vto_pipeline.errors import InputError
 from vto_pipeline.garment.unsewn.recover import recover
 from vto_pipeline.garment.unsewn.unsew import Unsewn
 from vto_pipeline.io.fabrics import read_fabric
@@ -125,14 +126,7 @@ def main() -> int:
     parser.add_argument("--fabric", default="cotton_poplin", help="name or file")
     parser.add_argument("--out", type=Path, metavar="FOLDER", help="where patterns, pictures and scans are kept")
     args = parser.parse_args()
-    try:
-        for row in (_HEADS, ("---",) * len(_HEADS), *rows(args.sources, args)):
-            sys.stdout.write(f"| {' | '.join(row)} |\n")
-            sys.stdout.flush()
-    except VtoError as error:
-        sys.stderr.write(f"{error}\n")
-        return error.exit_code
-    return 0
+    return print_table(_HEADS, rows(args.sources, args))
 
 
 if __name__ == "__main__":

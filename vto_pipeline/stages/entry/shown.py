@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from vto_pipeline.errors import InputError, VtoError
+from vto_pipeline.errors import InputError
 from vto_pipeline.model.mesh import Skin, TriangleMesh
 from vto_pipeline.model.render import GlbPart
 from vto_pipeline.numerics.srgb import encode_srgb
@@ -70,9 +69,8 @@ def shown_parts(outcome: Outcome) -> list[GlbPart]:
 
 def _made(outcome: Outcome) -> Iterator[str]:
     for kind in outcome.tables.kinds:
-        with suppress(VtoError):
-            if kind.filename and outcome.made(kind.name):
-                yield kind.name
+        if kind.filename and outcome.made(kind.name):
+            yield kind.name
 
 
 def painted(part: GlbPart) -> TriangleMesh:

@@ -12,6 +12,7 @@ import time
 import numpy as np
 
 from vto_pipeline.bench.physics.swatch.strips import any_cloth, hung
+from vto_pipeline.bench.printed_table import print_table
 from vto_pipeline.cloth.swatch.fit import fit_strips
 from vto_pipeline.errors import VtoError
 
@@ -55,13 +56,8 @@ def main() -> int:
     parser.add_argument("--scene", choices=list(_SCENES), action="append", help="only this; may be repeated")
     parser.add_argument("--reach-mm", type=float, action="append", help="over which noise is shared; may be repeated")
     args = parser.parse_args()
-    heads = (*_HEADS, *_MORE)
-    sys.stdout.write(f"| {' | '.join(heads)} |\n|{'---|' * len(heads)}\n")
-    for name in args.scene or _SCENES:
-        for reach in args.reach_mm or (0.0, 5.0, 20.0):
-            sys.stdout.write(f"| {' | '.join(row(name, 1e-3 * reach, args.runs))} |\n")
-            sys.stdout.flush()
-    return 0
+    scenes = ((name, reach) for name in args.scene or _SCENES for reach in args.reach_mm or (0.0, 5.0, 20.0))
+    return print_table((*_HEADS, *_MORE), (row(name, 1e-3 * reach, args.runs) for name, reach in scenes))
 
 
 if __name__ == "__main__":

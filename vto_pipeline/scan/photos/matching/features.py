@@ -107,8 +107,8 @@ def match(photos: PhotoSet, database: Path, config: FeatureConfig, job: Job, *, 
 
     Where the camera did not move, the background is left out first.
 
-    Matched by one thread: of 765 runs with two, four lost matches of whole pairs, and so changed every camera. The
-    fault is in the library, also where each thread has a database of its own. Verified by all threads.
+    Matched by one thread: with two, the library now and then loses all matches of a pair, also where each thread has a
+    database of its own, and every camera changes. Verified by all threads.
 
     Args:
         photos: Photos.
