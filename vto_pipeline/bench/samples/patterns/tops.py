@@ -1,6 +1,7 @@
 """T-shirt, shirt, dress and jacket: trunk, two-piece sleeves, and what is sewn to neck and cuffs.
 
-Front pieces are drawn as one sees the wearer; the mirrored outline is the piece of the other side or of the back. Names: front or back first, then the wearer's side.
+Front pieces are drawn as one sees the wearer; the mirrored outline is the piece of the other side or of the back.
+Names: front or back first, then the wearer's side.
 """
 
 from __future__ import annotations
