@@ -1,4 +1,4 @@
-"""Coarse to fine: a garment first comes to rest on coarser meshes, where steps are cheap.
+"""Coarse to fine: a garment first comes to rest on coarser meshes, where steps are cheap, and with softer threads.
 
 A step costs more than in proportion to the vertices, and a fine mesh has as far to go as a coarse one. So what is a
 matter of the way (the body growing, riding along, falling into place) is done once, on the coarsest mesh. Each finer
@@ -20,6 +20,7 @@ from vto_pipeline.cloth.model.build import ClothModel, at_rest, build_cloth
 from vto_pipeline.cloth.model.coarsening import CoarseGarment, coarsen
 from vto_pipeline.cloth.rest.convergence import SettlingResult
 from vto_pipeline.cloth.rest.phases import PLACED, REST, ROUGH, Phases
+from vto_pipeline.cloth.rest.softened import softened
 from vto_pipeline.cloth.rest.true_distance import some_positions, with_true_distances
 from vto_pipeline.cloth.simulation import default_skin
 from vto_pipeline.errors import GarmentError, InputError, IntersectingError
@@ -138,7 +139,7 @@ class _CoarseToFine:
         model, config, job = self._model, self._config, self._job
         if level > 0:
             config, job = self._rough, self._part(level)
-            model = build_cloth(garment.mesh, garment.rest, self._fabric, materials=config)
+            model = self._soft(garment, config)
         phases = Phases(model, garment.rest, self._fabric, config, job)
         phases.some = partial(self._some, level)
         first = TriangleMesh(body.keyframes[0], body.faces)
@@ -172,9 +173,17 @@ class _CoarseToFine:
             self._leave_out(model, f"too coarse: {error.problem}")
             return None
         before = time.perf_counter() - self._began
-        settling = phases.settle_and_clear(
-            state, stepper, body.final, deadline, (ROUGH,) if level > 0 else (PLACED, REST)
-        )
+        if level > 0:
+            settling = phases.settle_and_clear(state, stepper, body.final, deadline, (ROUGH,))
+        else:
+            softer = phases.stepper(self._soft(garment, config), collider, config.damping)
+            now = time.perf_counter()
+            rough = phases.settle_and_clear(state, softer, body.final, now + _FIRST * (deadline - now), (PLACED,))
+            stepper.steps += softer.steps
+            spent = time.perf_counter() - now
+            settling = phases.settle_and_clear(at_rest(rough.state.positions), stepper, body.final, deadline)
+            settling.trace = rough.trace + [replace(row, seconds=spent + row.seconds) for row in settling.trace]
+            settling.looks = rough.looks + settling.looks
         if level > 0 and (settling.jammed or settling.caught):
             weights = f"with forces of {settling.residual:.0f} times the weight"
             what = "it is caught in the body" if settling.caught else "its layers are jammed"
@@ -186,6 +195,11 @@ class _CoarseToFine:
             others = job.warnings[:untangled] + job.warnings[put_on:]
             self._job.notes += [f"on {len(model.mass)} vertices: {text}" for text in others]
         return RestOnMesh(model, phases, stepper, settling)
+
+    def _soft(self, garment: Garment, config: DrapeConfig) -> ClothModel:
+        """Return a garment's cloth with softer threads."""
+        fabric, materials = softened(self._fabric, config)
+        return build_cloth(garment.mesh, garment.rest, fabric, materials=materials)
 
     def _some(self, level: int, positions: FloatArray) -> FloatArray:
         """Return where some vertices of the garment's own mesh are when those of a coarser one are here [m]."""
