@@ -19,7 +19,7 @@ from vto_pipeline.cloth.dynamics.stepper import Stepper
 from vto_pipeline.cloth.model.build import ClothModel, at_rest, build_cloth
 from vto_pipeline.cloth.model.coarsening import CoarseGarment, coarsen
 from vto_pipeline.cloth.rest.convergence import SettlingResult
-from vto_pipeline.cloth.rest.phases import PLACED, REST, ROUGH, Phases
+from vto_pipeline.cloth.rest.phases import PLACED, ROUGH, Phases
 from vto_pipeline.cloth.rest.softened import softened
 from vto_pipeline.cloth.rest.true_distance import some_positions, with_true_distances
 from vto_pipeline.cloth.simulation import default_skin
