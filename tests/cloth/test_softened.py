@@ -8,13 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cloth_scenes import fabric, sheet
+from test_drape import pear, vest
 
+from vto_pipeline.cloth.drape import drape as cloth_drape
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.dynamics.residual import elastic_energy
 from vto_pipeline.cloth.model.build import build_cloth
 from vto_pipeline.cloth.rest import multiresolution
 from vto_pipeline.cloth.rest.softened import softened
 from vto_pipeline.io.documents import read_json
+from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.fabric import StretchCurve
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.stages.entry.commands import drape
@@ -69,6 +72,32 @@ def test_shear_and_fabric_stay_as_they_are():
     given = fabric(stretch=STIFF)
     soft, _ = softened(given, DrapeConfig())
     assert replace(soft, stretch_warp=STIFF, stretch_weft=STIFF) == given
+
+
+def settlings(monkeypatch, jams=False):
+    """When each settling of a vest began, on a body that grows under it [s], and when the body had grown."""
+    settle, began = multiresolution.Phases.settle_and_clear, []
+
+    def noted(self, state, stepper, *rest):
+        began.append((state.time, stepper._colliders[0].ends))
+        found = settle(self, state, stepper, *rest)
+        found.jammed = jams
+        return found
+
+    monkeypatch.setattr(multiresolution.Phases, "settle_and_clear", noted)
+    body = MovingBody(np.stack([pear().vertices, 1.05 * pear().vertices]), pear().faces)
+    cloth_drape(vest(), body, fabric(bending=1e-5), {"settle_seconds": 0.1})
+    return began
+
+
+def test_the_body_does_not_move_again_for_the_cloth_as_it_is(monkeypatch):
+    (soft, ends), (own, _) = settlings(monkeypatch)
+    assert ends > 0.01
+    assert own >= soft >= ends - 1e-9
+
+
+def test_what_jams_with_softer_threads_is_not_tried_as_it_is(monkeypatch):
+    assert len(settlings(monkeypatch, jams=True)) == 1
 
 
 @pytest.mark.slow

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.dynamics.stepper import Stepper
-from vto_pipeline.cloth.model.build import ClothModel, at_rest, build_cloth
+from vto_pipeline.cloth.model.build import ClothModel, ClothState, at_rest, build_cloth
 from vto_pipeline.cloth.model.coarsening import CoarseGarment, coarsen
 from vto_pipeline.cloth.rest.convergence import SettlingResult
 from vto_pipeline.cloth.rest.phases import PLACED, ROUGH, Phases
@@ -177,13 +177,7 @@ class _CoarseToFine:
             settling = phases.settle_and_clear(state, stepper, body.final, deadline, (ROUGH,))
         else:
             softer = phases.stepper(self._soft(garment, config), collider, config.damping)
-            now = time.perf_counter()
-            rough = phases.settle_and_clear(state, softer, body.final, now + _FIRST * (deadline - now), (PLACED,))
-            stepper.steps += softer.steps
-            spent = time.perf_counter() - now
-            settling = phases.settle_and_clear(at_rest(rough.state.positions), stepper, body.final, deadline)
-            settling.trace = rough.trace + [replace(row, seconds=spent + row.seconds) for row in settling.trace]
-            settling.looks = rough.looks + settling.looks
+            settling = _by_softer_threads(phases, softer, stepper, state, body.final, deadline)
         if level > 0 and (settling.jammed or settling.caught):
             weights = f"with forces of {settling.residual:.0f} times the weight"
             what = "it is caught in the body" if settling.caught else "its layers are jammed"
@@ -218,6 +212,31 @@ class _CoarseToFine:
             whole.progress(_FIRST * (count - level + done) / count, f"on a coarser mesh: {text}")
 
         return Job(progress, whole.scratch, whole.seed, whole.force_all)
+
+
+def _by_softer_threads(
+    phases: Phases, softer: Stepper, stepper: Stepper, state: ClothState, body: TriangleMesh, deadline: float
+) -> SettlingResult:
+    """Return how a cloth came to rest: nearly so with softer threads, then as it is; where those jam, no farther.
+
+    Args:
+        phases: Of its mesh.
+        softer, stepper: The cloth among its colliders, with softer threads and as it is.
+        state: Where to begin.
+        body: Where it is now.
+        deadline: `time.perf_counter` at which to stop.
+    """
+    began = time.perf_counter()
+    nearly = phases.settle_and_clear(state, softer, body, began + _FIRST * (deadline - began), (PLACED,))
+    stepper.steps += softer.steps
+    if nearly.jammed or nearly.caught:
+        return nearly
+    spent = time.perf_counter() - began
+    start = replace(at_rest(nearly.state.positions), time=nearly.state.time)
+    settling = phases.settle_and_clear(start, stepper, body, deadline)
+    settling.trace = nearly.trace + [replace(row, seconds=spent + row.seconds) for row in settling.trace]
+    settling.looks = nearly.looks + settling.looks
+    return settling
 
 
 def _coarser_ones(garment: Garment, most: int, job: Job) -> list[CoarseGarment]:
