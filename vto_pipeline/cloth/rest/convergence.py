@@ -175,7 +175,7 @@ def relax_to_rest(
         result.looks.append(some(after.positions))
         watch(share, result.error)
         result.caught = looks >= _JAM_LOOKS and is_caught(after.positions)
-        result.jammed = _is_jammed([one.residual for one in result.trace])
+        result.jammed = exact and _is_jammed([one.residual for one in result.trace])
         if result.caught or result.jammed:
             break
         if brief:
