@@ -4,7 +4,7 @@ The nearest triangle that faces the same way is the right one nearly everywhere.
 meshes, it may be one of the next layer. Then neighbours on the riding mesh are far apart along the other. Such edges
 are torn: the nearest point, followed along the surface from one end to the other, does not arrive where the other end
 is bound. Patches between torn edges are bound anew from the cloth about them, the smallest first. Each stays as it was
-unless that mends more edges than it costs in distance.
+unless that repairs more edges than it costs in distance.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def faces_ridden(rider: TriangleMesh, mesh: TriangleMesh) -> IntArray:
     walk, normals = SurfaceWalk(mesh), vertex_normals(rider)
     face = SurfaceDistance(mesh).nearest(rider.vertices).face
     face = _facing_the_same_way(rider.vertices, normals, face, walk)
-    face = _Patches(rider, normals, walk).mend(face)
+    face = _Patches(rider, normals, walk).rebind(face)
     for _ in range(_ROUNDS):
         face = _turned_back(rider, face, walk)
     return face
@@ -75,8 +75,8 @@ class _Patches:
         degree = np.bincount(self._links.ravel(), minlength=len(rider.vertices))
         self._first = np.cumsum([0, *degree]).astype(np.int32)
 
-    def mend(self, face: IntArray) -> IntArray:
-        """Return the triangles with patches bound anew where that mends torn edges."""
+    def rebind(self, face: IntArray) -> IntArray:
+        """Return the triangles with patches bound anew where that repairs torn edges."""
         whole = ~self._torn(self._links, face)
         if whole.all():
             return face
@@ -87,10 +87,10 @@ class _Patches:
         largest[patch[first_of_each(piece.astype(np.int64), -size[patch].astype(np.float64))]] = True
         small = np.flatnonzero(~largest)
         for number in small[np.argsort(size[small], kind="stable")]:
-            self._mend_patch(np.flatnonzero(patch == number), patch, face)
+            self._rebind_patch(np.flatnonzero(patch == number), patch, face)
         return face
 
-    def _mend_patch(self, members: NDArray[np.int64], patch: IntArray, face: IntArray) -> None:
+    def _rebind_patch(self, members: NDArray[np.int64], patch: IntArray, face: IntArray) -> None:
         """Change the triangles of a patch if that costs less; its vertices then belong to the patches about it."""
         _, place = spans(self._first[members], self._first[members + 1] - self._first[members])
         links = self._links[np.unique(self._by_end[place] // 2)]
@@ -124,7 +124,7 @@ class _Patches:
         return torn
 
     def _pieces(self, keep: NDArray[np.bool_]) -> tuple[IntArray, IntArray]:
-        """Return the piece of each vertex that hangs together by the kept edges, and the size of each piece."""
+        """Return the piece of each vertex that the kept edges connect, and the size of each piece."""
         count, links = len(self._points), self._links[keep]
         number, label = connected_components(coo_matrix((np.ones(len(links)), links.T), (count, count)), directed=False)
         return label, np.bincount(label, minlength=number).astype(np.int32)
