@@ -61,8 +61,8 @@ def test_nothing_is_given_until_each_joint_that_is_needed_was_seen():
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        (b'{"joints": {"left_hip": [NaN, 0, 0]}}\n', "NaN is no place"),
-        (b'{"joints": {"left_hip": [0, -Infinity, 0]}}\n', "-Infinity is no place"),
+        (b'{"joints": {"left_hip": [NaN, 0, 0]}}\n', "NaN is not a place"),
+        (b'{"joints": {"left_hip": [0, -Infinity, 0]}}\n', "-Infinity is not a place"),
         (b'{"joints": {"left_hip": [0, 0]}}\n', "not a place of three numbers"),
         (b'{"joints": {"left_hip": [0, 0\n', "not a line of JSON"),
         (b"\xff\xfe\n", "not a line of JSON"),

@@ -144,7 +144,7 @@ class LivePose:
 
 
 def _leaps(before: tuple[FloatArray, FloatArray], after: tuple[FloatArray, FloatArray]) -> bool:
-    """Return whether nobody can have come from one to the other, turns and translation each, in a frame."""
+    """Return whether the way from one to the other, turns and translation each, is too far for a frame."""
     turned = np.linalg.norm(matrix_vectors(np.swapaxes(before[0], -1, -2) @ after[0]), axis=1)
     return bool(np.linalg.norm(after[1] - before[1]) > _LEAP_M or turned.max() > _LEAP_RAD)
 

@@ -1,4 +1,4 @@
-"""A body that goes where it is told, frame by frame, as a collider: each vertex of the cloth keeps to its own part."""
+"""A body whose next place is set frame by frame, as a collider: each vertex of the cloth keeps to its own part."""
 
 from __future__ import annotations
 

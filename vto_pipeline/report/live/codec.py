@@ -97,7 +97,7 @@ def decode(message: bytes, last: tuple[int, Grid] | None) -> tuple[int, Grid]:
         low, ways = np.frombuffer(data[:12], "<i4"), _joined(data[12:], "<u2")
         return number, (low + ways).astype(np.int32)
     if kind != CHANGE or last is None or number != last[0] + 1 or len(data) != 2 * last[1].size:
-        raise FormatError(f"frame {number} is no key and does not follow the last one")
+        raise FormatError(f"frame {number} is not a key and does not follow the last one")
     return number, (last[1] + _joined(data, "<i2")).astype(np.int32)
 
 

@@ -1,7 +1,7 @@
 """A page and its frames, served to browsers from a thread of its own.
 
 Whoever makes frames never waits: it leaves the newest behind. A browser says which frame it has got, and is sent no
-more than a few beyond that. Where some were left out for it, or it comes back, the next frame is a key.
+more than a few beyond that; then it gets the newest. Where some were left out for it, or it comes back, that is a key.
 """
 
 from __future__ import annotations
@@ -175,6 +175,8 @@ class LiveServer:
 
             def on_message(self, message: str | bytes) -> None:
                 self.confirmed += 1
+                if live._encoded is not None and self.last != live._encoded.number:
+                    live._send(self, live._encoded, {})  # one that was left out, and may have been the last
 
             def on_close(self) -> None:
                 live._browsers.discard(self)

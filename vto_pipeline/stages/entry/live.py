@@ -79,7 +79,7 @@ def worn(outcome: Outcome, vertices: int) -> Worn:
         raise InputError("this run made no draped garment of its own", where=str(outcome.folder), hint=hint)
     if not outcome.made("avatar"):
         hint = "`vto fit` makes one of a scan or measurements; drape on that"
-        raise InputError("this run was draped on a body that is no avatar", where=str(outcome.folder), hint=hint)
+        raise InputError("this run was draped on a body that is not an avatar", where=str(outcome.folder), hint=hint)
     avatar, draped = outcome.read("avatar"), outcome.read("draped")
     garment = Garment(draped, outcome.read("worn_rest"))
     if len(draped.vertices) > _MORE * vertices:

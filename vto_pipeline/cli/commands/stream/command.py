@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from contextlib import suppress
+from itertools import count
 from pathlib import Path
 
 import click
@@ -19,7 +20,7 @@ _SAID = 5
 
 @click.command("stream")
 @click.argument("folder", metavar="RUN", type=PATH)
-@click.option("--rate", type=click.FloatRange(1, 120), default=25.0, show_default=True, help="Frames per second.")
+@click.option("--rate", type=click.FloatRange(1, 120), default=20.0, show_default=True, help="Frames per second.")
 @click.option(
     "--vertices", type=click.IntRange(100, 20000), default=1500, show_default=True, help="Of the cloth, about."
 )
@@ -48,7 +49,7 @@ def stream_command(
     """Move the avatar of a run, and its garment, as a person before a camera moves.
 
     RUN is a folder that `vto drape` made, on an avatar. Standard input holds joints as JSON lines, as for
-    `vto motion -`. A page shows the frames; a browser that loses it connects again and goes on with the newest.
+    `vto motion -`. A page shows the frames; a browser that loses it connects again and gets the newest.
     Where lines come faster than frames, the newest counts; where none come, the pose is held. Ends with the input, or
     with Ctrl-C, and says how it went.
 
@@ -68,8 +69,10 @@ def stream_command(
     from vto_pipeline.stages.entry.live import LiveReport, follow_live, worn
     from vto_pipeline.stages.entry.outcome import open_run
 
+    told = count()
+
     def refused(error: FormatError) -> None:
-        if feed.refusals <= _SAID:
+        if next(told) < _SAID:
             session.say(f"refused: {error.problem} in {error.where}")
 
     dressed, job, report = worn(open_run(folder), vertices), Job(), LiveReport()

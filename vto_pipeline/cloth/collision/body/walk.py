@@ -11,13 +11,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.arrays import IntArray
 from vto_pipeline.numerics.distance import barycentric_point, closest_on_triangle
 from vto_pipeline.numerics.vector import dot, load, sub
 
 
 def faces_around(faces: IntArray, count: int) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """Return the faces that hold each of `count` vertices: where each one's begin, (V + 1,), and all in a row, (3F,)."""
+    """Return the faces that hold each of V vertices: where each one's begin, (V + 1,), and all in a row, (3F,)."""
     corners = faces.reshape(-1)
     starts = np.concatenate([[0], np.cumsum(np.bincount(corners, minlength=count))])
     return starts.astype(np.int64), (np.argsort(corners, kind="stable") // 3).astype(np.int32)

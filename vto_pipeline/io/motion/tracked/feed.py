@@ -43,6 +43,7 @@ class Feed:
         self._first: tuple[float, float] | None = None  # its time by its own clock and by ours [s]
         self._changed = threading.Condition()
         self._over = False
+        self._broken: Exception | None = None
         threading.Thread(target=self._read, name="skeletons", daemon=True).start()
 
     @property
@@ -55,7 +56,9 @@ class Feed:
         with self._changed:
             self._changed.wait_for(lambda: self._newest is not None or self._over, patience)
             newest, self._newest = self._newest, None
-            return newest
+        if newest is None and self._broken is not None:
+            raise self._broken
+        return newest
 
     @property
     def over(self) -> bool:
@@ -74,6 +77,8 @@ class Feed:
                     continue
                 if frame is not None:
                     self._keep(frame)
+        except Exception as error:
+            self._broken = error  # for who asks: this thread has nobody to tell
         finally:
             with self._changed:
                 self._over = True

@@ -50,7 +50,7 @@ class LiveJoints:
         return tuple(name for name in NEEDED if name not in self._about)
 
     def read(self, line: bytes) -> LiveFrame | None:
-        """Return the frame of the next line; None where it shows nobody, or a joint that is needed was never seen.
+        """Return the frame of the next line; None where it shows no joint, or one that is needed was never seen.
 
         Raises:
             FormatError: the line is no frame, holds what is no number, or shows bones without length; with its number.
@@ -86,4 +86,4 @@ class LiveJoints:
 
 
 def _refuse(where: str, constant: str) -> None:
-    raise FormatError(f"{constant} is no place", where=where)
+    raise FormatError(f"{constant} is not a place", where=where)
