@@ -19,7 +19,7 @@ from vto_pipeline.avatar.motion.retarget import RetargetConfig, retarget
 from vto_pipeline.bench.printed_table import print_table
 from vto_pipeline.cloth.judge.crossings import crossings_between, self_crossings
 from vto_pipeline.cloth.moving.follow import follow
-from vto_pipeline.cloth.moving.live import LiveCloth, LiveConfig
+from vto_pipeline.cloth.moving.live import LiveCloth
 from vto_pipeline.geometry.intersections import self_intersections
 from vto_pipeline.io.motion.read import read_motion
 from vto_pipeline.model.arrays import FloatArray
@@ -60,7 +60,7 @@ def rows(dressed: Worn, path: BodyPath) -> Iterator[tuple[str, ...]]:
     took = [(time.process_time() - began) / (path.frames - 1)]
     yield ("follow", "", *_figures(truth.frames, truth.frames, bodies, dressed, took, 1e-3 * found["penetration_mm"]))
     for iterations, rounds in _BUDGETS:
-        config = LiveConfig(iterations=iterations, contact_rounds=rounds)
+        config = {"iterations": iterations, "contact_rounds": rounds}
         LiveCloth(dressed.garment, dressed.avatar.mesh, dressed.fabric, config).advance(bodies[0], path.frame_time)
         cloth = LiveCloth(dressed.garment, dressed.avatar.mesh, dressed.fabric, config)
         frames, took = [cloth.positions], []

@@ -6,12 +6,15 @@ what it would pass through or repeated, and a vertex is held off the part of the
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from pydantic import Field
 
 from vto_pipeline.cloth.collision.contacts import ContactSpan
-from vto_pipeline.cloth.model.build import at_rest, build_cloth
+from vto_pipeline.cloth.model.build import ClothState, at_rest, build_cloth
 from vto_pipeline.cloth.model.materials import Materials
+from vto_pipeline.cloth.model.settings import checked
 from vto_pipeline.cloth.moving.live_body import LiveBody
 from vto_pipeline.cloth.simulation import default_skin
 from vto_pipeline.cloth.solvers.newton import Limits, Newton
@@ -42,15 +45,25 @@ class LiveCloth:
         garment: At rest on the body.
         body: What it is on.
         fabric: What it is made of.
-        config: Settings.
+        config: Settings, or keys of `LiveConfig`.
 
     Attributes:
         deepest: How deep a vertex has been in its part of the body so far [m].
         restarts: How often the garment was laid on the body anew, as it had gone astray.
     """
 
-    def __init__(self, garment: Garment, body: TriangleMesh, fabric: Fabric, config: LiveConfig | None = None) -> None:
-        self._config = config or LiveConfig()
+    _state: ClothState
+    _body: LiveBody
+    _solver: Newton
+
+    def __init__(
+        self,
+        garment: Garment,
+        body: TriangleMesh,
+        fabric: Fabric,
+        config: LiveConfig | Mapping[str, object] | None = None,
+    ) -> None:
+        self._config = checked(LiveConfig, config)
         self._model = build_cloth(garment.mesh, garment.rest, fabric, materials=self._config)
         self._skin = np.full(len(self._model.mass), default_skin(self._model.edge_length))
         self._laid = bind(garment.mesh, body)
