@@ -14,7 +14,6 @@ from vto_pipeline.garment.sizes.rules import guess_rules, read_rules, rule_names
 from vto_pipeline.garment.sizes.widths import width_at
 from vto_pipeline.io.patterns.read import read_pattern
 from vto_pipeline.io.patterns.write import write_pattern
-from vto_pipeline.model.job import Job
 from vto_pipeline.model.pattern import Pattern
 
 
@@ -57,7 +56,7 @@ def test_trousers_measure_as_they_were_drawn():
 
 def test_a_turned_panel_measures_the_same(tmp_path):
     """Without a place in space, and by way of DXF, whose grain line and stitches say it all."""
-    write_pattern(tmp_path / "tee.dxf", tee(), Job())
+    write_pattern(tmp_path / "tee.dxf", tee())
     assert flat(read_pattern(tmp_path / "tee.dxf")) == pytest.approx(flat(tee()), abs=1e-5)
 
 

@@ -17,7 +17,6 @@ from vto_pipeline.io.patterns.read import parse_json
 from vto_pipeline.io.patterns.record import pattern_of
 from vto_pipeline.io.patterns.svg.read import parse_svg
 from vto_pipeline.io.patterns.write import write_pattern
-from vto_pipeline.model.job import Job
 
 DRAWING = """<svg xmlns="http://www.w3.org/2000/svg" width="500mm" height="500mm" viewBox="0 0 500 500">
 <g transform="rotate(10) scale(1.5)"><path id="p"
@@ -28,7 +27,7 @@ d="M10,10 h200 v100 q-9,9 -50,50 c1,2 3,4 -50,9 a20,30 5 0 1 -99,-9 z"/>
 def _written(suffix: str) -> str:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"a{suffix}"
-        write_pattern(path, rich_pattern(), Job())
+        write_pattern(path, rich_pattern())
         return path.read_text(encoding="utf-8")
 
 

@@ -239,7 +239,7 @@ def test_garbage_is_refused(tmp_path):
 
 def test_ours_as_ezdxf_reads_it(tmp_path):
     pattern = Pattern("disc", (half_disc(0.3, "left", -1.0), half_disc(0.2, "right", 1.0)))
-    write_pattern(tmp_path / "o.dxf", pattern, Job())
+    write_pattern(tmp_path / "o.dxf", pattern)
     assert (tmp_path / "o.dxf").read_bytes().isascii()
     document, auditor = recover.readfile(tmp_path / "o.dxf")
     assert not auditor.has_errors
@@ -256,13 +256,15 @@ def test_ours_as_ezdxf_reads_it(tmp_path):
 
 
 def test_all_that_dxf_holds_comes_back(tmp_path):
-    job = Job()
-    write_pattern(tmp_path / "r.dxf", rich_pattern(), job)
-    assert job.notes == ["r.dxf: DXF has no place for where panels stand in space; JSON has"]
+    write_pattern(tmp_path / "r.dxf", rich_pattern())
     back = read_pattern(tmp_path / "r.dxf")
     assert (back.name, back.stitches) == (rich_pattern().name, rich_pattern().stitches)
     for now, was in zip(back.panels, rich_pattern().panels, strict=True):
         assert (now.name, now.size, now.notes) == (was.name, was.size, was.notes)
+        assert (now.placement is None) == (was.placement is None)
+        if was.placement is not None:
+            assert now.placement.rotation == pytest.approx(was.placement.rotation, abs=1e-9)
+            assert now.placement.translation == pytest.approx(was.placement.translation, abs=1e-12)
         assert len(now.edges) == len(was.edges)
         assert len(now.cut) == len(was.cut)
         for a, b in zip((*now.edges, *now.cut), (*was.edges, *was.cut), strict=True):
@@ -282,7 +284,7 @@ def test_all_that_dxf_holds_comes_back(tmp_path):
 @given(panels())
 def test_any_outline_comes_back(tmp_path_factory, panel):
     path = tmp_path_factory.mktemp("any") / "a.dxf"
-    write_pattern(path, Pattern("any", (panel,)), Job())
+    write_pattern(path, Pattern("any", (panel,)))
     import json
 
     (back,) = pattern_of(json.loads(str(parse_dxf(str(path), "")["pattern"])), "a").panels

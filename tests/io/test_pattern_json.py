@@ -34,7 +34,7 @@ def read(tmp_path, data, job=None):
 
 
 def test_our_json_comes_back_bit_for_bit(tmp_path):
-    write_pattern(tmp_path / "a.json", rich_pattern(), Job())
+    write_pattern(tmp_path / "a.json", rich_pattern())
     assert record_of(read_pattern(tmp_path / "a.json")) == record_of(rich_pattern())
 
 

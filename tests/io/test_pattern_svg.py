@@ -131,7 +131,7 @@ def test_no_panels_no_svg_and_bombs_are_refused(tmp_path):
 
 
 def test_ours_comes_back_whole(tmp_path):
-    write_pattern(tmp_path / "r.svg", rich_pattern(), Job())
+    write_pattern(tmp_path / "r.svg", rich_pattern())
     was, now = (json.loads(json.dumps(record_of(p))) for p in (rich_pattern(), read_pattern(tmp_path / "r.svg")))
     flat_was, flat_now = flattened(was), flattened(now)
     assert flat_was.keys() == flat_now.keys()
@@ -148,7 +148,7 @@ def flattened(value, key=""):
 
 
 def test_ours_has_its_true_size_and_every_panel_on_the_page(tmp_path):
-    write_pattern(tmp_path / "o.svg", Pattern("disc", (half_disc(0.3),)), Job())
+    write_pattern(tmp_path / "o.svg", Pattern("disc", (half_disc(0.3),)))
     root = ElementTree.parse(tmp_path / "o.svg").getroot()
     width, height = (float(root.get(key).removesuffix("mm")) for key in ("width", "height"))
     assert (width, height) == (pytest.approx(640.0, abs=1e-6), pytest.approx(340.0, abs=0.2))
@@ -164,7 +164,7 @@ def test_ours_has_its_true_size_and_every_panel_on_the_page(tmp_path):
 @given(panels())
 def test_any_panel_comes_back(tmp_path_factory, panel):
     path = tmp_path_factory.mktemp("any") / "a.svg"
-    write_pattern(path, Pattern("any", (panel,)), Job())
+    write_pattern(path, Pattern("any", (panel,)))
     (back,) = pattern_of(json.loads(str(parse_svg(str(path), "")["pattern"])), "a").panels
     for a, b in zip(back.edges, panel.edges, strict=True):
         assert (a.kind, len(a.points)) == (b.kind, len(b.points))

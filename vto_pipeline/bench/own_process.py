@@ -22,11 +22,13 @@ class Ended(NamedTuple):
     Args:
         code: Its exit code; None when it ran out of time, negative when a signal ended it.
         seconds: Wall time [s].
+        cpu_seconds: Of it and all that it started and waited for [s].
         peak_mb: Largest memory of it or of one of its children [MB].
     """
 
     code: int | None
     seconds: float
+    cpu_seconds: float
     peak_mb: float
 
 
@@ -52,4 +54,5 @@ def run_vto(arguments: Sequence[str], log: Path, limit: float) -> Ended:
             time.sleep(_LOOK)
     _, status, usage = ended
     process.returncode = code = os.waitstatus_to_exitcode(status)
-    return Ended(None if late else code, time.perf_counter() - began, usage.ru_maxrss / 1000)
+    spent, busy = time.perf_counter() - began, usage.ru_utime + usage.ru_stime
+    return Ended(None if late else code, spent, busy, usage.ru_maxrss / 1000)

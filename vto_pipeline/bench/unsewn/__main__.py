@@ -111,7 +111,7 @@ def _table(name: str, errors: list[PanelErrors], found: Unsewn) -> Iterator[tupl
 def _keep(folder: Path, name: str, found: Unsewn, scan: TriangleMesh | None) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for suffix in (".json", ".svg"):
-        write_pattern(folder / f"{name}{suffix}", found.pattern, Job())
+        write_pattern(folder / f"{name}{suffix}", found.pattern)
     write_panels_obj(folder / f"{name}_panels.obj", found.mesh)
     if scan is not None:
         write_ply(folder / f"{name}_scan.ply", scan)

@@ -3,7 +3,8 @@
 Alternates between the best rigid frame of each triangle and the positions that agree best with all frames (Liu, Zhang,
 Xu, Gotsman & Gortler 2008, "A local/global approach to mesh parameterization", section 4, from the plane to space
 instead of the other way round). The frames begin as the panels are placed, so that the first solution spreads the
-closing of the seams over the panels.
+closing of the seams over the panels. Each vertex is drawn to where its panel stands about the body, first strongly,
+then ever less. So the garment stays open for the body, and hardly folds into itself.
 """
 
 from __future__ import annotations
@@ -18,15 +19,14 @@ from scipy.spatial.transform import Rotation
 
 from vto_pipeline.garment.pattern.sew import Sewn
 from vto_pipeline.geometry.topology import laid_edge_lengths
-from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
-_ROUNDS = 150
-_INFLATED = 100  # of these: at first it is blown up, so that it is a tube that a body finds its place in, not a pillow
-_PRESSURE = 0.5  # times the reach, against the stiffness of the frames: stretches a tube by a few percent
-_BULGE = 0.2  # of its reach
-_HOLD = 1e-6  # weight of staying in place against the frames: they leave the whole free to move
+_ROUNDS = 20  # at each of the holds
+_HOLDS = (0.1, 0.01, 1e-3, 1e-4, 1e-5, 1e-6)  # weights of staying in place against the frames
+_MOMENTUM = 0.9  # of the last move; plain alternation takes several times the rounds
+_BULGE = 0.1  # of its reach
 _LEAST_COT = 0.05  # weights stay positive where a corner is blunt
 
 
@@ -51,7 +51,7 @@ def embed(mesh: TriangleMesh, frames: FloatArray) -> FloatArray:
     """Return positions near the mesh's in which its triangles have the shape of their panels [m], shape (V, 3).
 
     Args:
-        mesh: Its texture coordinates are the panels [m]; its positions only say where the whole is.
+        mesh: Its texture coordinates are the panels [m]; its positions are where these stand about the body.
         frames: Where the axes of each triangle's panel point at first, orthonormal columns, shape (F, 3, 2).
     """
     assert mesh.texture is not None
@@ -62,22 +62,19 @@ def embed(mesh: TriangleMesh, frames: FloatArray) -> FloatArray:
     rows, columns = start.ravel(), end.ravel()
     links = coo_array((weight.ravel(), (rows, columns)), shape=(count, count))
     links = links + links.T
-    hold = _HOLD * float(weight.mean())
-    solver = splu(csc_array(_diagonal(links.sum(axis=1) + hold) - links))
-    x = mesh.vertices
-    reach = float(np.linalg.norm(x - x.mean(axis=0), axis=1).max())
-    for number in range(_ROUNDS):
-        wanted = weight[:, :, None] * (flat @ np.swapaxes(frames, 1, 2))  # along each side, in space
-        right = hold * mesh.vertices
-        for k in range(3):
-            right[:, k] += np.bincount(columns, wanted[:, :, k].ravel(), count)
-            right[:, k] -= np.bincount(rows, wanted[:, :, k].ravel(), count)
-        if 0 < number < _INFLATED:
-            right += _PRESSURE / reach * _area_vectors(mesh.faces, x)
-        x = np.asarray(solver.solve(right))
-        if number == 0:
-            x = x + _bulge(mesh, frames)
-        frames = _frames(np.roll(x[mesh.faces], -1, axis=1) - x[mesh.faces], flat, weight)
+    x = place = mesh.vertices + _bulge(mesh, frames)
+    for share in _HOLDS:
+        hold = share * float(weight.mean())
+        solver = splu(csc_array(_diagonal(links.sum(axis=1) + hold) - links))
+        for _ in range(_ROUNDS):
+            wanted = weight[:, :, None] * (flat @ np.swapaxes(frames, 1, 2))  # along each side, in space
+            right = hold * place
+            for k in range(3):
+                right[:, k] += np.bincount(columns, wanted[:, :, k].ravel(), count)
+                right[:, k] -= np.bincount(rows, wanted[:, :, k].ravel(), count)
+            before, x = x, np.asarray(solver.solve(right))
+            ahead = (x + _MOMENTUM * (x - before))[mesh.faces]
+            frames = _frames(np.roll(ahead, -1, axis=1) - ahead, flat, weight)
     return x
 
 
@@ -91,12 +88,6 @@ def _as_placed(x: FloatArray, placed: FloatArray) -> FloatArray:
     found = turn.apply(around) + placed.mean(axis=0)
     found[:, 1] += placed[:, 1].max() - found[:, 1].max()
     return np.asarray(found)
-
-
-def _area_vectors(faces: IntArray, x: FloatArray) -> FloatArray:
-    """Return a third of the area vectors of the faces around each vertex [m²], shape (V, 3)."""
-    third = np.cross(x[faces[:, 1]] - x[faces[:, 0]], x[faces[:, 2]] - x[faces[:, 0]]) / 6.0
-    return np.stack([np.bincount(faces.ravel(), np.repeat(third[:, k], 3), len(x)) for k in range(3)], axis=1)
 
 
 def _bulge(mesh: TriangleMesh, frames: FloatArray) -> FloatArray:

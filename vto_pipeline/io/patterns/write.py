@@ -9,19 +9,17 @@ from vto_pipeline.io.documents import write_json
 from vto_pipeline.io.patterns.dxf.write import write_dxf
 from vto_pipeline.io.patterns.record import record_of
 from vto_pipeline.io.patterns.svg.write import write_svg
-from vto_pipeline.model.job import Job
 from vto_pipeline.model.pattern import Pattern
 
 SUFFIXES = (".dxf", ".svg", ".json")
 
 
-def write_pattern(path: Path, pattern: Pattern, job: Job) -> None:
+def write_pattern(path: Path, pattern: Pattern) -> None:
     """Write a pattern.
 
     Args:
         path: Ends in .dxf, .svg or .json.
         pattern: Any.
-        job: Notified of what the format cannot hold.
 
     Raises:
         ConfigError: another suffix.
@@ -31,7 +29,7 @@ def write_pattern(path: Path, pattern: Pattern, job: Job) -> None:
     if suffix not in SUFFIXES:
         raise ConfigError(f"patterns are written as {', '.join(SUFFIXES)}, not as {suffix or 'a file without suffix'}")
     if suffix == ".dxf":
-        write_dxf(path, pattern, job)
+        write_dxf(path, pattern)
     elif suffix == ".svg":
         write_svg(path, pattern)
     else:

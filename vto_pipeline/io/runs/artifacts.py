@@ -78,7 +78,7 @@ def _write_avatar_mesh(path: Path, avatar: Avatar) -> None:
 
 
 def _write_pattern(path: Path, pattern: Pattern) -> None:
-    write_pattern(path, pattern, Job())
+    write_pattern(path, pattern)
 
 
 def _leaf(name: str, about: str, read: Callable[..., Any], **more: Any) -> ArtifactKind:

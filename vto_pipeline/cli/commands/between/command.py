@@ -49,7 +49,7 @@ def _pattern(small: Path, large: Path, share: float, output: Path, job: Any) -> 
     from vto_pipeline.io.patterns.write import write_pattern
 
     made = pattern_between(read_pattern(small, job=job), read_pattern(large, job=job), share)
-    write_pattern(output, made, job)
+    write_pattern(output, made)
     return {"kind": "pattern", "panels": len(made.panels)}
 
 

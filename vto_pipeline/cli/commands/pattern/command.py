@@ -169,7 +169,7 @@ def _describe(
         if taken is not None and output.suffix.lower() == ".obj":
             write_panels_obj(output, taken.mesh)
         else:
-            write_pattern(output, pattern, job)
+            write_pattern(output, pattern)
     flat = flat_facts(pattern, kind)
     facts = {"path": str(path), **pattern_facts(pattern), "flat": flat, "notes": job.notes}
     lines = [f"{path}: {pattern.name}, unit: {pattern.unit}", *pattern_lines(pattern), "", *flat_lines(flat), ""]

@@ -50,7 +50,7 @@ def graded_facts(
     output.mkdir(parents=True, exist_ok=True)
     written = [output / f"{_file_name(pattern.name)}_{row.size}{suffix}" for row in rows]
     for path, row in zip(written, rows, strict=True):
-        write_pattern(path, made.of_size(row.size), job)
+        write_pattern(path, made.of_size(row.size))
     write_json(output / SIZE_CHART, chart)
     return {**chart, "written": [str(path) for path in (*written, output / SIZE_CHART)]}
 

@@ -5,7 +5,7 @@ entities, texts: what a block holds, in curves and in words
 piece: a block as a panel
 fold: half a panel opened at its mirror line
 borders: where one edge of an outline ends and the next begins
-stitch_texts: stitches in words
+stitch_texts, placement_text: stitches, and where a panel stands in space, in words
 write: a pattern as a file of release 12
 layers: what lies on which layer
 """

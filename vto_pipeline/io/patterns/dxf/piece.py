@@ -12,6 +12,7 @@ from vto_pipeline.io.patterns.dxf import layers
 from vto_pipeline.io.patterns.dxf.borders import split_at_borders
 from vto_pipeline.io.patterns.dxf.entities import Piece
 from vto_pipeline.io.patterns.dxf.fold import Fold, fold_of
+from vto_pipeline.io.patterns.dxf.placement_text import placement_of
 from vto_pipeline.io.patterns.dxf.texts import key_and_value
 from vto_pipeline.io.patterns.loops import JOIN_M, Chain, Joined, anticlockwise, edges_area, join
 from vto_pipeline.model.arrays import FloatArray
@@ -74,6 +75,7 @@ def panel_of(piece: Piece, block: str, scale: float, notes: list[str]) -> Panel:
         tuple(lines),
         drills if len(drills) else None,
         cut,
+        placement=next(filter(None, (placement_of(text) for _, text in piece.texts)), None),
         notes=_remarks(piece),
     )
 
@@ -81,7 +83,8 @@ def panel_of(piece: Piece, block: str, scale: float, notes: list[str]) -> Panel:
 def _remarks(piece: Piece) -> tuple[str, ...]:
     """Return what else the file says of a piece."""
     texts = [text for layer, text in piece.texts if layer in (layers.BOUNDARY, layers.ANNOTATION)]
-    return tuple(dict.fromkeys(text for text in texts if key_and_value(text)[0] not in (*_NAMES, "UNITS")))
+    told = (*_NAMES, "UNITS")
+    return tuple(dict.fromkeys(t for t in texts if key_and_value(t)[0] not in told and placement_of(t) is None))
 
 
 def _outline(joined: Joined, block: str, notes: list[str]) -> tuple[tuple[Edge, ...], list[Chain]]:

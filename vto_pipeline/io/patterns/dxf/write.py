@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 
 from vto_pipeline.io.files import replacing
-from vto_pipeline.io.patterns.dxf import layers
+from vto_pipeline.io.patterns.dxf import layers, placement_text
 from vto_pipeline.io.patterns.dxf.stitch_texts import text_of
 from vto_pipeline.io.patterns.loops import edges_points
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.model.job import Job
 from vto_pipeline.model.pattern import Edge, Panel, Pattern
 from vto_pipeline.numerics.plane_curves import flatten
 
@@ -30,16 +29,15 @@ _LAYER_OF_LINE = {kind: layer for layer, kind in layers.LINE_KINDS.items()} | {
 }
 
 
-def write_dxf(path: Path, pattern: Pattern, job: Job) -> None:
+def write_dxf(path: Path, pattern: Pattern) -> None:
     """Write a pattern.
 
     Curves become polylines within `CURVE_M`, with turn points at the ends of edges and curve points between. Stitches
-    are annotations, as the standard has no place for them.
+    and where panels stand in space are texts, as the standard has no place for them.
 
     Args:
         path: The file.
         pattern: Any.
-        job: Notified of what the format cannot hold.
     """
     import ezdxf
     from ezdxf.addons import gerber_D6673
@@ -55,8 +53,6 @@ def write_dxf(path: Path, pattern: Pattern, job: Job) -> None:
         block = document.blocks.new(_block_name(number, panel))
         _draw(block, panel)
         space.add_blockref(block.name, (0.0, 0.0), dxfattribs={"layer": str(layers.BOUNDARY)})
-    if any(panel.placement is not None for panel in pattern.panels):
-        job.note(f"{path.name}: DXF has no place for where panels stand in space; JSON has")
     with replacing(path) as beside, beside.open("w", encoding="ascii", errors="dxfreplace") as stream:
         gerber_D6673.export_stream(document, stream)
 
@@ -69,6 +65,8 @@ def _block_name(number: int, panel: Panel) -> str:
 
 def _draw(block: Any, panel: Panel) -> None:
     words = [f"PIECE NAME: {panel.name}", *([f"SIZE: {panel.size}"] if panel.size else []), *panel.notes]
+    if panel.placement is not None:
+        words.append(placement_text.text_of(panel.placement))
     middle = _MM * edges_points(panel.edges, CURVE_M).mean(axis=0)
     for number, text in enumerate(words):
         _text(block, text, layers.BOUNDARY, (middle[0], middle[1] - 2.0 * _TEXT_MM * number))

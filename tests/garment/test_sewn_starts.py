@@ -1,0 +1,27 @@
+"""Patterns by others as they start: ipctk finds no crossing in jackets and hoods, whose fronts are open."""
+
+from __future__ import annotations
+
+import ipctk
+import numpy as np
+import pytest
+from size_shapes import FOREIGN
+
+from vto_pipeline.garment.pattern.embed import in_shape
+from vto_pipeline.garment.pattern.sew import SewConfig, sew
+from vto_pipeline.io.patterns.read import read_pattern
+from vto_pipeline.model.job import Job
+
+TOPS = sorted((FOREIGN / "basic tee").glob("*.json"))
+
+
+@pytest.mark.real_data
+@pytest.mark.skipif(not TOPS, reason="shared data absent")
+@pytest.mark.parametrize("path", TOPS, ids=lambda path: path.stem)
+def test_tops_of_others_start_without_crossing_themselves(path):
+    job = Job()
+    mesh = in_shape(sew(read_pattern(path), SewConfig(edge_mm=30.0), job), job)
+    assert not ipctk.has_intersections(
+        ipctk.CollisionMesh(mesh.vertices, ipctk.edges(mesh.faces), mesh.faces), np.asfortranarray(mesh.vertices)
+    )
+    assert max(abs(job.metrics[f"stretch_p{p}_share"]) for p in ("01", "99")) < 0.02  # cotton yields as much
