@@ -17,8 +17,9 @@ from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.scan.photos import sfm as sfm_module
 from vto_pipeline.scan.photos.board import board_corners, detect_board
+from vto_pipeline.scan.photos.matching.board_poses import Placed, line_distance, place_photos
 from vto_pipeline.scan.photos.matching.features import SURE, FeatureConfig, detect, match
-from vto_pipeline.scan.photos.matching.from_board import Placed, line_distance, map_from_board, place_photos
+from vto_pipeline.scan.photos.matching.from_board import map_from_board
 from vto_pipeline.scan.photos.sfm import SfmConfig, estimate_cameras, load_colmap
 from vto_pipeline.scan.similarity import fit_similarity
 
@@ -102,15 +103,14 @@ def test_another_board_places_nothing():
 
 
 def test_distance_from_the_line_of_exact_matches_is_zero_and_of_shifted_ones_their_shift():
-    poses, points = orbit(12)[[0, 1]], np.random.default_rng(4).uniform(-0.1, 0.1, (200, 3)) + [0, 0.25, 0]
+    poses = orbit(12)[[0, 1]]
+    points = np.random.default_rng(4).uniform([-0.1, 0.15, -0.1], [0.1, 0.35, 0.1], (200, 3))
     lens = replace(LENS, k1=-0.1)
-    first, second = (
-        Placed(pose[:3, :3].T, -pose[:3, :3].T @ pose[:3, 3], np.ones(6, dtype=bool)) for pose in poses
-    )
+    first, second = (Placed(pose[:3, :3].T, -pose[:3, :3].T @ pose[:3, 3], np.ones(6, dtype=bool)) for pose in poses)
     here, there = (project(points, pose, lens) + 0.5 for pose in poses)
     camera = colmap_camera(lens)
     assert line_distance(camera, camera, first, second, here, there).max() < 1e-6
-    up = there + [0.0, 4.0]  # the cameras are beside each other: lines are all but level
+    up = there + np.array([0.0, 4.0])  # the cameras are beside each other: lines are all but level
     shifted = line_distance(camera, camera, first, second, here, up)
     assert_allclose(shifted, 4.0 / np.sqrt(2.0), rtol=0.1, atol=0)  # either point may give way
     assert len(line_distance(camera, camera, first, second, here[:0], there[:0])) == 0

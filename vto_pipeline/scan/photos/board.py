@@ -13,7 +13,6 @@ from vto_pipeline.model.frames import CharucoBoard, PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.scan.library_message import library_message
 
-
 LONGER_SIDE = 2400
 """Smaller photos are enlarged to this [px]: a marker seen at a slant is then told from its neighbours."""
 

@@ -78,12 +78,12 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
         job.progress(0.7, f"placing cameras, {pairs} matched pairs")
         tried = _placed(photos, database, counts, pairs, job)
         again = None
-        if fixed_camera and tried.count < len(photos.paths):
+        if fixed_camera and tried.placed < len(photos.paths):
             again = _beside_background(photos, Path(scratch), config, job)
-        elif tried.count < FEW * len(photos.paths) and database.stem == "sure" and not tried.by_board:
-            job.note(f"only {tried.count} of {len(photos.paths)} photos could be placed: looking for fainter features")
+        elif tried.placed < FEW * len(photos.paths) and database.stem == "sure" and not tried.by_board:
+            job.note(f"only {tried.placed} of {len(photos.paths)} photos could be placed: looking for fainter features")
             again = _faint(photos, photos, Path(scratch) / "faint", config, job)
-        if again is not None and again.count > tried.count and (again.by_board or again.count >= MOST * len(counts)):
+        if again is not None and again.placed > tried.placed and (again.by_board or again.placed >= MOST * len(counts)):
             tried = again
         model, counts, pairs = tried.model, tried.features, tried.pairs
     names = [path.name for path in photos.paths]
@@ -128,7 +128,7 @@ class _Tried(NamedTuple):
     by_board: bool
 
     @property
-    def count(self) -> int:
+    def placed(self) -> int:
         """How many photos were placed."""
         return 0 if self.model is None else int(self.model.num_reg_images())
 
@@ -137,12 +137,12 @@ def _placed(photos: PhotoSet, database: Path, features: list[int], pairs: int, j
     """Place photos by their features, or by the board if these place few and it places more."""
     folder, names = photos.paths[0].parent, tuple(path.name for path in photos.paths)
     tried = _Tried(map_photos(database, folder, len(names), job), features, pairs, by_board=False)
-    if tried.count >= FEW * len(names) or photos.board is None:
+    if tried.placed >= FEW * len(names) or photos.board is None:
         return tried
-    job.note(f"only {tried.count} of {len(names)} photos could be placed by features: looking for the board")
+    job.note(f"only {tried.placed} of {len(names)} photos could be placed by features: looking for the board")
     found = dict(zip(names, detect_board(photos, names, job), strict=True))
     by_board = _Tried(map_from_board(database, folder, photos.board, found, job), features, pairs, by_board=True)
-    return by_board if by_board.count > tried.count else tried
+    return by_board if by_board.placed > tried.placed else tried
 
 
 def _beside_background(photos: PhotoSet, scratch: Path, config: SfmConfig, job: Job) -> _Tried | None:

@@ -94,7 +94,7 @@ def _merit(model: Any) -> tuple[int, float]:
 
 
 def copy_database(database: Path, name: str) -> Path:
-    """Return a copy in a folder of that name: each mapper writes to its own database: calibration changes the cameras in it.
+    """Return a copy in a folder of that name: each mapper writes to its own, for calibration changes the cameras in it.
 
     Copied by SQLite: what was committed may still lie in the write-ahead log, which a copy of the file would miss.
     """

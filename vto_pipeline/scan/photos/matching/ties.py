@@ -37,7 +37,9 @@ def untie(model: Any, sure: Sequence[int] = ()) -> Any:
             for row, point in enumerate(model.points3D.values())
             for element in point.track.elements
         ]
-        board = [(len(model.points3D) + k, place[number]) for k in range(LEAST_TIES) for number in sure if number in place]
+        board = [
+            (len(model.points3D) + k, place[number]) for k in range(LEAST_TIES) for number in sure if number in place
+        ]
         seen = np.array(sightings + board, dtype=np.int64).reshape(-1, 2)
         kept = tied_together(seen[:, 0], seen[:, 1], len(ids))
         if kept.all():
