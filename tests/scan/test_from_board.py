@@ -203,14 +203,12 @@ def test_without_a_board_or_with_another_nothing_changes(plain, monkeypatch):
             estimate_cameras(PhotoSet(shot.paths, shot.intrinsics, board), SfmConfig(), Job())
 
 
-def test_a_board_far_off_at_a_slant_is_found_where_it_is(tmp_path):
-    """Seen from 1.5 m at 13 degrees: a square is 14 by 3 pixels."""
-    poses = orbit(6, distance=1.5, elevations_deg=(4.0,))
+def test_a_board_seen_at_a_slant_is_found_where_it_is(tmp_path):
+    """From 1 m and 8 degrees above the tube's middle a square is 21 by 7 pixels: hardly a marker can be read."""
+    poses = orbit(4, elevations_deg=(8.0,))
     far = photos(make_scene(contrast=0.0), tmp_path, poses, LENS)
     found = detect_board(far, tuple(path.name for path in far.paths), Job())
-    world, seen = board_corners(BOARD), 0
     for (ids, pixels), pose in zip(found, poses, strict=True):
-        error = np.linalg.norm(pixels - project(world[ids], pose, LENS), axis=1)
-        seen += len(ids)
-        assert np.median(error, initial=0.0) < 0.5
-    assert seen > 60  # a fifth of all; without looking for the other markers, hardly any
+        assert len(ids) > 20  # of 48, some of them behind the tube; read marker by marker, none or two
+        error = np.linalg.norm(pixels - project(board_corners(BOARD)[ids], pose, LENS), axis=1)
+        assert np.median(error) < 0.3
