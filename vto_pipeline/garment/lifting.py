@@ -22,7 +22,6 @@ from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import (
     boundary_loops,
     corners_from,
-    face_area_vectors,
     face_components,
     half_edges,
     opposite_half_edges,
@@ -60,12 +59,14 @@ class Lifted(NamedTuple):
         after: Its fillings outside the mannequin.
         filled: Which vertices no sensor saw, shape (V,).
         moved: Which of them had to be moved, shape (V,).
+        whole: How many faces there were before splits.
     """
 
     before: TriangleMesh
     after: TriangleMesh
     filled: NDArray[np.bool_]
     moved: NDArray[np.bool_]
+    whole: int
 
 
 def lift_fillings(mesh: TriangleMesh, filled: NDArray[np.bool_], distance: SurfaceDistance, least: float) -> Lifted:
@@ -82,7 +83,7 @@ def lift_fillings(mesh: TriangleMesh, filled: NDArray[np.bool_], distance: Surfa
     away = distance.signed(mesh.vertices).distance
     usual = max(float(np.quantile(away[~filled], USUAL)), least)
     if not filled.any() or away[filled].min() >= usual:
-        return Lifted(mesh, mesh, filled, np.zeros(len(filled), dtype=bool))
+        return Lifted(mesh, mesh, filled, np.zeros(len(filled), dtype=bool), len(mesh.faces))
     near = filled.copy()
     for _ in range(RINGS):
         near[mesh.faces[near[mesh.faces].any(axis=1)]] = True
@@ -92,7 +93,9 @@ def lift_fillings(mesh: TriangleMesh, filled: NDArray[np.bool_], distance: Surfa
     nearest = np.maximum(extend_smoothly(patch, nearest, free, order=1)[:, 0], least)
     vertices = mesh.vertices.copy()
     vertices[source] = _relaxed(patch, free, distance, nearest)
-    lifted = Lifted(mesh, TriangleMesh(vertices, mesh.faces, mesh.colors), filled, filled & (away < usual))
+    lifted = Lifted(
+        mesh, TriangleMesh(vertices, mesh.faces, mesh.colors), filled, filled & (away < usual), len(mesh.faces)
+    )
     edge = np.linalg.norm(patch.vertices[np.roll(patch.faces, -1, axis=1)] - patch.vertices[patch.faces], axis=2)
     for _ in range(SPLITS):
         finer = _split(lifted, distance, least, STRETCHED * float(np.median(edge)))
@@ -135,9 +138,11 @@ def _split(lifted: Lifted, distance: SurfaceDistance, off: float, longest: float
     near = distance.signed(points)
     outward = (points - near.point) / np.where(near.distance == 0.0, 1.0, near.distance)[:, None]
     before = _halved(lifted.before, sides, lifted.before.vertices[ends].mean(axis=1))
-    filled, moved = (np.concatenate([which, np.ones(len(chosen), dtype=bool)]) for which in lifted[2:])
+    filled, moved = (
+        np.concatenate([which, np.ones(len(chosen), dtype=bool)]) for which in (lifted.filled, lifted.moved)
+    )
     points = points + np.maximum(off - near.distance, 0.0)[:, None] * outward
-    return Lifted(before, _halved(after, sides, points), filled, moved)
+    return Lifted(before, _halved(after, sides, points), filled, moved, lifted.whole)
 
 
 def _halved(mesh: TriangleMesh, sides: IntArray, middles: FloatArray) -> TriangleMesh:
@@ -212,12 +217,10 @@ def check_lifted(lifted: Lifted, distance: SurfaceDistance, bare: BareParts | No
     if bare is None:
         return
     first = distance.signed(before.vertices[before.faces[faces]].mean(axis=1)).distance
-    whole = TriangleMesh(before.vertices, before.faces[faces])
-    area = np.linalg.norm(face_area_vectors(whole), axis=1)  # as evenly filled: where it was stretched counts no more
-    count, piece = face_components(whole)
+    count, piece = face_components(TriangleMesh(after.vertices, after.faces[faces]))
     for hole in range(count):
-        mine = piece == hole
-        if first[mine].min() < -DEEP and np.average(bare.under(middle[mine]), weights=area[mine]) > BARE:
+        mine = (piece == hole) & (faces < lifted.whole)
+        if first[mine].min() < -DEEP and np.mean(bare.under(middle[mine])) > BARE:
             raise GarmentError(
                 f"a filled hole at {_place(middle[mine].mean(axis=0))} covers mannequin that was seen bare, and was "
                 f"{-1e3 * first[mine].min():.0f} mm inside it: too little was seen beside an opening",
