@@ -140,6 +140,20 @@ def test_the_board_alone_places_photos(plain):
     assert job.metrics["board_placed"] == 10
 
 
+def test_fewer_corners_than_features_would_be_asked_for_place_photos(plain, tmp_path):
+    """The same dozen in all photos: as many features might agree by chance."""
+    shot, poses, database, found = plain
+    copied = tmp_path / database.name
+    copied.write_bytes(database.read_bytes())
+    common = sorted(set.intersection(*(set(ids.tolist()) for ids, _ in found.values())))[:12]
+    few = {name: (ids[np.isin(ids, common)], pixels[np.isin(ids, common)]) for name, (ids, pixels) in found.items()}
+    model = map_from_board(copied, shot.paths[0].parent, BOARD, few, Job())
+    centers = placed_centers(model, sorted(found))
+    assert len(common) == 12
+    assert len(centers) == 10
+    assert centers_off(np.array(list(centers.values())), poses[:, :3, 3]).max() < 0.03  # at 1 m, as above
+
+
 def test_features_tie_photos_without_the_board_to_the_others(shot, tmp_path):
     """Two photos do not show the board, and one shows nothing at all."""
     taken, poses = shot
