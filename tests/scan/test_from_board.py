@@ -88,6 +88,7 @@ def test_corners_that_are_elsewhere_are_left_out():
     ("ids", "places"),
     [
         (range(8), False),  # one row: the board could turn about it
+        ([*range(7), 8], False),  # all but one in a row
         (range(5), False),
         ([0, 1, 2, 8, 9, 10], True),
     ],
