@@ -116,7 +116,8 @@ def test_a_recording_moves_the_garment_and_a_browser_sees_it(run, monkeypatch, c
     browser.start()
     first, *rest = recording().splitlines(keepends=True)
     bad = first.replace(b"[", b"[NaN, ", 1)
-    code, out, err = streamed(monkeypatch, capfd, first + bad + b"".join(rest), run, "--replay", "--lead-in", "0.2s", "--json")
+    data = first + bad + b"".join(rest)
+    code, out, err = streamed(monkeypatch, capfd, data, run, "--replay", "--lead-in", "0.2s", "--json")
     browser.join(30)
     assert code == 0
     said = json.loads(out)
