@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from ezdxf import recover
 
+from vto_pipeline.bench.drape.ipc_crossings import crossings
+from vto_pipeline.bench.drape.seam_gaps import seam_gaps
 from vto_pipeline.bench.samples.patterns.tape import Tape, tape_of
 from vto_pipeline.bench.samples.patterns.wardrobe import PATTERNS
-from vto_pipeline.bench.sewn.crossings import crossings
-from vto_pipeline.bench.sewn.seams import seam_gaps
 from vto_pipeline.cloth.placement.collision_free_start import find_collision_free_start
 from vto_pipeline.garment.pattern.embed import in_shape
 from vto_pipeline.garment.pattern.figures import panel_figures, seam_figures

@@ -11,7 +11,6 @@ cloth/, scaling/, physics/, stability/, collision/, drape/, body/, scan/, peers/
 samples/: the sample data and its truth
 motion/: how clean motions come out on five bodies; garments in motion
 unsewn/: patterns found from garments of known cut
-sewn/: patterns sewn and draped on bodies
 demo: how far a run on the sample data is from the truth
 first_run: what `make demo` and `make test` cost from nothing
 docs/: README and docs from templates and results

@@ -18,7 +18,7 @@ from vto_pipeline.numerics.plane_curves import curve_length
 Path = list[Point | list[Point]]
 
 _AWAY = 0.16  # m: of panels from the middle of the body
-_SLOPE = np.deg2rad(45.0)  # of sleeves, downwards
+_SLOPE = np.deg2rad(20.0)  # of sleeves, downwards
 _BESIDE = 0.06  # m: of sleeves from the trunk
 _BAND, _CUFF = 0.035, 0.06  # m: heights of a collar's stand and of a cuff
 _BUST_DART = (0.03, 0.10)  # m: how wide and how long

@@ -1,4 +1,4 @@
-"""`python -m vto_pipeline.bench.sewn` sews patterns and drapes them on bodies, each as a user would.
+"""`python -m vto_pipeline.bench.drape.sewn` sews patterns and drapes them on bodies, each as a user would.
 
 Without `--pattern`, the six sample patterns are cut to each body and written as DXF, SVG and JSON. The DXF is draped.
 Bars: every seam closed within 1 mm, no crossing by the independent judge ipctk, at rest.
@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from vto_pipeline.bench.bench import Value
+from vto_pipeline.bench.drape.ipc_crossings import crossings
+from vto_pipeline.bench.drape.seam_gaps import seam_gaps
 from vto_pipeline.bench.live_rows import LiveRows
 from vto_pipeline.bench.own_process import run_vto
 from vto_pipeline.bench.samples.patterns.tape import tape_of
 from vto_pipeline.bench.samples.patterns.wardrobe import PATTERNS
-from vto_pipeline.bench.sewn.crossings import crossings
-from vto_pipeline.bench.sewn.seams import seam_gaps
 from vto_pipeline.garment.pattern.figures import seam_figures
 from vto_pipeline.io.documents import read_json
 from vto_pipeline.io.meshes import read_mesh
@@ -43,7 +43,7 @@ _OUTCOMES = {0: "done", 1: "crashed", 2: "refused", 3: "refused", 4: "failed", 5
 
 def main() -> None:
     """Read the command line, drape, and print a row each."""
-    parser = argparse.ArgumentParser(prog="python -m vto_pipeline.bench.sewn", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m vto_pipeline.bench.drape.sewn", description=__doc__)
     parser.add_argument("--pattern", type=Path, nargs="+", default=[], help="files; none: the sample patterns")
     parser.add_argument("--only", nargs="+", choices=list(PATTERNS), default=list(PATTERNS), help="of the samples")
     parser.add_argument("--body", type=Path, nargs="+", required=True, help="mesh files of the wearers")
