@@ -155,6 +155,26 @@ def test_fewer_corners_than_features_would_be_asked_for_place_photos(plain, tmp_
     assert centers_off(np.array(list(centers.values())), poses[:, :3, 3]).max() < 0.03  # at 1 m, as above
 
 
+def test_matches_that_contradict_where_the_photos_were_do_not_count(plain, tmp_path):
+    """Features paired at random. They lie within some 90 pixels of height, so that a fifth is near its line by chance."""
+    shot, _, database, found = plain
+    copied = tmp_path / database.name
+    copied.write_bytes(database.read_bytes())
+    with pycolmap.Database.open(str(copied)) as opened:
+        one, other = (len(opened.read_keypoints(number)) for number in (1, 2))
+        random = np.random.default_rng(8)
+        rows = [random.permutation(count)[: min(one, other)] for count in (one, other)]
+        opened.write_matches(1, 2, np.column_stack(rows).astype(np.uint32))
+    map_from_board(copied, shot.paths[0].parent, BOARD, found, Job())
+    with pycolmap.Database.open(str(tmp_path / "board" / database.name)) as opened:
+        kept = np.array(opened.read_two_view_geometry(1, 2).inlier_matches)
+    corners = (kept >= [one, other]).all(axis=1)
+    names = sorted(found)
+    assert corners.sum() == len(np.intersect1d(found[names[0]][0], found[names[1]][0]))
+    assert min(one, other) > 100
+    assert (~corners).sum() < 0.3 * min(one, other)
+
+
 def test_features_tie_photos_without_the_board_to_the_others(shot, tmp_path):
     """Two photos do not show the board, and one shows nothing at all."""
     taken, poses = shot
