@@ -97,6 +97,12 @@ def test_a_photo_needs_corners_that_fix_it(ids, places):
     assert bool(place_photos(colmap_camera(LENS), BOARD, sighted(orbit(4), LENS, list(ids)))) is places
 
 
+def test_a_photo_of_one_row_does_not_spoil_the_others():
+    found = sighted(orbit(5), LENS, range(48))
+    found["2"] = (found["2"][0][:8], found["2"][1][:8])
+    assert sorted(place_photos(colmap_camera(LENS), BOARD, found)) == ["0", "1", "3", "4"]
+
+
 def test_another_board_places_nothing():
     """Columns and rows exchanged: the corners carry other numbers."""
     other = replace(BOARD, columns=BOARD.rows, rows=BOARD.columns)
@@ -156,7 +162,7 @@ def test_fewer_corners_than_features_would_be_asked_for_place_photos(plain, tmp_
 
 
 def test_matches_that_contradict_where_the_photos_were_do_not_count(plain, tmp_path):
-    """Features paired at random. They lie within some 90 pixels of height, so that a fifth is near its line by chance."""
+    """Features paired at random. They lie within some 90 pixels of height: by chance a fifth is near its line."""
     shot, _, database, found = plain
     copied = tmp_path / database.name
     copied.write_bytes(database.read_bytes())
