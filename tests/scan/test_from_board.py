@@ -97,6 +97,12 @@ def test_a_photo_needs_corners_that_fix_it(ids, places):
     assert bool(place_photos(colmap_camera(LENS), BOARD, sighted(orbit(4), LENS, list(ids)))) is places
 
 
+def test_a_photo_of_one_row_does_not_spoil_the_others():
+    found = sighted(orbit(5), LENS, range(48))
+    found["2"] = (found["2"][0][:8], found["2"][1][:8])
+    assert sorted(place_photos(colmap_camera(LENS), BOARD, found)) == ["0", "1", "3", "4"]
+
+
 def test_another_board_places_nothing():
     """Columns and rows exchanged: the corners carry other numbers."""
     other = replace(BOARD, columns=BOARD.rows, rows=BOARD.columns)
@@ -153,6 +159,26 @@ def test_fewer_corners_than_features_would_be_asked_for_place_photos(plain, tmp_
     assert len(common) == 12
     assert len(centers) == 10
     assert centers_off(np.array(list(centers.values())), poses[:, :3, 3]).max() < 0.03  # at 1 m, as above
+
+
+def test_matches_that_contradict_where_the_photos_were_do_not_count(plain, tmp_path):
+    """Features paired at random. They lie within some 90 pixels of height: by chance a fifth is near its line."""
+    shot, _, database, found = plain
+    copied = tmp_path / database.name
+    copied.write_bytes(database.read_bytes())
+    with pycolmap.Database.open(str(copied)) as opened:
+        one, other = (len(opened.read_keypoints(number)) for number in (1, 2))
+        random = np.random.default_rng(8)
+        rows = [random.permutation(count)[: min(one, other)] for count in (one, other)]
+        opened.write_matches(1, 2, np.column_stack(rows).astype(np.uint32))
+    map_from_board(copied, shot.paths[0].parent, BOARD, found, Job())
+    with pycolmap.Database.open(str(tmp_path / "board" / database.name)) as opened:
+        kept = np.array(opened.read_two_view_geometry(1, 2).inlier_matches)
+    corners = (kept >= [one, other]).all(axis=1)
+    names = sorted(found)
+    assert corners.sum() == len(np.intersect1d(found[names[0]][0], found[names[1]][0]))
+    assert min(one, other) > 100
+    assert (~corners).sum() < 0.3 * min(one, other)
 
 
 def test_features_tie_photos_without_the_board_to_the_others(shot, tmp_path):
