@@ -18,7 +18,7 @@ from vto_pipeline.cloth.model.settings import checked
 from vto_pipeline.cloth.moving.live_body import LiveBody
 from vto_pipeline.cloth.simulation import default_skin
 from vto_pipeline.cloth.solvers.newton import Limits, Newton
-from vto_pipeline.geometry.binding import apply, bind
+from vto_pipeline.geometry.riding.binding import apply, bind
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import Garment
@@ -66,7 +66,7 @@ class LiveCloth:
         self._config = checked(LiveConfig, config)
         self._model = build_cloth(garment.mesh, garment.rest, fabric, materials=self._config)
         self._skin = np.full(len(self._model.mass), default_skin(self._model.edge_length))
-        self._laid = bind(garment.mesh, body)
+        self._laid, self._faces = bind(garment.mesh, body), body.faces
         self._friction = fabric.friction
         self.deepest = 0.0
         self.restarts = 0
@@ -92,7 +92,7 @@ class LiveCloth:
         self._body.arrive()
         if not self._is_near(vertices):
             self.restarts += 1
-            self._lay_on(TriangleMesh(vertices, self._laid.faces), apply(self._laid, vertices))
+            self._lay_on(TriangleMesh(vertices, self._faces), apply(self._laid, vertices))
 
     def _lay_on(self, body: TriangleMesh, positions: FloatArray) -> None:
         """Begin at rest on a body."""

@@ -15,7 +15,7 @@ from vto_pipeline.avatar.motion.live import LivePose
 from vto_pipeline.cloth.model.coarsening import coarsen
 from vto_pipeline.cloth.moving.live import LiveCloth
 from vto_pipeline.errors import FormatError, InputError
-from vto_pipeline.geometry.binding import Binding, apply, bind
+from vto_pipeline.geometry.riding.binding import Binding, apply, bind
 from vto_pipeline.io.fabrics import read_fabric
 from vto_pipeline.io.motion.tracked.feed import Feed
 from vto_pipeline.model.arrays import FloatArray
