@@ -7,6 +7,7 @@ import http.client
 import threading
 import time
 import urllib.request
+from contextlib import suppress
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -47,29 +48,31 @@ class Browser:
 
     def __init__(self, address: str, *, confirms: bool = True) -> None:
         self.got: list[tuple[int, int, np.ndarray]] = []  # kind, number, places
-        self._address, self._confirms = address, confirms
+        self._address, self.confirms = address, confirms
         self._leave = threading.Event()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._run()))
         self._thread.start()
 
     async def _run(self) -> None:
-        from tornado.websocket import websocket_connect
+        from tornado.websocket import WebSocketClosedError, websocket_connect
 
         socket = await websocket_connect(self._address.replace("http", "ws") + "frames")
-        last = None
+        last, owed = None, 0
         reading = asyncio.ensure_future(socket.read_message())
         while not self._leave.is_set():
             done, _ = await asyncio.wait([reading], timeout=0.01)
+            with suppress(WebSocketClosedError):
+                while owed and self.confirms:
+                    await socket.write_message("1")
+                    owed -= 1
             if not done:
                 continue
             message = reading.result()
             if message is None:
-                socket.close()
-                return
+                break
             last = decode(message, last)
             self.got.append((message[0], last[0], last[1] * STEP_M))
-            if self._confirms:
-                await socket.write_message(str(last[0]))
+            owed += 1
             reading = asyncio.ensure_future(socket.read_message())
         socket.close()
         while await reading is not None:
@@ -124,6 +127,22 @@ def test_who_was_away_comes_back_to_the_newest_frame(server):
     assert again.got[0][0] == KEY
     assert_allclose(again.got[-1][2], frame(42), rtol=0, atol=HALF_A_STEP)
     assert server.joined == 2
+
+
+def test_who_fell_behind_gets_the_newest_frame_as_a_key_once_it_confirms(server):
+    slow = Browser(server.address, confirms=False)
+    until(lambda: server.clients == 1)
+    for number in range(12):
+        server.show(frame(number))
+        until(lambda number=number: server.sent + server.left_out > number)
+    until(lambda: len(slow.got) == 3)
+    slow.confirms = True
+    until(lambda: len(slow.got) > 3)
+    assert slow.got[3][:2] == (KEY, 11)
+    assert_allclose(slow.got[3][2], frame(11), rtol=0, atol=HALF_A_STEP)
+    sent(server, range(12, 14), slow)
+    slow.leave()
+    assert slow.got[-1][0] == CHANGE
 
 
 def test_nobody_waits_for_a_browser_that_confirms_nothing(server):
