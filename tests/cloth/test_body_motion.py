@@ -92,3 +92,13 @@ def test_a_body_does_not_grow_into_jammed_cloth(monkeypatch):
     assert caught.value.partial["draped"].faces.shape == mesh.faces.shape
     state = run_body_motion(stepper, at_rest(mesh.vertices), body, 5e-4, lambda done: None)
     assert state.time > 0.5 - 1e-9  # a body that may open again is waited for
+
+
+def test_what_a_method_that_solves_in_part_leaves_over_is_no_jam(monkeypatch):
+    mesh = tube(0.11, 0.05, 36, 5, base=-0.025)
+    model = build_cloth(mesh, RestShape(mesh.vertices), fabric())
+    body = VariableSpeedBody(swelling(0.1, 0.105), 0.5, 0.3)
+    stepper = Stepper(model, [body], np.full(len(mesh.vertices), 1e-3), StepConfig(solver="xpbd", substeps=10))
+    monkeypatch.setattr(stepper, "residual", lambda state: 5000.0)
+    state = run_body_motion(stepper, at_rest(mesh.vertices), body, 5e-4, lambda done: None, only_grows=True)
+    assert state.time > 0.5 - 1e-9

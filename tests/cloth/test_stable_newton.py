@@ -212,6 +212,79 @@ def test_where_cloth_is_about_to_buckle_steps_are_short_enough_for_it_to():
     assert not strip.exact
 
 
+class Chattering(Straying):
+    """The same, but what a longer step makes of its contacts is not positive definite."""
+
+    def run(self, state, seconds):
+        found = super().run(state, seconds)
+        self.was_positive_definite = self.exact and self.substeps >= 0.5
+        return ClothState(0.5 * state.positions, found.velocities, found.time)
+
+
+def test_what_stands_in_steps_that_hold_nothing_back_is_at_rest():
+    stepper = Chattering()
+    found = relax_to_rest(stepper, at_rest(np.array([[1e-3, 0, 0]])), SettleLimits(1e-5, 0.01, 12.0, 160))
+    assert found.settled
+    assert found.error <= 1e-5
+    assert found.state.time > 16 * 4 / 30  # so long, in steps that are definite
+
+
+def test_what_drifts_on_does_not_stand():
+    class Drifting(Chattering):
+        def run(self, state, seconds):
+            return ClothState(state.positions + 2e-7, super().run(state, seconds).velocities, state.time + seconds)
+
+        def residual(self, state):
+            return 1e-3
+
+    found = relax_to_rest(Drifting(), at_rest(np.zeros((1, 3))), SettleLimits(1e-5, 0.01, 30.0, 160))
+    assert not found.settled  # a tenth of the bound is left behind every few looks
+
+
+def test_what_was_indefinite_elsewhere_says_nothing_here():
+    class Moving(Steps):
+        """It stands at 0, where long steps are indefinite, and after a second at 0.1 mm, where they stray."""
+
+        place = 0.0
+
+        def run(self, state, seconds):
+            self.place = 1e-4 if state.time > 1.0 else 0.0
+            strays = self.place > 0.0 and self.substeps < 0.5
+            self.was_positive_definite = self.exact and (self.place > 0.0 or self.substeps >= 0.5)
+            return ClothState(np.full((1, 3), self.place + strays), np.zeros((1, 3)), state.time + seconds)
+
+        def residual(self, state):
+            return 1e-3 + abs(state.positions[0, 0] - self.place)
+
+    found = relax_to_rest(Moving(), at_rest(np.zeros((1, 3))), SettleLimits(1e-5, 0.01, 8.0, 160))
+    assert not found.settled
+
+
+class Slowly(Creeping):
+    """A strip that leaves the middle by itself, e times as far in 0.13 s; in steps of 0.13 s it is not definite."""
+
+    c = 100.0  # 1/s²
+
+
+@pytest.mark.parametrize("off", [1e-9, 1e-8, 1e-7])
+def test_a_place_that_is_left_within_seconds_is_no_rest(off):
+    found = relax_to_rest(Slowly(), at_rest(np.array([[off, 0, 0]])), SettleLimits(1e-5, 0.01, 12.0, 160))
+    assert found.settled
+    assert found.state.positions[0, 0] == pytest.approx(1e-3, abs=1e-5)
+
+
+def test_what_only_creeps_with_the_usual_stiffness_has_not_stood():
+    class Held(Steps):
+        def run(self, state, seconds):
+            return ClothState(state.positions + 1e-9, np.zeros((1, 3)), state.time + seconds)
+
+        def residual(self, state):
+            return 1e-3
+
+    found = relax_to_rest(Held(), at_rest(np.zeros((1, 3))), SettleLimits(1e-5, 0.01, 6.0, 160))
+    assert not found.settled  # no step was with the exact stiffness: it may be about to buckle
+
+
 class Indefinite(Steps):
     """Cloth that buckles within an edge: with the exact stiffness no step is short enough."""
 

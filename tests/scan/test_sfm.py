@@ -17,7 +17,7 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.scan.photos import scale as scale_module
 from vto_pipeline.scan.photos.board import board_corners
 from vto_pipeline.scan.photos.matching.features import SURE, FeatureConfig, detect, match
-from vto_pipeline.scan.photos.matching.mapping import _copy
+from vto_pipeline.scan.photos.matching.mapping import copy_database
 from vto_pipeline.scan.photos.scale import ScaleConfig, apply_board, apply_scale
 from vto_pipeline.scan.photos.sfm import SfmConfig, estimate_cameras
 from vto_pipeline.scan.similarity import fit_similarity
@@ -206,5 +206,5 @@ def test_copy_of_a_database_has_what_is_still_in_the_log(tmp_path):
         writer.execute("create table matches (pair integer)")
         writer.execute("insert into matches values (7)")
         writer.commit()
-        with closing(sqlite3.connect(_copy(tmp_path / "sure.db", "global"))) as reader:
+        with closing(sqlite3.connect(copy_database(tmp_path / "sure.db", "global"))) as reader:
             assert reader.execute("select pair from matches").fetchall() == [(7,)]

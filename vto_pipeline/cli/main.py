@@ -32,6 +32,7 @@ COMMANDS = {
     "advise": "Advise a customer on a size: the best one, the runner-up, and the reason.",
     "fabric": "Measure a fabric's bending rigidity from hanging strips.",
     "motion": "Show what a motion holds, and carry it over to an avatar.",
+    "stream": "Move a run's avatar and garment live, after a camera's skeletons.",
     "info": "Describe a run, or a file or folder that may be given.",
     "prune": "Remove stored results that a run or a batch no longer needs.",
     "plan": "Show what a document would run, without running it.",

@@ -1,11 +1,14 @@
 """Fillings of scan holes lifted off the mannequin: cloth was there, and cloth is never inside.
 
 A smooth filling over a shoulder that was not seen cuts through it. It is let relax, as a thin plate, while the
-mannequin grows into it from within (an obstacle problem; Glowinski 1984). What then still runs through the mannequin is
-no hole: a limb comes out there.
+mannequin grows into it from within (an obstacle problem; Glowinski 1984). Triangles that are stretched over a bulge cut
+it, and are split. What then still runs through the mannequin is no hole: a limb comes out there, and however finely a
+filling is split, it spans the limb.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +19,15 @@ from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.bare_parts import BareParts
 from vto_pipeline.geometry.laplace import bending, extend_smoothly
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import boundary_loops, face_components, submesh
-from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.geometry.topology import (
+    boundary_loops,
+    corners_from,
+    face_components,
+    half_edges,
+    opposite_half_edges,
+    submesh,
+)
+from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 
 USUAL = 0.1
@@ -34,13 +44,33 @@ BARE = 0.2
 """A larger share of it over mannequin that was seen bare, and a part of the mannequin comes out there."""
 LEFT_INSIDE = 0.005
 """Lifted triangles cut a curved mannequin by no more [m]."""
+STRETCHED = 4.0
+"""Edges so many times as long as they usually are in fillings are stretched: in between, nothing was looked at."""
+SPLITS = 8
+"""Rounds in which edges that are stretched or cut the mannequin are halved; each takes three quarters of its depth."""
 HINT = "take more photos of that place, from above or below; are scan and mannequin aligned?"
 
 
-def lift_fillings(
-    mesh: TriangleMesh, filled: NDArray[np.bool_], distance: SurfaceDistance, least: float
-) -> tuple[TriangleMesh, NDArray[np.bool_]]:
-    """Return the mesh with its fillings outside the mannequin, and which vertices had to be moved for that, (V,).
+class Lifted(NamedTuple):
+    """A garment whose fillings were lifted. Its vertices and faces come first, in their order; then those of splits.
+
+    Args:
+        before: As it was, with the same splits.
+        after: Its fillings outside the mannequin.
+        filled: Which vertices no sensor saw, shape (V,).
+        moved: Which of them had to be moved, shape (V,).
+        whole: How many faces there were before splits.
+    """
+
+    before: TriangleMesh
+    after: TriangleMesh
+    filled: NDArray[np.bool_]
+    moved: NDArray[np.bool_]
+    whole: int
+
+
+def lift_fillings(mesh: TriangleMesh, filled: NDArray[np.bool_], distance: SurfaceDistance, least: float) -> Lifted:
+    """Return the mesh with its fillings outside the mannequin.
 
     They end as far off as cloth usually rests on this mannequin, and nearer only beside cloth that is.
 
@@ -53,7 +83,7 @@ def lift_fillings(
     away = distance.signed(mesh.vertices).distance
     usual = max(float(np.quantile(away[~filled], USUAL)), least)
     if not filled.any() or away[filled].min() >= usual:
-        return mesh, np.zeros(len(filled), dtype=bool)
+        return Lifted(mesh, mesh, filled, np.zeros(len(filled), dtype=bool), len(mesh.faces))
     near = filled.copy()
     for _ in range(RINGS):
         near[mesh.faces[near[mesh.faces].any(axis=1)]] = True
@@ -63,7 +93,78 @@ def lift_fillings(
     nearest = np.maximum(extend_smoothly(patch, nearest, free, order=1)[:, 0], least)
     vertices = mesh.vertices.copy()
     vertices[source] = _relaxed(patch, free, distance, nearest)
-    return TriangleMesh(vertices, mesh.faces, mesh.colors), filled & (away < usual)
+    lifted = Lifted(
+        mesh, TriangleMesh(vertices, mesh.faces, mesh.colors), filled, filled & (away < usual), len(mesh.faces)
+    )
+    edge = np.linalg.norm(patch.vertices[np.roll(patch.faces, -1, axis=1)] - patch.vertices[patch.faces], axis=2)
+    for _ in range(SPLITS):
+        finer = _split(lifted, distance, least, STRETCHED * float(np.median(edge)))
+        if len(finer.moved) == len(lifted.moved):
+            break
+        lifted = finer
+    return lifted
+
+
+def _split(lifted: Lifted, distance: SurfaceDistance, off: float, longest: float) -> Lifted:
+    """Halve the edges of fillings that are stretched or cut the mannequin, the longest first and one of each face.
+
+    Args:
+        lifted: After any number of splits.
+        distance: Signed distances to the mannequin [m].
+        off: How far from the mannequin the new vertices are at least [m].
+        longest: Longer edges are stretched [m].
+    """
+    after = lifted.after
+    ends, twin = half_edges(after), opposite_half_edges(after)
+    own = np.repeat(lifted.filled[after.faces].any(axis=1), 3)
+    half = np.flatnonzero((twin > np.arange(len(twin))) & own)
+    half = half[own[twin[half]]]
+    length = np.linalg.norm(after.vertices[ends[half, 1]] - after.vertices[ends[half, 0]], axis=1)
+    cuts = 0.5 * length > distance.signed(after.vertices).distance[ends[half]].max(axis=1)  # its middle may be inside
+    cuts[cuts] = distance.signed(after.vertices[ends[half[cuts]]].mean(axis=1)).distance < 0.0
+    wanted = np.flatnonzero(cuts | (length > longest))
+    chosen: list[int] = []
+    taken: set[int] = set()
+    for k in half[wanted[np.argsort(-length[wanted], kind="stable")]]:
+        faces = {int(k) // 3, int(twin[k]) // 3}
+        if not faces & taken:
+            taken |= faces
+            chosen.append(int(k))
+    if not chosen:
+        return lifted
+    sides = np.array([chosen, twin[chosen]])
+    ends = ends[chosen]
+    points = after.vertices[ends].mean(axis=1)
+    near = distance.signed(points)
+    outward = (points - near.point) / np.where(near.distance == 0.0, 1.0, near.distance)[:, None]
+    before = _halved(lifted.before, sides, lifted.before.vertices[ends].mean(axis=1))
+    filled, moved = (
+        np.concatenate([which, np.ones(len(chosen), dtype=bool)]) for which in (lifted.filled, lifted.moved)
+    )
+    points = points + np.maximum(off - near.distance, 0.0)[:, None] * outward
+    return Lifted(before, _halved(after, sides, points), filled, moved, lifted.whole)
+
+
+def _halved(mesh: TriangleMesh, sides: IntArray, middles: FloatArray) -> TriangleMesh:
+    """Return a mesh with edges halved; what is new comes last.
+
+    Args:
+        mesh: A manifold mesh.
+        sides: Both half-edges of each, no two in one face, shape (2, N).
+        middles: Where they are halved [m], shape (N, 3).
+    """
+    corner = mesh.faces.reshape(-1)
+    new = len(mesh.vertices) + np.arange(len(middles))
+    faces, added = np.array(mesh.faces), []
+    for side in sides:
+        after, across = corner[corners_from(side)[:, 1:]].T
+        faces[side // 3, (side + 1) % 3] = new  # of its two halves a face keeps the one where the half-edge starts
+        added.append(np.column_stack([new, after, across]))
+    ends = corner[corners_from(sides[0])[:, :2]]
+    colors = mesh.colors
+    if colors is not None:
+        colors = np.vstack([colors, colors[ends].mean(axis=1).round().astype(np.uint8)])
+    return TriangleMesh(np.vstack([mesh.vertices, middles]), np.vstack([faces, *added]).astype(np.int32), colors)
 
 
 def _relaxed(
@@ -90,25 +191,19 @@ def _relaxed(
     return points
 
 
-def check_lifted(
-    before: TriangleMesh,
-    after: TriangleMesh,
-    filled: NDArray[np.bool_],
-    distance: SurfaceDistance,
-    bare: BareParts | None,
-) -> None:
+def check_lifted(lifted: Lifted, distance: SurfaceDistance, bare: BareParts | None) -> None:
     """Refuse fillings that a part of the mannequin goes through: what was filled is an opening, or holds one.
 
     Args:
-        before, after: The garment before and after its fillings were lifted.
-        filled: Which vertices no sensor saw, shape (V,).
+        lifted: As `lift_fillings` leaves them.
         distance: Signed distances to the mannequin [m].
         bare: What was seen of the bare mannequin, if it is known.
 
     Raises:
         GarmentError: one still runs through the mannequin, or was lifted over a part that was seen bare.
     """
-    faces = np.flatnonzero(filled[after.faces].any(axis=1))
+    before, after = lifted.before, lifted.after
+    faces = np.flatnonzero(lifted.filled[after.faces].any(axis=1))
     if len(faces) == 0:
         return
     middle = after.vertices[after.faces[faces]].mean(axis=1)
@@ -124,7 +219,7 @@ def check_lifted(
     first = distance.signed(before.vertices[before.faces[faces]].mean(axis=1)).distance
     count, piece = face_components(TriangleMesh(after.vertices, after.faces[faces]))
     for hole in range(count):
-        mine = piece == hole
+        mine = (piece == hole) & (faces < lifted.whole)
         if first[mine].min() < -DEEP and np.mean(bare.under(middle[mine])) > BARE:
             raise GarmentError(
                 f"a filled hole at {_place(middle[mine].mean(axis=0))} covers mannequin that was seen bare, and was "

@@ -111,11 +111,11 @@ def close_scan_holes(
     filled = fill_holes(bridged, [shape.walk for shape, real in zip(shapes, is_opening, strict=True) if not real])
     observed = np.arange(len(filled.vertices)) < len(clean.vertices)
     if distance is not None:
-        smooth = filled
-        filled, lifted = lift_fillings(smooth, ~observed, distance, config.clearance_mm * 1e-3)
+        lifted = lift_fillings(filled, ~observed, distance, config.clearance_mm * 1e-3)
+        filled, observed = lifted.after, ~lifted.filled
         if config.keep is None:
-            check_lifted(smooth, filled, ~observed, distance, bare)
-        job.measure(lifted_cm2=1e4 * _area(filled, np.asarray(lifted[filled.faces].any(axis=1))))
+            check_lifted(lifted, distance, bare)
+        job.measure(lifted_cm2=1e4 * _area(filled, np.asarray(lifted.moved[filled.faces].any(axis=1))))
     final = fair_rims(filled, config.fair_mm * 1e-3)
     if face_components(final)[0] != 1:
         raise GarmentError(f"the garment fell apart into {face_components(final)[0]} pieces")

@@ -35,6 +35,8 @@ TIGHT = 0.007
 LEAST_SIGMA = 1e-4
 """Scans claim to be better than this only by accident [m]."""
 MOST_SIGMA = 5e-3
+LARGE = 0.1
+"""With pieces of a larger share of the garment it was torn, and they are cloth that will be missing."""
 FLOOR_REACH = 0.01
 """A board on the floor may lie so much higher than the lowest point of the mannequin [m]."""
 
@@ -108,7 +110,12 @@ def extract_garment(surface: TriangleMesh, labels: SurfaceLabels, config: Subtra
     if area.max() < config.smallest_piece_cm2 * 1e-4:
         raise GarmentError(f"the largest piece of garment has only {area.max() * 1e4:.1f} cm²")
     if len(area) > 1:
-        job.note(f"dropped {len(area) - 1} smaller pieces of {(area.sum() - area.max()) * 1e4:.1f} cm² in all")
+        dropped = float(area.sum() - area.max())
+        what = f"dropped {len(area) - 1} smaller pieces of {dropped * 1e4:.1f} cm² in all"
+        if dropped > LARGE * area.sum():
+            job.warn(f"{what}, {100 * dropped / area.sum():.0f} % of the garment: what connects them was not seen")
+        else:
+            job.note(what)
     job.measure(area_cm2=float(area.max() * 1e4), dropped_pieces=len(area) - 1)
     return submesh(shell, piece == int(np.argmax(area)))[0]
 

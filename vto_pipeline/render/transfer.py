@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from vto_pipeline.geometry import binding
-from vto_pipeline.geometry.binding import Binding, apply
+from vto_pipeline.geometry.riding import binding
+from vto_pipeline.geometry.riding.binding import Binding, apply
 from vto_pipeline.model.mesh import TriangleMesh
 
 __all__ = ["Binding", "apply", "bind"]

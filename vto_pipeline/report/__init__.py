@@ -5,4 +5,5 @@ budgets: what a run bought with its budgets, in words
 batch_page: the summary of a batch
 card, facts: a card for notebooks; the numbers of a surface
 scene, layers, packing, scales, render_colors, body_loops: its 3D view
+live/: a view of what moves now
 """

@@ -1,5 +1,5 @@
 // A small viewer of triangle meshes: turn, move, zoom, show and hide. WebGL 2, nothing else.
-(() => {
+const viewer = (() => {
   "use strict";
   const byId = (id) => document.getElementById(id);
   const canvas = byId("canvas");
@@ -12,7 +12,7 @@
   };
   if (!gl) {
     say("This browser does not support WebGL 2, so there is no 3D view. The rest of the page is complete.");
-    return;
+    return null;
   }
 
   // ---- meshes ------------------------------------------------------------------------------------------------
@@ -57,20 +57,30 @@
       positions: buffer(gl.ARRAY_BUFFER, positions),
       normals: buffer(gl.ARRAY_BUFFER, vertexNormals(positions, 4, packed.size, indices)),
       indices: buffer(gl.ELEMENT_ARRAY_BUFFER, indices),
-      count: indices.length,
-      motion: packed.shapes ? unpackMotion(packed, positions, indices) : null,
+      triangles: indices,
+      placed: false, // whether its positions are floats, in metres
+      motion: packed.shapes ? unpackMotion(packed, positions) : null,
     };
   });
 
   /** The mean of a moving mesh [m], three numbers a vertex, and the shapes that are added to it. */
-  function unpackMotion(packed, positions, indices) {
+  function unpackMotion(packed, positions) {
     const mean = new Float32Array((positions.length / 4) * 3);
     for (let i = 0; i < mean.length; i++) {
       const k = i % 3;
       mean[i] = packed.low[k] + (packed.size[k] * positions[4 * ((i - k) / 3) + k]) / 65535;
     }
     const shapes = packed.shapes.map((shape) => new Int16Array(bytes(shape).buffer));
-    return { mean, shapes, step: packed.step, weights: packed.weights, indices };
+    return { mean, shapes, step: packed.step, weights: packed.weights };
+  }
+
+  /** Put the vertices of a mesh at these places [m], three numbers each. */
+  function place(geometry, places) {
+    geometry.placed = true;
+    for (const [data, into] of [[places, "positions"], [vertexNormals(places, 3, [1, 1, 1], geometry.triangles), "normals"]]) {
+      gl.bindBuffer(gl.ARRAY_BUFFER, geometry[into]);
+      gl.bufferData(gl.ARRAY_BUFFER, data, gl.DYNAMIC_DRAW);
+    }
   }
 
   /** Put a moving mesh where it is in a frame; between two frames, in between. */
@@ -84,10 +94,7 @@
       const weight = motion.step * (a + (b - a) * (frame - first));
       for (let i = 0; i < placed.length; i++) placed[i] += weight * shape[i];
     });
-    for (const [data, into] of [[placed, "positions"], [vertexNormals(placed, 3, [1, 1, 1], motion.indices), "normals"]]) {
-      gl.bindBuffer(gl.ARRAY_BUFFER, geometry[into]);
-      gl.bufferData(gl.ARRAY_BUFFER, data, gl.DYNAMIC_DRAW);
-    }
+    place(geometry, placed);
   }
 
   const channels = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255);
@@ -157,7 +164,7 @@
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS)) {
     say("The 3D view does not work with this graphics driver. The rest of the page is complete.");
-    return;
+    return null;
   }
   const uniform = (name) => gl.getUniformLocation(program, name);
   const [lowAt, sizeAt, eyeAt, lensAt, placesAt, skinnedAt] = ["low", "size", "eye", "lens", "places", "skinned"].map(uniform);
@@ -205,9 +212,9 @@
     gl.uniformMatrix4fv(lensAt, false, lensMatrix());
     for (const layer of layers.filter((one) => one.visible)) {
       const shape = layer.shape;
-      gl.uniform3fv(lowAt, shape.motion ? [0, 0, 0] : shape.low);
-      gl.uniform3fv(sizeAt, shape.motion ? [1, 1, 1] : shape.size);
-      if (shape.motion) attribute(0, shape.positions, 3, gl.FLOAT, false, 0);
+      gl.uniform3fv(lowAt, shape.placed ? [0, 0, 0] : shape.low);
+      gl.uniform3fv(sizeAt, shape.placed ? [1, 1, 1] : shape.size);
+      if (shape.placed) attribute(0, shape.positions, 3, gl.FLOAT, false, 0);
       else attribute(0, shape.positions, 3, gl.UNSIGNED_SHORT, true, 8);
       attribute(1, shape.normals, 3, gl.FLOAT, false, 0);
       const skinned = Boolean(layer.skin && layer.skin.ready);
@@ -226,7 +233,7 @@
         gl.vertexAttrib3fv(2, layer.flat);
       }
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, shape.indices);
-      gl.drawElements(gl.TRIANGLES, shape.count, gl.UNSIGNED_INT, 0);
+      gl.drawElements(gl.TRIANGLES, shape.triangles.length, gl.UNSIGNED_INT, 0);
     }
   }
 
@@ -439,4 +446,13 @@
   refresh();
   frame(...SIDES.Reset);
   draw();
+
+  /** For scripts that move what is shown: places of each mesh, by number; the view goes along, by a way [m]. */
+  return {
+    place(meshes, way) {
+      meshes.forEach((places, k) => place(geometries[k], places));
+      camera.target = camera.target.map((value, k) => value + way[k]);
+      redraw();
+    },
+  };
 })();

@@ -42,10 +42,15 @@ def pose_avatar(avatar: Avatar, pose: FloatArray, translation: FloatArray) -> Av
         translation: Of the root [m], shape (3,).
 
     """
+    vertices = posed_vertices(avatar, pose, translation)
+    return replace(avatar, pose=pose, translation=np.asarray(translation, dtype=float), vertices=vertices)
+
+
+def posed_vertices(avatar: Avatar, pose: FloatArray, translation: FloatArray) -> FloatArray:
+    """Return where the avatar's vertices are in another pose [m], shape (V, 3); as `pose_avatar`."""
     rotation, offset = joint_transforms(avatar.joints, avatar.parents, pose)
     turn, place = blend_transforms(avatar.weights, rotation, offset)
-    vertices = np.einsum("vij,vj->vi", turn, avatar.bind_vertices) + place + translation
-    return replace(avatar, pose=pose, translation=np.asarray(translation, dtype=float), vertices=vertices)
+    return np.einsum("vij,vj->vi", turn, avatar.bind_vertices) + place + translation
 
 
 def joint_transforms(joints: FloatArray, parents: np.ndarray, pose: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -7,6 +7,7 @@ soles, plants: where a foot touches the floor, and when it stands still
 foot_skate, leg_reach: feet that stand still are held there
 timing: another frame rate; a smooth start from a pose; a last pose that is held
 path: the avatar at any time of its motion
+live: an avatar that follows a person frame by frame
 balance: mass of the parts, zero moment point, support
 figures: drift of planted feet, spikes, floor, crossings
 """

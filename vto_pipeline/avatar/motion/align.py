@@ -7,6 +7,7 @@ as a whole, then the direction of each bone of arms and legs by the smallest rot
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,23 @@ _LOW_SHARE = 5.0  # per cent of the frames in which an ankle is lowest
 _MOST_TILT_RAD = np.deg2rad(35.0)
 
 
+class Fit(NamedTuple):
+    """What is measured of a skeleton once, so that any frame of it can be carried over.
+
+    Args:
+        resting, at_rest: World rotation and place of each of its joints as it stands, shapes (J, 3, 3) and (J, 3).
+        scale: The avatar's legs over its own.
+        origin: What becomes the point of the floor below the avatar's hips [m], shape (3,).
+        tilts: Side -> how a foot is turned in its own frame to be level, shape (3, 3).
+    """
+
+    resting: FloatArray
+    at_rest: FloatArray
+    scale: float
+    origin: FloatArray
+    tilts: Mapping[str, FloatArray]
+
+
 def carry_over(clip: Clip, joints: JointMap, avatar: Avatar, job: Job) -> tuple[FloatArray, FloatArray]:
     """Return world rotations of the avatar's joints relative to its bind pose, and places of its root.
 
@@ -53,11 +71,55 @@ def carry_over(clip: Clip, joints: JointMap, avatar: Avatar, job: Job) -> tuple[
     Raises:
         InputError: the source stands neither at rest nor in the first frame.
     """
+    return carried(clip, joints, avatar, fit_of(clip, joints, avatar, job))
+
+
+def fit_of(clip: Clip, joints: JointMap, avatar: Avatar, job: Job) -> Fit:
+    """Return what carries the frames of a clip over to an avatar; see `carry_over`.
+
+    Feet are turned so that they are level, on average, while they stand still. Skeletons at rest hold them in different
+    ways, some across the shank, some level: the floor is the same.
+    """
     turn, place = world_transforms(clip.parents, quaternion_matrices(clip.rotations), clip.translations)
     resting, at_rest = _standing(clip, joints, turn, place, job)
+    indices, bind = joints.indices, _bind(avatar)
+    ankles = {side: indices[f"{side}_ankle"] for side in ("left", "right")}
+    still = {side: _still(side, joints, place, clip.frame_time) for side in ankles}
+    found = _turned(turn, resting, at_rest, joints, avatar)
+    tilts = {side: _tilt(side, found[f"{side}_ankle"][frames], job) for side, frames in still.items()}
+    stands = np.concatenate([place[still[side], ankle, 1] for side, ankle in ankles.items()])
+    lowest = place[:, list(ankles.values()), 1].min(axis=1)
+    floor = np.median(stands) if len(stands) else np.percentile(lowest, _LOW_SHARE)
+    middle = _hips(place[0], joints)
+    scale = _leg(bind) / leg_length(clip, joints)
+    return Fit(resting, at_rest, scale, np.array([middle[0], floor, middle[2]]), tilts)
+
+
+def carried(clip: Clip, joints: JointMap, avatar: Avatar, fit: Fit) -> tuple[FloatArray, FloatArray]:
+    """Return what `carry_over` does, of frames of a skeleton that is measured already.
+
+    Args:
+        clip: Any frames of it; in metres, +Y up.
+        joints: Of the clip.
+        avatar: That the fit was made for.
+        fit: Of the skeleton.
+    """
+    turn, place = world_transforms(clip.parents, quaternion_matrices(clip.rotations), clip.translations)
+    found, bind = _turned(turn, fit.resting, fit.at_rest, joints, avatar), _bind(avatar)
+    for side, tilt in fit.tilts.items():
+        found[f"{side}_ankle"] = found[f"{side}_ankle"] @ tilt
+    middle = fit.scale * (_hips(place, joints) - fit.origin)
+    middle[:, 1] += min(bind[f"{side}_ankle"][1] for side in ("left", "right")) - avatar.bind_vertices[:, 1].min()
+    inside = (bind["left_hip"] + bind["right_hip"]) / 2 - bind["pelvis"]
+    return np.stack([found[name] for name in avatar.joint_names], axis=1), middle - found["pelvis"] @ inside
+
+
+def _turned(
+    turn: FloatArray, resting: FloatArray, at_rest: FloatArray, joints: JointMap, avatar: Avatar
+) -> dict[str, FloatArray]:
+    """Return each joint's world rotation relative to the bind pose, feet as the skeleton holds them, (T, 3, 3) each."""
     axes = _body_axes(joints, at_rest)
-    indices = joints.indices
-    bind = dict(zip(avatar.joint_names, avatar.joints, strict=True))
+    indices, bind = joints.indices, _bind(avatar)
     delta = {name: turn[:, k] @ resting[k].T for name, k in indices.items()}
     found: dict[str, FloatArray] = {name: delta[name] @ axes for name in indices if name in bind}
     for side in ("left", "right"):
@@ -73,18 +135,19 @@ def carry_over(clip: Clip, joints: JointMap, avatar: Avatar, job: Job) -> tuple[
                 found[tip] = delta[tip] @ laid
         _aim_foot(side, found, delta, joints, at_rest, avatar)
     _fill(found, len(turn))
-    scale = _leg(bind) / leg_length(clip, joints)
-    still = {side: _still(side, joints, place, clip.frame_time) for side in ("left", "right")}
-    _level_feet(found, still, job)
-    hips = [indices["left_hip"], indices["right_hip"]]
-    ankles = [indices["left_ankle"], indices["right_ankle"]]
-    middle = place[:, hips].mean(axis=1)
-    stands = np.concatenate([place[still[side], k, 1] for side, k in zip(("left", "right"), ankles, strict=True)])
-    floor = np.median(stands) if len(stands) else np.percentile(place[:, ankles, 1].min(axis=1), _LOW_SHARE)
-    middle = scale * (middle - [middle[0, 0], floor, middle[0, 2]])
-    middle[:, 1] += min(bind[f"{side}_ankle"][1] for side in ("left", "right")) - avatar.bind_vertices[:, 1].min()
-    inside = (bind["left_hip"] + bind["right_hip"]) / 2 - bind["pelvis"]
-    return np.stack([found[name] for name in avatar.joint_names], axis=1), middle - found["pelvis"] @ inside
+    return found
+
+
+def _bind(avatar: Avatar) -> dict[str, FloatArray]:
+    """Return the avatar's joint -> its place in the bind pose [m]."""
+    return dict(zip(avatar.joint_names, avatar.joints, strict=True))
+
+
+def _hips(place: FloatArray, joints: JointMap) -> FloatArray:
+    """Return the middle of both hips, shape (..., 3)."""
+    hips = [joints.indices["left_hip"], joints.indices["right_hip"]]
+    middle: FloatArray = place[..., hips, :].mean(axis=-2)
+    return middle
 
 
 def _standing(
@@ -192,18 +255,12 @@ def _still(side: str, joints: JointMap, place: FloatArray, frame_time: float) ->
     return still
 
 
-def _level_feet(found: dict[str, FloatArray], still: Mapping[str, NDArray[np.bool_]], job: Job) -> None:
-    """Turn each foot in its own frame so that it is level, on average, while it stands still.
-
-    Skeletons at rest hold their feet in different ways, some across the shank, some level: the floor is the same.
-    """
-    for side, frames in still.items():
-        if not frames.any():
-            continue
-        up = (np.swapaxes(found[f"{side}_ankle"][frames], -1, -2) @ _UP).mean(axis=0)
-        tilt = shortest_rotations(_UP, up)
-        angle = float(np.linalg.norm(matrix_vectors(tilt)))
-        if angle > _MOST_TILT_RAD:
-            job.warn(f"the {side} foot stands at {np.rad2deg(angle):.0f} degrees to the floor; it is left so")
-            continue
-        found[f"{side}_ankle"] = found[f"{side}_ankle"] @ tilt
+def _tilt(side: str, standing: FloatArray, job: Job) -> FloatArray:
+    """Return the turn of a foot in its own frame that levels it, on average, over the frames in which it stands."""
+    up = (np.swapaxes(standing, -1, -2) @ _UP).mean(axis=0) if len(standing) else _UP
+    tilt = shortest_rotations(_UP, up)
+    angle = float(np.linalg.norm(matrix_vectors(tilt)))
+    if angle > _MOST_TILT_RAD:
+        job.warn(f"the {side} foot stands at {np.rad2deg(angle):.0f} degrees to the floor; it is left so")
+        return np.eye(3)
+    return np.asarray(tilt)

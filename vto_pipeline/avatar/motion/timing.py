@@ -55,7 +55,7 @@ def lead_in(motion: AvatarMotion, avatar: Avatar, seconds: float) -> AvatarMotio
         seconds: Time from there to the first frame.
     """
     count = max(1, round(seconds / motion.frame_time))
-    poses, translations = _brought_to(motion, avatar)
+    poses, translations = brought_to(motion, avatar)
     second = min(1, len(poses) - 1)
     start = vector_matrices(avatar.pose)
     first, after = (matrix_vectors(vector_matrices(poses[k]) @ np.swapaxes(start, -1, -2)) for k in (0, second))
@@ -73,8 +73,8 @@ def lead_in(motion: AvatarMotion, avatar: Avatar, seconds: float) -> AvatarMotio
     )
 
 
-def _brought_to(motion: AvatarMotion, avatar: Avatar) -> tuple[FloatArray, FloatArray]:
-    """Poses and translations, turned about the vertical and moved on the floor to where the avatar stands."""
+def brought_to(motion: AvatarMotion, avatar: Avatar) -> tuple[FloatArray, FloatArray]:
+    """Return poses and translations, turned about the vertical and moved on the floor to where the avatar stands."""
     root = avatar.joint_names.index("pelvis")
     turns = vector_matrices(motion.poses[:, root])
     yaws = [np.arctan2(turn[0, 2], turn[2, 2]) for turn in (vector_matrices(avatar.pose[root]), turns[0])]

@@ -2,5 +2,6 @@
 
 __main__: how clean motions come out on five bodies
 tracked: the same motions given as places of their joints
+live: the garment of a stream, beside the accurate one
 garments: garments carried through motions: crossings, stretch, time per frame
 """

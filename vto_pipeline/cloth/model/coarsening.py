@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from vto_pipeline.errors import InputError
-from vto_pipeline.geometry.binding import Binding, apply, bind
 from vto_pipeline.geometry.remeshing.flat_faces import carry_flat_faces
 from vto_pipeline.geometry.remeshing.remesh import RemeshConfig, remesh
+from vto_pipeline.geometry.riding.binding import Binding, apply, bind
 from vto_pipeline.geometry.topology import face_area_vectors
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.garment import Garment

@@ -5,4 +5,5 @@ frame: one frame: steps, and what is done where it fails
 path_collider: the body, posed when it is asked for
 frame_audit: what each frame is judged by
 config: settings
+live, live_body: as fast as the body moves, before a camera
 """

@@ -1,7 +1,8 @@
 """Settling of a cloth to rest, and its distance from rest.
 
 phases: the phases of one drape: freed, grown into, ridden along, settled
-multiresolution: rest on coarser meshes first
+multiresolution: rest on coarser meshes, and with softer threads, first
+softened: cloth with softer threads
 convergence: waiting for rest to a stated error
 stable_newton: the last steps, with the exact stiffness
 true_distance: how far each look was from the end

@@ -19,6 +19,7 @@ _QUIET = 3  # looks in a row under the bound: an oscillating cloth stands still 
 _COARSE = 2.0  # times the bound: waiting longer for a coarse answer, itself in error by more, is waste
 _STILL, _LONG = 1e-4, 10  # m, looks in a row: what stays within that is waited for no longer, in balance or not
 _VAGUE = 3e-3  # m: what is not known to be stable may still buckle by as much, as dresses of `vto bench drape` do
+_FOLDS, _THERE = 16.0, 0.1  # times e, from rounding to this share of the bound, grows what leaves an unstable place
 _NEAR = 1e-3  # m a look: slow enough to ask whether it is
 _JAMMED = 100.0  # weights left over: cloth on its way to rest has forces of the order of its weight
 _JAM_LOOKS, _JAM_FALL = 5, 0.8  # looks, and the share that their least residual has to fall below
@@ -108,7 +109,9 @@ def relax_to_rest(
 
     Cloth that buckles slowly hardly moves for a long while, so being quiet does not prove much. A method that knows the
     exact stiffness goes on in steps that grow as long as the system is positive definite (`cloth.rest.stable_newton`):
-    one of these goes all the way that was to come, and where it goes nowhere, the cloth is at rest, and stable.
+    one of these goes all the way that was to come, and where it goes nowhere, the cloth is at rest, and stable. Where
+    contacts change within such a step there may be none. But shorter ones with the exact stiffness hold nothing back:
+    were the place unstable where a step of h was not definite, it would be left by a factor of e in each h.
 
     Args:
         stepper: The cloth among its colliders; its steps are changed, and as they were at the end if the rest does not
@@ -128,7 +131,7 @@ def relax_to_rest(
     drifts: list[float] = []
     earlier = state.positions
     coarse: FloatArray | None = None
-    quiet = still = 0
+    quiet, still, stood, stood_at = 0, 0, 0.0, state.positions
     stepper.prepare(state.positions)
     stepper.deadline = limits.deadline
     exact, newton_steps = stepper.has_exact_rest, StableNewtonSteps(stepper, limits.residual)
@@ -151,13 +154,19 @@ def relax_to_rest(
                 "the garment has fallen off the body: nothing holds it",
                 hint="does it go around the body, right way up, and is it small enough?",
             )
+        if residual >= limits.residual or _rms(after.positions - stood_at) > _THERE * limits.error:
+            stood, stood_at = 0.0, after.positions
+            newton_steps.indefinite_step = np.inf
+        elif stepper.was_positive_definite:
+            stood += span
         if not brief:  # a shorter time tells nothing about rest
             moves.append(moved)
             drifts.append(0.5 * _rms(after.positions - earlier) if len(moves) > 1 else moved)
             earlier = before
             whole = newton_steps.took_full_step and len(moves) > 1
+            stable = whole or stood >= _FOLDS * newton_steps.indefinite_step
             to_come = max(moves[-2:]) if whole else max(moved, _still_to_come(drifts))
-            result.error = max(to_come, _VAGUE) if stepper.can_use_exact_stiffness and not whole else to_come
+            result.error = max(to_come, _VAGUE) if stepper.can_use_exact_stiffness and not stable else to_come
             if not exact:
                 result.error += np.inf if coarse is None else _rms(after.positions - coarse) / 3.0
         seconds = time.perf_counter() - began
@@ -166,7 +175,7 @@ def relax_to_rest(
         result.looks.append(some(after.positions))
         watch(share, result.error)
         result.caught = looks >= _JAM_LOOKS and is_caught(after.positions)
-        result.jammed = _is_jammed([one.residual for one in result.trace])
+        result.jammed = exact and _is_jammed([one.residual for one in result.trace])
         if result.caught or result.jammed:
             break
         if brief:
@@ -177,7 +186,7 @@ def relax_to_rest(
         still = still + 1 if to_come < _STILL else 0
         balanced = result.residual < limits.residual or not exact
         over = balanced or still >= _LONG
-        quiet = quiet + 1 if to_come < bound and over and (whole or not stepper.was_positive_definite) else 0
+        quiet = quiet + 1 if to_come < bound and over and (stable or not stepper.was_positive_definite) else 0
         if stepper.can_use_exact_stiffness and limits.error < _VAGUE:
             newton_steps.choose(moved < (_NEAR if over else _STILL), residual, moved)
         if quiet < (1 if exact and residual < limits.residual else _QUIET):  # at a turn of its way forces are large

@@ -1,4 +1,4 @@
-"""Coarse to fine: a garment first comes to rest on coarser meshes, where steps are cheap.
+"""Coarse to fine: a garment first comes to rest on coarser meshes, where steps are cheap, and with softer threads.
 
 A step costs more than in proportion to the vertices, and a fine mesh has as far to go as a coarse one. So what is a
 matter of the way (the body growing, riding along, falling into place) is done once, on the coarsest mesh. Each finer
@@ -16,10 +16,11 @@ from typing import NamedTuple
 
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.dynamics.stepper import Stepper
-from vto_pipeline.cloth.model.build import ClothModel, at_rest, build_cloth
+from vto_pipeline.cloth.model.build import ClothModel, ClothState, at_rest, build_cloth
 from vto_pipeline.cloth.model.coarsening import CoarseGarment, coarsen
 from vto_pipeline.cloth.rest.convergence import SettlingResult
-from vto_pipeline.cloth.rest.phases import PLACED, REST, ROUGH, Phases
+from vto_pipeline.cloth.rest.phases import PLACED, ROUGH, Phases
+from vto_pipeline.cloth.rest.softened import softened
 from vto_pipeline.cloth.rest.true_distance import some_positions, with_true_distances
 from vto_pipeline.cloth.simulation import default_skin
 from vto_pipeline.errors import GarmentError, InputError, IntersectingError
@@ -138,7 +139,7 @@ class _CoarseToFine:
         model, config, job = self._model, self._config, self._job
         if level > 0:
             config, job = self._rough, self._part(level)
-            model = build_cloth(garment.mesh, garment.rest, self._fabric, materials=config)
+            model = self._soft(garment, config)
         phases = Phases(model, garment.rest, self._fabric, config, job)
         phases.some = partial(self._some, level)
         first = TriangleMesh(body.keyframes[0], body.faces)
@@ -172,9 +173,11 @@ class _CoarseToFine:
             self._leave_out(model, f"too coarse: {error.problem}")
             return None
         before = time.perf_counter() - self._began
-        settling = phases.settle_and_clear(
-            state, stepper, body.final, deadline, (ROUGH,) if level > 0 else (PLACED, REST)
-        )
+        if level > 0:
+            settling = phases.settle_and_clear(state, stepper, body.final, deadline, (ROUGH,))
+        else:
+            softer = phases.stepper(self._soft(garment, config), collider, config.damping)
+            settling = _by_softer_threads(phases, softer, stepper, state, body.final, deadline)
         if level > 0 and (settling.jammed or settling.caught):
             weights = f"with forces of {settling.residual:.0f} times the weight"
             what = "it is caught in the body" if settling.caught else "its layers are jammed"
@@ -186,6 +189,11 @@ class _CoarseToFine:
             others = job.warnings[:untangled] + job.warnings[put_on:]
             self._job.notes += [f"on {len(model.mass)} vertices: {text}" for text in others]
         return RestOnMesh(model, phases, stepper, settling)
+
+    def _soft(self, garment: Garment, config: DrapeConfig) -> ClothModel:
+        """Return a garment's cloth with softer threads."""
+        fabric, materials = softened(self._fabric, config)
+        return build_cloth(garment.mesh, garment.rest, fabric, materials=materials)
 
     def _some(self, level: int, positions: FloatArray) -> FloatArray:
         """Return where some vertices of the garment's own mesh are when those of a coarser one are here [m]."""
@@ -204,6 +212,31 @@ class _CoarseToFine:
             whole.progress(_FIRST * (count - level + done) / count, f"on a coarser mesh: {text}")
 
         return Job(progress, whole.scratch, whole.seed, whole.force_all)
+
+
+def _by_softer_threads(
+    phases: Phases, softer: Stepper, stepper: Stepper, state: ClothState, body: TriangleMesh, deadline: float
+) -> SettlingResult:
+    """Return how a cloth came to rest: nearly so with softer threads, then as it is; where those jam, no farther.
+
+    Args:
+        phases: Of its mesh.
+        softer, stepper: The cloth among its colliders, with softer threads and as it is.
+        state: Where to begin.
+        body: Where it is now.
+        deadline: `time.perf_counter` at which to stop.
+    """
+    began = time.perf_counter()
+    nearly = phases.settle_and_clear(state, softer, body, began + _FIRST * (deadline - began), (PLACED,))
+    stepper.steps += softer.steps
+    if nearly.jammed or nearly.caught:
+        return nearly
+    spent = time.perf_counter() - began
+    start = replace(at_rest(nearly.state.positions), time=nearly.state.time)
+    settling = phases.settle_and_clear(start, stepper, body, deadline)
+    settling.trace = nearly.trace + [replace(row, seconds=spent + row.seconds) for row in settling.trace]
+    settling.looks = nearly.looks + settling.looks
+    return settling
 
 
 def _coarser_ones(garment: Garment, most: int, job: Job) -> list[CoarseGarment]:

@@ -41,11 +41,15 @@ class StableNewtonSteps:
     Args:
         stepper: The cloth among its colliders, prepared; its steps are changed.
         enough: Left-over force, as a share of weight, at which cloth counts as in balance.
+
+    Attributes:
+        indefinite_step: The shortest in which the system was not positive definite [s]; may be set, infinite for none.
     """
 
     def __init__(self, stepper: Stepper, enough: float) -> None:
         self._stepper = stepper
         self._usual = stepper.substeps
+        self.indefinite_step = np.inf
         self._enough = enough
         self._most = self._before = np.inf
         self._tried = False
@@ -105,6 +109,7 @@ class StableNewtonSteps:
             if residual < self._enough or stands or stepper.substeps > self._usual:
                 stepper.substeps = max(stepper.substeps / _LONGER, FRAME / LONGEST)
         elif stepper.substeps < self._usual:
+            self.indefinite_step = min(self.indefinite_step, stepper.step)
             self._shorten()
         else:
             self._most = _ASIDE * max(residual, _SLIGHT * self._enough)

@@ -45,17 +45,28 @@ from vto_pipeline.numerics.linear.multigrid import Hierarchy
 _LEFT = 6.0  # 1/s: share of the forces at the begin of a step left by a linear solve, times h, so errors fall with h
 _OF_WEIGHT = 0.3  # share of the weight that counts as force where cloth is in balance
 _ENOUGH = 3  # Newton iterations of a step that comes down by full moves
-_HARDEST = 20  # Newton iterations at most, of a step that will not come down
 _BENT = 0.06  # 1/s: share of the motion's energy that curvature left out by an iteration may cost in a second
 _SLIGHT = 10.0  # times what is allowed: a fall that is not worth a second way down
 _SHORTEST = 1e-10  # share of a Newton step: from a point, cloth begins to grow by a millionth of its edges
 _ROUNDING = 1e-9  # relative change of the objective that is no change
-_CONTACT_ROUNDS = 20  # solutions with a revised set of contacts, an iteration, at most
 _CHANGED = 0.05  # of the contact forces: amiss by less, their set is good enough
 _FEW = 4.0  # contacts' mean force, amiss: with more, what lies on a fine mesh breaks loose in the next step
 _HARDLY = 0.04  # the same with the exact stiffness: a tight garment's contacts bear a hundred times its weight
-_EXTENSIONS = 2  # times an iteration is solved again with what it would have passed through
 _CROSSED = 0.01  # of an edge: how far a plane may be crossed without solving again
+
+
+class Limits(NamedTuple):
+    """What a step may take at most; it mostly takes less.
+
+    Args:
+        iterations: Of Newton, where a step will not come down.
+        contact_rounds: Solutions with a revised set of contacts, an iteration.
+        extensions: Times an iteration is solved again with what it would have passed through.
+    """
+
+    iterations: int = 20
+    contact_rounds: int = 20
+    extensions: int = 2
 
 
 class _Iteration(NamedTuple):
@@ -90,6 +101,7 @@ class Newton:
         exact: Whether steps use the exact stiffness, until the system is not positive definite with it; may be set.
         definite: Whether all systems of the last step were, with the exact stiffness.
         active: The contacts of the last step, and the forces they bore.
+        limits: Of a step; may be lowered where its time is short.
     """
 
     def __init__(self, model: ClothModel, *, sweeps: int = 1, damping: float = 0.0, max_speed: float = np.inf) -> None:
@@ -98,6 +110,7 @@ class Newton:
         self._damping = damping
         self._max_speed = max_speed
         self.self_contact: SelfContact | None = None
+        self.limits = Limits()
         self.exact = self.definite = False
         self._checked = False
         self._held = model.inverse_mass == 0.0
@@ -193,7 +206,7 @@ class Newton:
     def _descend(self, x: FloatArray, target: FloatArray, h: float, done: _Iteration) -> _Iteration:
         """Iterate on until the objective is a parabola, to within what is allowed, or will not fall."""
         zero = np.zeros_like(x)
-        for iteration in range(1, max(_HARDEST, self._sweeps)):
+        for iteration in range(1, max(self.limits.iterations, self._sweeps)):
             straight = abs(done.fall - done.foreseen) <= self._allowed + _ROUNDING * abs(done.left)
             if done.share == 1.0 and iteration >= self._sweeps and (straight or iteration >= _ENOUGH):
                 break
@@ -247,7 +260,7 @@ class Newton:
         bare = matrix.blocks[matrix.diagonal]
         good = _CHANGED
         move, pushes, changed = guess.copy(), (0.0, 0.0, 0.0), 0.0
-        rounds, extensions = _CONTACT_ROUNDS, _EXTENSIONS
+        _, rounds, extensions = self.limits
         while True:
             right = forces.copy()
             touches = len(self.active.key) > 0

@@ -57,7 +57,7 @@ def upright(clip: Clip, joints: JointMap, unit: str | None, up: str | None) -> t
         name = next((one for one, size in _UNITS.items() if low <= legs * size <= high), "unknown")
         metres = _UNITS.get(name, _USUAL_LEG_M / max(legs, 1e-12))
     axis = up or _up_axis(clip, joints)
-    turn = _to_y(axis)
+    turn = to_y(axis)
     roots = clip.parents < 0
     rotations, translations = clip.rotations.copy(), clip.translations * metres
     rotations[:, roots] = matrix_quaternions(turn @ quaternion_matrices(clip.rotations[:, roots]))
@@ -103,8 +103,8 @@ def _up_axis(clip: Clip, joints: JointMap) -> str:
     return "+Y"
 
 
-def _to_y(axis: str) -> FloatArray:
-    """The rotation that brings a signed axis to +Y by a quarter turn, or half a turn, about another axis."""
+def to_y(axis: str) -> FloatArray:
+    """Return the rotation that brings a signed axis to +Y by a quarter turn, or half a turn, about another axis."""
     start = np.zeros(3)
     start["XYZ".index(axis[1])] = 1.0 if axis[0] == "+" else -1.0
     end = np.array([0.0, 1.0, 0.0])

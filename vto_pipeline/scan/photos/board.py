@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from vto_pipeline.errors import InputError
@@ -10,6 +12,9 @@ from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.frames import CharucoBoard, PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.scan.library_message import library_message
+
+LONGER_SIDE = 2400
+"""Smaller photos are enlarged to this [px]: a marker seen at a slant is then told from its neighbours."""
 
 
 def board_corners(board: CharucoBoard) -> FloatArray:
@@ -28,6 +33,9 @@ def board_corners(board: CharucoBoard) -> FloatArray:
 
 def detect_board(photos: PhotoSet, names: tuple[str, ...], job: Job) -> list[tuple[IntArray, FloatArray]]:
     """Detect the board's corners in the named photos.
+
+    One marker that is read tells where the others are (`tryRefineMarkers`), and beside one alone a corner counts: of a
+    board far off or at a slant, few can be read.
 
     Args:
         photos: The photos and the board.
@@ -48,17 +56,24 @@ def detect_board(photos: PhotoSet, names: tuple[str, ...], job: Job) -> list[tup
         raise InputError(f"{board.dictionary} is not a dictionary of OpenCV", hint="for example DICT_4X4_250")
     dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, board.dictionary))
     pattern = cv2.aruco.CharucoBoard((board.columns, board.rows), board.square_m, board.marker_m, dictionary)
-    detector = cv2.aruco.CharucoDetector(pattern)
+    reading = cv2.aruco.CharucoParameters()
+    reading.tryRefineMarkers, reading.minMarkers = True, 1
+    detector = cv2.aruco.CharucoDetector(pattern, reading)
     paths = {path.name: path for path in photos.paths}
     found = []
     for name in names:
         try:
-            pixels, ids, _, _ = detector.detectBoard(cv2.cvtColor(read_image(paths[name]), cv2.COLOR_RGB2GRAY))
+            gray: Any = cv2.cvtColor(read_image(paths[name]), cv2.COLOR_RGB2GRAY)
+            scale = max(1.0, LONGER_SIDE / max(gray.shape))
+            if scale > 1.0:
+                gray = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
+            pixels, ids, _, _ = detector.detectBoard(gray)
         except cv2.error as error:
             job.note(f"no board in {name}: {library_message(error)}")
             found.append((np.empty(0, np.int32), np.empty((0, 2))))
             continue
         none = ids is None or pixels is None
         identity = np.empty(0, np.int32) if none else np.asarray(ids, np.int32).ravel()
-        found.append((identity, np.empty((0, 2)) if none else np.asarray(pixels, float).reshape(-1, 2)))
+        places = np.empty((0, 2)) if none else np.asarray(pixels, float).reshape(-1, 2)
+        found.append((identity, (places + 0.5) / scale - 0.5))
     return found

@@ -6,7 +6,7 @@ import signal
 import tempfile
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -18,8 +18,10 @@ from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
 from vto_pipeline.model.settings import Config
+from vto_pipeline.scan.photos.board import detect_board
 from vto_pipeline.scan.photos.matching.adjust import adjust
 from vto_pipeline.scan.photos.matching.features import FAINT, SURE, FeatureConfig, detect, match
+from vto_pipeline.scan.photos.matching.from_board import map_from_board
 from vto_pipeline.scan.photos.matching.mapping import MIN_PHOTOS, lens_of, map_photos
 from vto_pipeline.scan.photos.matching.still_background import grey_beside, paint_over, still_pixels
 from vto_pipeline.scan.photos.matching.ties import LEAST_TIES
@@ -74,15 +76,16 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
         job.progress(0.3, f"matching {len(photos.paths)} photos")
         pairs, fixed_camera = match(photos, database, config.features, job)
         job.progress(0.7, f"placing cameras, {pairs} matched pairs")
-        model = map_photos(database, photos.paths[0].parent, len(photos.paths), job)
-        placed, again = 0 if model is None else model.num_reg_images(), None
-        if fixed_camera and placed < len(photos.paths):
+        tried = _placed(photos, database, counts, pairs, job)
+        again = None
+        if fixed_camera and tried.placed < len(photos.paths):
             again = _beside_background(photos, Path(scratch), config, job)
-        elif placed < FEW * len(photos.paths) and database.stem == "sure":
-            job.note(f"only {placed} of {len(photos.paths)} photos could be placed: looking for fainter features")
+        elif tried.placed < FEW * len(photos.paths) and database.stem == "sure" and not tried.by_board:
+            job.note(f"only {tried.placed} of {len(photos.paths)} photos could be placed: looking for fainter features")
             again = _faint(photos, photos, Path(scratch) / "faint", config, job)
-        if again is not None and _is_better(again[0], model, len(photos.paths)):
-            model, counts, pairs = again
+        if again is not None and again.placed > tried.placed and (again.by_board or again.placed >= MOST * len(counts)):
+            tried = again
+        model, counts, pairs = tried.model, tried.features, tried.pairs
     names = [path.name for path in photos.paths]
     if model is None or model.num_reg_images() < MIN_PHOTOS:
         each = ", ".join(f"{name} {count}" for name, count in zip(names, counts, strict=True))
@@ -109,13 +112,43 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
     return cameras, cloud
 
 
-def _beside_background(
-    photos: PhotoSet, scratch: Path, config: SfmConfig, job: Job
-) -> tuple[Any | None, list[int], int] | None:
+class _Tried(NamedTuple):
+    """What came of trying to place photos.
+
+    Args:
+        model: A pycolmap Reconstruction, or None.
+        features: Per photo.
+        pairs: That match.
+        by_board: Whether the board placed them.
+    """
+
+    model: Any | None
+    features: list[int]
+    pairs: int
+    by_board: bool
+
+    @property
+    def placed(self) -> int:
+        """How many photos were placed."""
+        return 0 if self.model is None else int(self.model.num_reg_images())
+
+
+def _placed(photos: PhotoSet, database: Path, features: list[int], pairs: int, job: Job) -> _Tried:
+    """Place photos by their features, or by the board if these place few and it places more."""
+    folder, names = photos.paths[0].parent, tuple(path.name for path in photos.paths)
+    tried = _Tried(map_photos(database, folder, len(names), job), features, pairs, by_board=False)
+    if tried.placed >= FEW * len(names) or photos.board is None:
+        return tried
+    job.note(f"only {tried.placed} of {len(names)} photos could be placed by features: looking for the board")
+    found = dict(zip(names, detect_board(photos, names, job), strict=True))
+    by_board = _Tried(map_from_board(database, folder, photos.board, found, job), features, pairs, by_board=True)
+    return by_board if by_board.placed > tried.placed else tried
+
+
+def _beside_background(photos: PhotoSet, scratch: Path, config: SfmConfig, job: Job) -> _Tried | None:
     """Try again with the background painted over: its many features hide that the object has few, and faint ones.
 
-    Returns:
-        The model or None, features per photo, and matched pairs; None where the background is not known.
+    None where the background is not known.
     """
     masks = still_pixels(photos)
     if masks is None:
@@ -132,19 +165,13 @@ def _beside_background(
 
 def _faint(
     shown: PhotoSet, photos: PhotoSet, folder: Path, config: SfmConfig, job: Job, *, camera_stays: bool = False
-) -> tuple[Any | None, list[int], int]:
-    """Place the photos by faint features of what is shown of them; returns what `_beside_background` does."""
+) -> _Tried:
+    """Place the photos by faint features of what is shown of them."""
     folder.mkdir(exist_ok=True)
     database = folder / "faint.db"
     counts = detect(shown, database, FAINT, config.features)
     pairs, _ = match(shown, database, config.features, Job(seed=job.seed), camera_stays=camera_stays)
-    return map_photos(database, photos.paths[0].parent, len(photos.paths), job), counts, pairs
-
-
-def _is_better(again: Any | None, before: Any | None, photos: int) -> bool:
-    """Return whether a model from faint features is to be believed, and places more photos than the one before."""
-    placed = 0 if again is None else again.num_reg_images()
-    return placed >= MOST * photos and (before is None or placed > before.num_reg_images())
+    return _placed(photos, database, counts, pairs, job)
 
 
 def load_colmap(seed: int) -> None:

@@ -8,4 +8,5 @@ outcome: what a run made, and what it says
 shown, pictures: what of it can be drawn, and a small picture of that
 cards: what a notebook shows of it
 moving: its garment and avatar in motion, frame by frame
+live: the same, moved by a person before a camera
 """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from codecs import BOM_UTF8
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -71,23 +71,41 @@ def read_lines(path: Path) -> TrackedFrames:
                 record = json.loads(line)
             except (ValueError, RecursionError):
                 raise FormatError("not a line of JSON", where=where, hint=_HINT) from None
-            frames.append(_joints(record, where))
-            times += [float(record[key]) * unit for key, unit in _TIMES.items() if _is_number(record.get(key))][:1]
+            frames.append(joints_in(record, where))
+            times += times_in(record)
     if not frames:
         raise FormatError("no frames", where=str(path), hint=_HINT)
     if len(times) not in (0, len(frames)):
         raise FormatError(f"{len(times)} of {len(frames)} frames say when they were", where=str(path))
     names = sorted({name for frame in frames for name in frame})
-    convention, known = ("ours", {name: name for name in names})
-    if not set(names) <= set(LANDMARKS):
-        convention, known = joints_by_name(names)
+    convention, known = our_joints(names)
     nowhere = [math.nan] * 3
     places = {ours: np.array([frame.get(theirs, nowhere) for frame in frames]) for ours, theirs in known.items()}
     return TrackedFrames(places, np.array(times) if times else None, convention)
 
 
-def _joints(record: Any, where: str) -> dict[str, list[float]]:
-    """Return the joints that a frame holds, by the file's names, or by ours where it has landmarks."""
+def our_joints(names: Sequence[str]) -> tuple[str, dict[str, str]]:
+    """Return the convention that joints are named by, and our joint -> its name there."""
+    if set(names) <= set(LANDMARKS):
+        return "ours", {name: name for name in names}
+    return joints_by_name(names)
+
+
+def times_in(record: Mapping[str, Any]) -> list[float]:
+    """Return when a frame says that it was [s], alone in a list; empty where it says nothing."""
+    return [float(record[key]) * unit for key, unit in _TIMES.items() if _is_number(record.get(key))][:1]
+
+
+def joints_in(record: Any, where: str) -> dict[str, list[float]]:
+    """Return the joints that a frame holds, by the file's names, or by ours where it has landmarks.
+
+    Args:
+        record: A line's JSON value.
+        where: The line, for messages.
+
+    Raises:
+        FormatError: it holds none, or a place is not three numbers.
+    """
     if not isinstance(record, dict):
         raise FormatError("a frame is not an object", where=where, hint=_HINT)
     for key in _WORLD:

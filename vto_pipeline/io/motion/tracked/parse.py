@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +15,11 @@ from vto_pipeline.io.motion.tracked.turns import fitted_skeleton, turns_of
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.numerics.kinematics import local_rotations, matrix_quaternions
 
-_NEEDED = tuple(
+NEEDED = tuple(
     f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in ("left", "right")
 )
+"""Joints without which nothing is known of the limbs."""
+
 _BONES = (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist"))
 _RATE = 30.0
 """Frames a second where the file does not say."""
@@ -41,7 +44,7 @@ def parse_tracked(name: str) -> Arrays:
         FormatError: it breaks the format, or a joint that is needed is missing, or lost in most frames.
     """
     read = read_lines(Path(name))
-    missing = [joint for joint in _NEEDED if joint not in read.places]
+    missing = [joint for joint in NEEDED if joint not in read.places]
     if missing:
         raise FormatError(f"no {', '.join(missing)} in any frame", where=name, hint="names as in the docs on motion")
     notes, warnings = [f"joints are named by the convention {read.convention!r}"], []
@@ -53,13 +56,30 @@ def parse_tracked(name: str) -> Arrays:
         notes.append(f"the lines hold no time: {_RATE:g} frames a second are assumed")
     else:
         places, frame_time = _evenly(places, read.times, name)
-    _refuse_points(places, name)
+    refuse_points(places, name)
     parents, offsets = fitted_skeleton(places)
     world, root = turns_of(places, offsets)
     hips = 0.5 * (places["left_hip"] + places["right_hip"])
     if len(hips) > 1 and np.abs(hips).max() < _LEAST_BONE * np.abs(offsets).max():
-        root = root + _carried_by_feet(places)
+        root = root + carried_by_feet(places)
         notes.append("places count from the hips: the foot that stands carries the body")
+    return moving_skeleton(parents, offsets, world, root, frame_time) | {
+        "notes": np.array(notes, dtype=np.str_),
+        "warnings": np.array(warnings, dtype=np.str_),
+    }
+
+
+def moving_skeleton(
+    parents: list[int], offsets: FloatArray, world: FloatArray, root: FloatArray, frame_time: float
+) -> Arrays:
+    """Return a skeleton that turns, as `parse_bvh` does, without notes.
+
+    Args:
+        parents, offsets: Of `fitted_skeleton`.
+        world: Rotations in the world, shape (T, J, 3, 3).
+        root: Places of the root, shape (T, 3).
+        frame_time: [s].
+    """
     translations = np.tile(offsets, (len(root), 1, 1))
     translations[:, 0] = root
     return {
@@ -71,8 +91,6 @@ def parse_tracked(name: str) -> Arrays:
         "translations": translations,
         "frame_time": np.array(frame_time),
         "dialect": np.array("joints followed by a camera"),
-        "notes": np.array(notes, dtype=np.str_),
-        "warnings": np.array(warnings, dtype=np.str_),
     }
 
 
@@ -83,7 +101,7 @@ def _filled(read: TrackedFrames, name: str) -> tuple[dict[str, FloatArray], list
     for joint, there in read.places.items():
         seen = np.isfinite(there).all(axis=1)
         if seen.mean() < 1 - _MOST_LOST:
-            if joint in _NEEDED:
+            if joint in NEEDED:
                 raise FormatError(f"{joint} is seen in {seen.mean():.0%} of the frames", where=name)
             continue
         frames = np.flatnonzero(seen)
@@ -108,7 +126,7 @@ def _evenly(places: dict[str, FloatArray], times: FloatArray, name: str) -> tupl
     return found, frame_time
 
 
-def _refuse_points(places: dict[str, FloatArray], name: str) -> None:
+def refuse_points(places: Mapping[str, FloatArray], name: str) -> None:
     """Refuse bones without length: they have no direction."""
     trunk = 0.5 * (places["left_shoulder"] + places["right_shoulder"] - places["left_hip"] - places["right_hip"])
     least = _LEAST_BONE * float(np.median(np.linalg.norm(trunk, axis=1)))
@@ -120,7 +138,7 @@ def _refuse_points(places: dict[str, FloatArray], name: str) -> None:
         raise FormatError("hips and shoulders are in one place", where=name)
 
 
-def _carried_by_feet(places: dict[str, FloatArray]) -> FloatArray:
+def carried_by_feet(places: Mapping[str, FloatArray]) -> FloatArray:
     """Return how far the body has gone, of which only places about the hips are known, shape (T, 3).
 
     From one frame to the next it goes as far as the lower foot goes back. Toes are better than ankles: they stand until

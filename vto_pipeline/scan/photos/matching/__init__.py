@@ -4,6 +4,7 @@ fixed_camera: a background that stays where it is, found by its matches
 still_background: which pixels show it, so that it can be painted over
 features: features, and pairs of photos that share them
 mapping: cameras and points from the pairs
+board_poses, from_board: the same where features are too few, and photos show the board
 ties: photos that too few points tie to the others
 tracks, adjust: many more points followed from photo to photo, and the cameras adjusted to them
 """

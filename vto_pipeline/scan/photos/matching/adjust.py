@@ -71,10 +71,36 @@ def adjust(model: Any, photos: PhotoSet, job: Job) -> Any:
     return adjusted
 
 
-def _adjust(model: Any, photos: PhotoSet, job: Job) -> int:
-    """Adjust a model in place, and return how many points were added for it."""
+def solve(model: Any, soft_px: float, bent: bool) -> None:
+    """Adjust a model's cameras and points to its sightings, in place.
+
+    Args:
+        model: A pycolmap Reconstruction.
+        soft_px: Errors beyond this lose their weight [px].
+        bent: Whether the lens's distortion is adjusted, too.
+
+    Raises:
+        ValueError: no solution was found.
+    """
     import pycolmap
 
+    options = pycolmap.BundleAdjustmentOptions(refine_extra_params=bent, print_summary=False)
+    options.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
+    options.ceres.loss_function_scale = soft_px
+    options.ceres.solver_options.num_threads = 1  # with more, the last bits change from run to run
+    options.ceres.solver_options.max_num_iterations = 50
+    options.ceres.solver_options.function_tolerance = 1e-6
+    gauge = pycolmap.BundleAdjustmentConfig()
+    for number in sorted(number for number, image in model.images.items() if image.has_pose):
+        gauge.add_image(number)
+    gauge.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
+    solved = pycolmap.create_default_bundle_adjuster(options, gauge, model).solve()
+    if not solved.is_solution_usable():
+        raise ValueError(solved.brief_report())
+
+
+def _adjust(model: Any, photos: PhotoSet, job: Job) -> int:
+    """Adjust a model in place, and return how many points were added for it."""
     ids = sorted(number for number, image in model.images.items() if image.has_pose)
     shared = _shared(model, ids)
     views, scales = _views(model, photos, ids)
@@ -94,19 +120,7 @@ def _adjust(model: Any, photos: PhotoSet, job: Job) -> int:
             tracks.append((points[n], track))
         job.progress(0.85 + 0.1 * (index + 1) / len(ids), f"adjusting cameras, photo {index + 1} of {len(ids)}")
     fresh = _enter(model, extra, tracks)
-    options = pycolmap.BundleAdjustmentOptions(refine_extra_params=len(fresh) >= LENS * len(ids), print_summary=False)
-    options.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
-    options.ceres.loss_function_scale = SOFT_PX
-    options.ceres.solver_options.num_threads = 1  # with more, the last bits change from run to run
-    options.ceres.solver_options.max_num_iterations = 50
-    options.ceres.solver_options.function_tolerance = 1e-6
-    gauge = pycolmap.BundleAdjustmentConfig()
-    for number in ids:
-        gauge.add_image(number)
-    gauge.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
-    solved = pycolmap.create_default_bundle_adjuster(options, gauge, model).solve()
-    if not solved.is_solution_usable():
-        raise ValueError(solved.brief_report())
+    solve(model, SOFT_PX, bent=len(fresh) >= LENS * len(ids))
     for number in fresh:
         model.delete_point3D(number)
     model.update_point_3d_errors()

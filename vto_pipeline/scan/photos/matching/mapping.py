@@ -79,10 +79,10 @@ def _explains_as_much(model: Any, other: Any) -> bool:
 def _best(database: Path, folder: Path, count: int, job: Job, bent: bool) -> Any | None:
     """Return the model with the most photos, the least error among equals."""
     models: list[Any] = []
-    for name, mapper in (("global", _global), ("incremental", _incremental)):
+    for name, mapper in (("global", _global), ("incremental", incremental)):
         if max((model.num_reg_images() for model in models), default=0) < count:
             try:
-                found = mapper(_copy(database, name if bent else f"{name}_straight"), folder, job.seed, bent)
+                found = mapper(copy_database(database, name if bent else f"{name}_straight"), folder, job.seed, bent)
                 models += [untie(model) for model in found]
             except COLMAP_ERRORS as error:
                 job.note(f"the {name} mapper failed: {library_message(error)}")
@@ -93,8 +93,8 @@ def _merit(model: Any) -> tuple[int, float]:
     return model.num_reg_images(), -model.compute_mean_reprojection_error()
 
 
-def _copy(database: Path, name: str) -> Path:
-    """Each mapper writes to its own database: calibration changes the cameras in it.
+def copy_database(database: Path, name: str) -> Path:
+    """Return a copy in a folder of that name: each mapper writes to its own, for calibration changes the cameras in it.
 
     Copied by SQLite: what was committed may still lie in the write-ahead log, which a copy of the file would miss.
     """
@@ -121,12 +121,22 @@ def _global(database: Path, folder: Path, seed: int, bent: bool) -> list[Any]:
     return [models[key] for key in sorted(models)]
 
 
-def _incremental(database: Path, folder: Path, seed: int, bent: bool) -> list[Any]:
+def incremental(database: Path, folder: Path, seed: int, bent: bool, start: Path | None = None) -> list[Any]:
+    """Return the models of COLMAP's incremental mapper.
+
+    Args:
+        database: Features and verified matches.
+        folder: Of the photos.
+        seed: Of the mapper.
+        bent: Whether the lens is refined.
+        start: Folder of a model to go on from.
+    """
     import pycolmap
 
     options = pycolmap.IncrementalPipelineOptions(num_threads=1, random_seed=seed, min_model_size=MIN_PHOTOS)
     options.mapper.num_threads = 1
     options.mapper.random_seed = options.triangulation.random_seed = seed
     options.ba_refine_extra_params = bent
-    models = pycolmap.incremental_mapping(database, folder, database.parent, options)
+    options.multiple_models = start is None
+    models = pycolmap.incremental_mapping(database, folder, database.parent, options, str(start or ""))
     return [models[key] for key in sorted(models)]

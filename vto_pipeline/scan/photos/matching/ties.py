@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,12 @@ LEAST_LINK = 10
 besides it fix the scale; each is between photos that share so many points."""
 
 
-def untie(model: Any) -> Any:
+def untie(model: Any, sure: Sequence[int] = ()) -> Any:
     """Leave out of a pycolmap Reconstruction, in place, the photos that too few points tie to most of the others.
+
+    Args:
+        model: Placed photos and sparse points.
+        sure: Numbers of photos that see the same board: it ties them as points enough would.
 
     Returns:
         The model.
@@ -32,7 +37,10 @@ def untie(model: Any) -> Any:
             for row, point in enumerate(model.points3D.values())
             for element in point.track.elements
         ]
-        seen = np.array(sightings, dtype=np.int64).reshape(-1, 2)
+        board = [
+            (len(model.points3D) + k, place[number]) for k in range(LEAST_TIES) for number in sure if number in place
+        ]
+        seen = np.array(sightings + board, dtype=np.int64).reshape(-1, 2)
         kept = tied_together(seen[:, 0], seen[:, 1], len(ids))
         if kept.all():
             return model

@@ -1,0 +1,97 @@
+"""An avatar that follows a person frame by frame, beside the whole motion carried over at once."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+from motion_shapes import random_moves, tracked_places, tracked_text
+from numpy.testing import assert_allclose
+
+from vto_pipeline.avatar.model.pose import posed_vertices
+from vto_pipeline.avatar.motion.live import LivePose
+from vto_pipeline.avatar.motion.retarget import RetargetConfig, retarget
+from vto_pipeline.avatar.motion.timing import brought_to
+from vto_pipeline.avatar.template.template import template
+from vto_pipeline.io.motion.read import read_motion
+from vto_pipeline.io.motion.tracked.live import LiveJoints
+
+NO_LEAD = 1e-9
+COUNT = 20  # less than it measures over: at the last frame it knows what the whole motion tells
+
+
+def live(lines: list[str], body, **settings) -> tuple[LivePose, list[np.ndarray]]:
+    """The avatar's vertices in each frame."""
+    joints, pose = LiveJoints("camera"), LivePose(body, settings.pop("lead_in", NO_LEAD), **settings)
+    found = []
+    for number, line in enumerate(lines):
+        frame = joints.read(line.encode())
+        found.append(posed_vertices(body, *pose.at(frame.places, 1.0 + number / 25)))
+    return pose, found
+
+
+def test_once_measured_a_frame_is_as_the_whole_motion_has_it(tmp_path: Path):
+    body, text = template(0.0), tracked_text(random_moves(COUNT))
+    (tmp_path / "a.jsonl").write_text(text)
+    read = read_motion(tmp_path / "a.jsonl")
+    motion, _ = retarget(read.clip, read.joints, body, RetargetConfig(hold_feet=False))
+    poses, places = brought_to(motion, body)
+    _, found = live(text.splitlines(), body)
+    truth = posed_vertices(body, poses[-1], places[-1])
+    assert_allclose(found[-1], truth, rtol=0, atol=2e-3)  # feet are levelled by how they stand at 30 frames a second
+
+
+def test_it_begins_in_its_own_pose_and_is_led_to_the_persons():
+    body, line = template(0.0), tracked_text(random_moves(1)).splitlines()[0]
+    joints, pose = LiveJoints("camera"), LivePose(body, 2.0)
+    frame = joints.read(line.encode())
+    ways = [posed_vertices(body, *pose.at(frame.places, t)) for t in (0.0, 0.5, 1.0, 1.5, 2.0, 3.0)]
+    assert_allclose(ways[0], body.vertices, rtol=0, atol=1e-9)
+    assert_allclose(ways[4], ways[5], rtol=0, atol=1e-12)
+    left = [np.abs(way - ways[-1]).max() for way in ways]
+    assert left == sorted(left, reverse=True)
+    assert left[0] > 0.05
+
+
+def test_unit_axis_and_place_of_the_camera_change_nothing():
+    body, moves = template(0.0), random_moves(6)
+    _, found = live(tracked_text(moves).splitlines(), body)
+    turned = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # +Z up
+    places = {name: 1000.0 * place @ turned.T + [300.0, 2000.0, 40.0] for name, place in tracked_places(moves).items()}
+    lines = [json.dumps({"joints": {name: place[t].tolist() for name, place in places.items()}}) for t in range(6)]
+    _, other = live(lines, body, unit="mm", up="+Z")
+    for one, two in zip(found, other, strict=True):
+        assert_allclose(two, one, rtol=0, atol=1e-6)
+
+
+def test_places_about_the_hips_are_carried_by_the_foot_that_stands():
+    """A person who steps ahead over a standing foot, told in places about the hips."""
+    body, count, step = template(0.0), 10, 0.03
+    places = {name: np.repeat(place[:1], count, axis=0) for name, place in tracked_places(random_moves(1)).items()}
+    hips = 0.5 * (places["left_hip"] + places["right_hip"])
+    about = {name: place - hips for name, place in places.items()}
+    for joint in ("left_ankle", "left_toe"):
+        if joint in about:
+            about[joint] = about[joint] - [0.0, 0.3, 0.0]  # the lower foot, which goes back
+            about[joint] = about[joint] - np.outer(np.arange(count) * step, [0.0, 0.0, 1.0])
+    lines = [json.dumps({"joints": {name: place[t].tolist() for name, place in about.items()}}) for t in range(count)]
+    joints, pose = LiveJoints("camera"), LivePose(body, NO_LEAD, unit="m", up="+Y")
+    roots = [pose.at(joints.read(line.encode()).places, 1.0)[1] for line in lines]
+    gone = np.linalg.norm(np.array(roots)[:, [0, 2]] - roots[0][[0, 2]], axis=1)
+    assert_allclose(gone / gone[-1], np.arange(count) / (count - 1), rtol=0, atol=0.02)
+    assert 0.5 * step * (count - 1) < gone[-1] < 1.5 * step * (count - 1)
+
+
+def test_a_leap_is_followed_in_the_time_of_the_lead_in():
+    body, moves = template(0.0), random_moves(1)
+    here = {name: place[0] for name, place in tracked_places(moves).items()}
+    there = {name: place + np.array([1.5, 0.0, 0.0]) for name, place in here.items()}
+    pose = LivePose(body, 0.5, unit="m", up="+Y")
+    roots = [pose.at(here, 0.1 * k)[1] for k in range(10)] + [pose.at(there, 1.0 + 0.1 * k)[1] for k in range(10)]
+    steps = np.linalg.norm(np.diff(roots, axis=0), axis=1)
+    gone = float(np.linalg.norm(roots[-1] - roots[9]))
+    assert gone > 1.0  # by the ratio of the legs
+    assert steps[9] < 1e-9  # at the leap itself it goes on from where it is
+    assert steps[10:15].max() < 0.4 * gone
+    assert_allclose(steps[15:], 0.0, atol=1e-9, rtol=0)

@@ -1,0 +1,255 @@
+"""Photos placed by the board alone, by it and by features, or not at all: exact projections and a rendered scene."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pycolmap
+import pytest
+from numpy.testing import assert_allclose
+from scan_scene import BOARD, make_scene, orbit, photos
+
+from vto_pipeline.errors import ScanError
+from vto_pipeline.model.camera import Intrinsics
+from vto_pipeline.model.frames import PhotoSet
+from vto_pipeline.model.job import Job
+from vto_pipeline.scan.photos import sfm as sfm_module
+from vto_pipeline.scan.photos.board import board_corners, detect_board
+from vto_pipeline.scan.photos.matching.board_poses import Placed, line_distance, place_photos
+from vto_pipeline.scan.photos.matching.features import SURE, FeatureConfig, detect, match
+from vto_pipeline.scan.photos.matching.from_board import map_from_board
+from vto_pipeline.scan.photos.sfm import SfmConfig, estimate_cameras, load_colmap
+from vto_pipeline.scan.similarity import fit_similarity
+
+LENS = Intrinsics(480, 360, 528.0, 528.0, 239.5, 179.5)
+GUESSED = replace(LENS, fx=545.0, fy=545.0)
+"""What EXIF says: 3 % too long."""
+
+
+def project(points, pose, lens):
+    """Pixels (N, 2) of points by the formulas of a pinhole camera with one radial term."""
+    local = (points - pose[:3, 3]) @ pose[:3, :3]
+    flat = local[:, :2] / local[:, 2:]
+    bent = flat * (1 + lens.k1 * (flat**2).sum(1, keepdims=True))
+    return bent * [lens.fx, lens.fy] + [lens.cx, lens.cy]
+
+
+def sighted(poses, lens, ids, noise=0.0):
+    random = np.random.default_rng(3)
+    world = board_corners(BOARD)[ids]
+    return {
+        f"{k}": (np.array(ids, np.int32), project(world, pose, lens) + random.normal(0, noise, (len(ids), 2)))
+        for k, pose in enumerate(poses)
+    }
+
+
+def colmap_camera(lens):
+    params = [lens.fx, lens.cx + 0.5, lens.cy + 0.5, lens.k1]
+    return pycolmap.Camera(model="SIMPLE_RADIAL", width=lens.width, height=lens.height, params=params)
+
+
+def centers_off(centers, truth):
+    """Distances of camera centres (C, 3) from the true ones after a similarity [m]."""
+    scale, transform = fit_similarity(centers, truth)
+    return np.linalg.norm(scale * centers @ transform[:3, :3].T + transform[:3, 3] - truth, axis=1)
+
+
+def placed_centers(model, names):
+    images = {image.name: image for image in model.images.values() if image.has_pose}
+    return {name: np.array(images[name].projection_center()) for name in names if name in images}
+
+
+@pytest.mark.parametrize("k1", [0.0, -0.15])
+def test_focal_length_and_places_are_those_that_the_corners_were_projected_with(k1):
+    """The bend is what is known of it: a few corners tell it too badly."""
+    lens, poses = replace(LENS, k1=k1), orbit(8, distance=0.8)
+    camera = colmap_camera(replace(GUESSED, k1=k1))
+    placed = place_photos(camera, BOARD, sighted(poses, lens, range(48)))
+    assert sorted(placed) == [f"{k}" for k in range(8)]
+    assert_allclose(camera.params, [528.0, 240.0, 180.0, k1], rtol=1e-4, atol=1e-4)  # pixels in single precision
+    for k, pose in enumerate(poses):
+        mine = placed[f"{k}"]
+        assert_allclose(mine.rotation, pose[:3, :3].T, rtol=0, atol=1e-4)
+        assert_allclose(-mine.rotation.T @ mine.shift, pose[:3, 3], rtol=0, atol=2e-4)  # [m], for the same reason
+
+
+def test_corners_that_are_elsewhere_are_left_out():
+    found = sighted(orbit(6), LENS, range(24), noise=0.2)
+    for ids, pixels in found.values():
+        pixels[ids == 7] += [25.0, -14.0]
+    placed = place_photos(colmap_camera(GUESSED), BOARD, found)
+    assert len(placed) == 6
+    assert all(not one.corners[7] and one.corners.sum() == 23 for one in placed.values())
+
+
+@pytest.mark.parametrize(
+    ("ids", "places"),
+    [
+        (range(8), False),  # one row: the board could turn about it
+        ([*range(7), 8], False),  # all but one in a row
+        (range(5), False),
+        ([0, 1, 2, 8, 9, 10], True),
+    ],
+)
+def test_a_photo_needs_corners_that_fix_it(ids, places):
+    assert bool(place_photos(colmap_camera(LENS), BOARD, sighted(orbit(4), LENS, list(ids)))) is places
+
+
+def test_a_photo_of_one_row_does_not_spoil_the_others():
+    found = sighted(orbit(5), LENS, range(48))
+    found["2"] = (found["2"][0][:8], found["2"][1][:8])
+    assert sorted(place_photos(colmap_camera(LENS), BOARD, found)) == ["0", "1", "3", "4"]
+
+
+def test_another_board_places_nothing():
+    """Columns and rows exchanged: the corners carry other numbers."""
+    other = replace(BOARD, columns=BOARD.rows, rows=BOARD.columns)
+    assert place_photos(colmap_camera(LENS), other, sighted(orbit(6), LENS, range(48))) == {}
+
+
+def test_distance_from_the_line_of_exact_matches_is_zero_and_of_shifted_ones_their_shift():
+    poses = orbit(12)[[0, 1]]
+    points = np.random.default_rng(4).uniform([-0.1, 0.15, -0.1], [0.1, 0.35, 0.1], (200, 3))
+    lens = replace(LENS, k1=-0.1)
+    first, second = (Placed(pose[:3, :3].T, -pose[:3, :3].T @ pose[:3, 3], np.ones(6, dtype=bool)) for pose in poses)
+    here, there = (project(points, pose, lens) + 0.5 for pose in poses)
+    camera = colmap_camera(lens)
+    assert line_distance(camera, camera, first, second, here, there).max() < 1e-6
+    up = there + np.array([0.0, 4.0])  # the cameras are beside each other: lines are all but level
+    shifted = line_distance(camera, camera, first, second, here, up)
+    assert_allclose(shifted, 4.0 / np.sqrt(2.0), rtol=0.1, atol=0)  # either point may give way
+    assert len(line_distance(camera, camera, first, second, here[:0], there[:0])) == 0
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    """Ten photos of a tube without a print, of which no feature was matched."""
+    folder, poses = tmp_path_factory.mktemp("plain"), orbit(10, elevations_deg=(28.0,))
+    load_colmap(0)
+    shot = photos(make_scene(contrast=0.0), folder / "photos", poses, LENS)
+    shot = PhotoSet(shot.paths, (GUESSED,) * len(poses), shot.board)
+    detect(shot, folder / "x.db", SURE, FeatureConfig())
+    names = tuple(path.name for path in shot.paths)
+    return shot, poses, folder / "x.db", dict(zip(names, detect_board(shot, names, Job()), strict=True))
+
+
+def test_the_board_alone_places_photos(plain):
+    shot, poses, database, found = plain
+    job = Job()
+    model = map_from_board(database, shot.paths[0].parent, BOARD, found, job)
+    centers = placed_centers(model, sorted(found))
+    assert list(centers) == sorted(found)
+    error = centers_off(np.array(list(centers.values())), poses[:, :3, 3])
+    assert error.max() < 0.02  # at 1 m: one flat board, all from one height, tells focal length to 2 %, and so depth
+    assert_allclose(next(iter(model.cameras.values())).focal_length, 528.0, rtol=0.02, atol=0)
+    assert job.metrics["board_placed"] == 10
+
+
+def test_fewer_corners_than_features_would_be_asked_for_place_photos(plain, tmp_path):
+    """The same dozen in all photos: as many features might agree by chance."""
+    shot, poses, database, found = plain
+    copied = tmp_path / database.name
+    copied.write_bytes(database.read_bytes())
+    common = sorted(set.intersection(*(set(ids.tolist()) for ids, _ in found.values())))[:12]
+    few = {name: (ids[np.isin(ids, common)], pixels[np.isin(ids, common)]) for name, (ids, pixels) in found.items()}
+    model = map_from_board(copied, shot.paths[0].parent, BOARD, few, Job())
+    centers = placed_centers(model, sorted(found))
+    assert len(common) == 12
+    assert len(centers) == 10
+    assert centers_off(np.array(list(centers.values())), poses[:, :3, 3]).max() < 0.03  # at 1 m, as above
+
+
+def test_matches_that_contradict_where_the_photos_were_do_not_count(plain, tmp_path):
+    """Features paired at random. They lie within some 90 pixels of height: by chance a fifth is near its line."""
+    shot, _, database, found = plain
+    copied = tmp_path / database.name
+    copied.write_bytes(database.read_bytes())
+    with pycolmap.Database.open(str(copied)) as opened:
+        one, other = (len(opened.read_keypoints(number)) for number in (1, 2))
+        random = np.random.default_rng(8)
+        rows = [random.permutation(count)[: min(one, other)] for count in (one, other)]
+        opened.write_matches(1, 2, np.column_stack(rows).astype(np.uint32))
+    map_from_board(copied, shot.paths[0].parent, BOARD, found, Job())
+    with pycolmap.Database.open(str(tmp_path / "board" / database.name)) as opened:
+        kept = np.array(opened.read_two_view_geometry(1, 2).inlier_matches)
+    corners = (kept >= [one, other]).all(axis=1)
+    names = sorted(found)
+    assert corners.sum() == len(np.intersect1d(found[names[0]][0], found[names[1]][0]))
+    assert min(one, other) > 100
+    assert (~corners).sum() < 0.3 * min(one, other)
+
+
+def test_features_tie_photos_without_the_board_to_the_others(shot, tmp_path):
+    """Two photos do not show the board, and one shows nothing at all."""
+    taken, poses = shot
+    paths = []
+    for k, path in enumerate(taken.paths):
+        picture = cv2.imread(str(path))
+        if k in (4, 9):
+            picture[(np.arange(360) > 190)[:, None] & (picture.std(axis=2) < 4)] = 150  # the floor is grey
+        if k == 12:
+            picture[:] = 150
+        paths.append(tmp_path / path.name)
+        cv2.imwrite(str(paths[-1]), picture, [cv2.IMWRITE_JPEG_QUALITY, 95])
+    own = PhotoSet(tuple(paths), taken.intrinsics, taken.board)
+    names = tuple(path.name for path in paths)
+    found = dict(zip(names, detect_board(own, names, Job()), strict=True))
+    for k in (4, 9):
+        found[names[k]] = (found[names[k]][0][:0], found[names[k]][1][:0])
+    detect(own, tmp_path / "x.db", SURE, FeatureConfig())
+    match(own, tmp_path / "x.db", FeatureConfig(), Job())
+    job = Job()
+    model = map_from_board(tmp_path / "x.db", tmp_path, BOARD, found, job)
+    centers = placed_centers(model, names)
+    assert sorted(centers) == sorted(set(names) - {names[12]})
+    truth = np.array([poses[names.index(name), :3, 3] for name in centers])
+    error = centers_off(np.array(list(centers.values())), truth)
+    assert error.max() < 5e-3
+    assert job.metrics["board_placed"] == 13
+    assert "features tie 2" in job.notes[-1]
+
+
+def test_too_few_photos_with_the_board_place_none(plain, tmp_path):
+    shot, _, database, found = plain
+    copied = tmp_path / database.name
+    copied.write_bytes(database.read_bytes())
+    two = {name: found[name] for name in sorted(found)[:2]}
+    job = Job()
+    assert map_from_board(copied, shot.paths[0].parent, BOARD, two, job) is None
+    assert "board.yaml" in job.notes[0]
+
+
+def test_photos_that_features_do_not_place_are_placed_by_the_board(plain, monkeypatch):
+    shot, poses, _, _ = plain
+    monkeypatch.setattr(sfm_module, "map_photos", lambda *args: None)
+    runs = []
+    for _ in range(2):
+        job = Job()
+        runs.append(estimate_cameras(shot, SfmConfig(), job))
+    cameras, cloud = runs[0]
+    assert not cameras.unregistered
+    error = centers_off(cameras.world_from_cam[:, :3, 3], poses[:, :3, 3])
+    assert error.max() < 0.02
+    assert cameras.world_from_cam.tobytes() == runs[1][0].world_from_cam.tobytes()
+    assert cloud.points.tobytes() == runs[1][1].points.tobytes()
+
+
+def test_without_a_board_or_with_another_nothing_changes(plain, monkeypatch):
+    shot = plain[0]
+    monkeypatch.setattr(sfm_module, "map_photos", lambda *args: None)
+    for board in (None, replace(BOARD, dictionary="DICT_6X6_50")):
+        with pytest.raises(ScanError, match="fewer than 3 of 10"):
+            estimate_cameras(PhotoSet(shot.paths, shot.intrinsics, board), SfmConfig(), Job())
+
+
+def test_a_board_seen_at_a_slant_is_found_where_it_is(tmp_path):
+    """From 1 m and 8 degrees above the tube's middle a square is 21 by 7 pixels: hardly a marker can be read."""
+    poses = orbit(4, elevations_deg=(8.0,))
+    far = photos(make_scene(contrast=0.0), tmp_path, poses, LENS)
+    found = detect_board(far, tuple(path.name for path in far.paths), Job())
+    for (ids, pixels), pose in zip(found, poses, strict=True):
+        assert len(ids) > 20  # of 48, some of them behind the tube; read marker by marker, none or two
+        error = np.linalg.norm(pixels - project(board_corners(BOARD)[ids], pose, LENS), axis=1)
+        assert np.median(error) < 0.3
