@@ -195,9 +195,21 @@ def test_photos_that_fail_before_their_background_are_placed_beside_it(scene, tm
 
 
 @pytest.mark.parametrize(
-    ("again", "before", "believed"),
-    [(12, None, False), (17, None, False), (18, None, True), (24, 20, True), (20, 20, False), (None, None, False)],
+    ("again", "before", "by_board", "believed"),
+    [
+        (12, None, False, False),
+        (17, None, False, False),
+        (18, None, False, True),
+        (24, 20, False, True),
+        (20, 20, False, False),
+        (None, None, False, False),
+        (12, None, True, True),
+        (12, 12, True, False),
+    ],
 )
-def test_a_second_model_is_believed_where_it_places_most_photos_and_more_than_the_first(again, before, believed):
+def test_a_second_model_is_believed_where_it_places_most_photos_and_more_than_the_first(
+    again, before, by_board, believed
+):
     again, before = (n and SimpleNamespace(num_reg_images=lambda n=n: n) for n in (again, before))
-    assert sfm._is_better(again, before, PHOTOS) is believed
+    second = sfm._Tried(again, [70] * PHOTOS, 9, by_board)
+    assert sfm._is_better(second, sfm._Tried(before, [70] * PHOTOS, 9, by_board=False)) is believed

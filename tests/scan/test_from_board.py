@@ -98,9 +98,9 @@ def test_a_photo_needs_corners_that_fix_it(ids, places):
 
 
 def test_a_photo_of_one_row_does_not_spoil_the_others():
-    found = sighted(orbit(5), LENS, range(48))
+    found = sighted(orbit(6), LENS, range(48))
     found["2"] = (found["2"][0][:8], found["2"][1][:8])
-    assert sorted(place_photos(colmap_camera(LENS), BOARD, found)) == ["0", "1", "3", "4"]
+    assert sorted(place_photos(colmap_camera(LENS), BOARD, found)) == ["0", "1", "3", "4", "5"]
 
 
 def test_another_board_places_nothing():
@@ -148,17 +148,15 @@ def test_the_board_alone_places_photos(plain):
 
 
 def test_fewer_corners_than_features_would_be_asked_for_place_photos(plain, tmp_path):
-    """The same dozen in all photos: as many features might agree by chance."""
+    """Sixteen in each photo: as many features might agree by chance."""
     shot, poses, database, found = plain
     copied = tmp_path / database.name
     copied.write_bytes(database.read_bytes())
-    common = sorted(set.intersection(*(set(ids.tolist()) for ids, _ in found.values())))[:12]
-    few = {name: (ids[np.isin(ids, common)], pixels[np.isin(ids, common)]) for name, (ids, pixels) in found.items()}
+    few = {name: (ids[:16], pixels[:16]) for name, (ids, pixels) in found.items()}
     model = map_from_board(copied, shot.paths[0].parent, BOARD, few, Job())
     centers = placed_centers(model, sorted(found))
-    assert len(common) == 12
     assert len(centers) == 10
-    assert centers_off(np.array(list(centers.values())), poses[:, :3, 3]).max() < 0.03  # at 1 m, as above
+    assert centers_off(np.array(list(centers.values())), poses[:, :3, 3]).max() < 0.05  # at 1 m, by a third of it
 
 
 def test_matches_that_contradict_where_the_photos_were_do_not_count(plain, tmp_path):

@@ -83,7 +83,7 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
         elif tried.placed < FEW * len(photos.paths) and database.stem == "sure" and not tried.by_board:
             job.note(f"only {tried.placed} of {len(photos.paths)} photos could be placed: looking for fainter features")
             again = _faint(photos, photos, Path(scratch) / "faint", config, job)
-        if again is not None and again.placed > tried.placed and (again.by_board or again.placed >= MOST * len(counts)):
+        if again is not None and _is_better(again, tried):
             tried = again
         model, counts, pairs = tried.model, tried.features, tried.pairs
     names = [path.name for path in photos.paths]
@@ -172,6 +172,12 @@ def _faint(
     counts = detect(shown, database, FAINT, config.features)
     pairs, _ = match(shown, database, config.features, Job(seed=job.seed), camera_stays=camera_stays)
     return _placed(photos, database, counts, pairs, job)
+
+
+def _is_better(again: _Tried, before: _Tried) -> bool:
+    """Return whether to believe faint features: they place more than before, and by the board or most of the photos."""
+    believed = again.by_board or again.placed >= MOST * len(again.features)
+    return believed and again.placed > before.placed
 
 
 def load_colmap(seed: int) -> None:

@@ -135,13 +135,13 @@ def _match_again(
             geometry.config = pycolmap.TwoViewGeometryConfiguration.CALIBRATED
             pixels = entered.places[one][rows[:, 0]], entered.places[other][rows[:, 1]]
             off = line_distance(cameras[one], cameras[other], placed[one], placed[other], *pixels)
-            kept = np.vstack([rows[off < AGREES_PX], entered.shared(one, other)])
+            kept, enough = np.vstack([rows[off < AGREES_PX], entered.shared(one, other)]), LEAST_CORNERS
         else:
             geometry = pycolmap.estimate_calibrated_two_view_geometry(
                 cameras[one], entered.places[one], cameras[other], entered.places[other], rows, options
             )
-            kept = np.array(geometry.inlier_matches, dtype=np.uint32).reshape(-1, 2)
-        if len(kept) >= options.min_num_inliers:
+            kept, enough = np.array(geometry.inlier_matches, dtype=np.uint32).reshape(-1, 2), options.min_num_inliers
+        if len(kept) >= enough:
             geometry.inlier_matches = kept
             opened.write_two_view_geometry(first, second, geometry)
 
@@ -163,7 +163,7 @@ def _mapped(
         image.frame.set_cam_from_world(image.camera_id, world)
         model.register_frame(image.frame_id)
     options = pycolmap.IncrementalPipelineOptions(num_threads=1, random_seed=job.seed)
-    options.triangulation.random_seed = job.seed
+    options.triangulation.random_seed, options.min_num_matches = job.seed, LEAST_CORNERS
     model = pycolmap.triangulate_points(model, database, folder, start, options=options)
     solve(model, SOFT_PX, bent=False)
     model.write(start)

@@ -137,6 +137,7 @@ def incremental(database: Path, folder: Path, seed: int, bent: bool, start: Path
     options.mapper.num_threads = 1
     options.mapper.random_seed = options.triangulation.random_seed = seed
     options.ba_refine_extra_params = bent
-    options.multiple_models = start is None
+    if start is not None:
+        options.multiple_models, options.min_num_matches = False, 1  # its pairs are known to be good
     models = pycolmap.incremental_mapping(database, folder, database.parent, options, str(start or ""))
     return [models[key] for key in sorted(models)]
