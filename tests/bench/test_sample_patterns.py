@@ -41,9 +41,10 @@ GATHERED = {"skirt": 0.06, "trousers": 0.06, "shirt": 0.2}  # shares that are ea
 def test_each_is_sewn_closed_and_starts_without_crossings(name, size):
     pattern = PATTERNS[name](BODIES[size])
     sewn = sew(pattern, SewConfig(edge_mm=30.0), Job())
-    bent = in_shape(sewn, Job())
-    start = find_collision_free_start(bent.vertices, bent.faces, bent.vertices, 3e-4, Job())
-    mesh = replace(bent, vertices=start.positions)
+    mesh = in_shape(sewn, Job())
+    if name == "shirt":  # sleeves gathered into cuffs by a fifth fold, and the drape untangles them
+        start = find_collision_free_start(mesh.vertices, mesh.faces, mesh.vertices, 3e-4, Job())
+        mesh = replace(mesh, vertices=start.positions)
     assert not ipctk.has_intersections(
         ipctk.CollisionMesh(mesh.vertices, ipctk.edges(mesh.faces), mesh.faces), np.asfortranarray(mesh.vertices)
     )

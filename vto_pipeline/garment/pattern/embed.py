@@ -4,7 +4,9 @@ Alternates between the best rigid frame of each triangle and the positions that 
 Xu, Gotsman & Gortler 2008, "A local/global approach to mesh parameterization", section 4, from the plane to space
 instead of the other way round). The frames begin as the panels are placed, so that the first solution spreads the
 closing of the seams over the panels. Each vertex is drawn to where its panel stands about the body, first strongly,
-then ever less. So the garment stays open for the body, and hardly folds into itself.
+then ever less. Each triangle's frame is drawn to those of its neighbours (Levi & Gotsman 2015, "Smooth rotation
+enhanced as-rigid-as-possible mesh animation"), or nothing would resist bending: the tip of a dart would stay pushed in.
+So the garment stays open for the body, and hardly folds into itself.
 """
 
 from __future__ import annotations
@@ -18,13 +20,14 @@ from scipy.sparse.linalg import splu
 from scipy.spatial.transform import Rotation
 
 from vto_pipeline.garment.pattern.sew import Sewn
-from vto_pipeline.geometry.topology import laid_edge_lengths
-from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.geometry.topology import laid_edge_lengths, opposite_half_edges
+from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
 _ROUNDS = 20  # at each of the holds
 _HOLDS = (0.1, 0.01, 1e-3, 1e-4, 1e-5, 1e-6)  # weights of staying in place against the frames
+_SMOOTH = 0.03  # weight of a neighbour's frame against a triangle's own sides
 _MOMENTUM = 0.9  # of the last move; plain alternation takes several times the rounds
 _BULGE = 0.1  # of its reach
 _LEAST_COT = 0.05  # weights stay positive where a corner is blunt
@@ -62,6 +65,8 @@ def embed(mesh: TriangleMesh, frames: FloatArray) -> FloatArray:
     rows, columns = start.ravel(), end.ravel()
     links = coo_array((weight.ravel(), (rows, columns)), shape=(count, count))
     links = links + links.T
+    twin, turns = _neighbours(mesh)
+    area = float(np.abs(np.linalg.det(mesh.texture[:, 1:] - mesh.texture[:, :1])).mean())
     x = place = mesh.vertices + _bulge(mesh, frames)
     for share in _HOLDS:
         hold = share * float(weight.mean())
@@ -74,7 +79,9 @@ def embed(mesh: TriangleMesh, frames: FloatArray) -> FloatArray:
                 right[:, k] -= np.bincount(rows, wanted[:, :, k].ravel(), count)
             before, x = x, np.asarray(solver.solve(right))
             ahead = (x + _MOMENTUM * (x - before))[mesh.faces]
-            frames = _frames(np.roll(ahead, -1, axis=1) - ahead, flat, weight)
+            beside = np.where(twin[:, None, None] >= 0, frames[twin // 3] @ turns, 0.0)
+            smooth = _SMOOTH * area * beside.reshape(-1, 3, 3, 2).sum(axis=1)
+            frames = _frames(np.roll(ahead, -1, axis=1) - ahead, flat, weight, smooth)
     return x
 
 
@@ -100,9 +107,25 @@ def _bulge(mesh: TriangleMesh, frames: FloatArray) -> FloatArray:
     return np.asarray(_BULGE * (away.max() - away**2 / away.max())[:, None] * out)
 
 
-def _frames(sides: FloatArray, flat: FloatArray, weight: FloatArray) -> FloatArray:
-    """Return the orthonormal frames that turn sides in the plane best into those in space, shape (F, 3, 2)."""
-    u, _, v = np.linalg.svd(np.swapaxes(weight[:, :, None] * sides, 1, 2) @ flat, full_matrices=False)
+def _neighbours(mesh: TriangleMesh) -> tuple[IntArray, FloatArray]:
+    """Return the other half of each half-edge, (3F,), -1 for none, and what turns the axes there to these."""
+    twin = opposite_half_edges(mesh)
+    assert mesh.texture is not None
+    here = (np.roll(mesh.texture, -1, axis=1) - mesh.texture).reshape(-1, 2)
+    angle = np.arctan2(*-here[twin].T[::-1]) - np.arctan2(*here.T[::-1])
+    cos, sin = np.cos(angle), np.sin(angle)
+    return twin, np.stack([np.stack([cos, -sin], axis=1), np.stack([sin, cos], axis=1)], axis=1)
+
+
+def _frames(sides: FloatArray, flat: FloatArray, weight: FloatArray, smooth: FloatArray) -> FloatArray:
+    """Return the orthonormal frames that turn sides in the plane best into those in space, shape (F, 3, 2).
+
+    Args:
+        sides, flat: In space and in the plane, shapes (F, 3, 3) and (F, 3, 2) [m].
+        weight: Of the sides, shape (F, 3).
+        smooth: Sum of the neighbours' frames with their weight, shape (F, 3, 2) [m²].
+    """
+    u, _, v = np.linalg.svd(np.swapaxes(weight[:, :, None] * sides, 1, 2) @ flat + smooth, full_matrices=False)
     return np.asarray(u @ v)
 
 
