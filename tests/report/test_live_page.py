@@ -109,9 +109,9 @@ def test_the_page_shows_what_is_sent_and_comes_back(tmp_path):
         try:
             rows = []
             for height in (0.0, 0.1, 0.1, -0.1):
-                before = int(browser.value("document.body.dataset.shown || 0"))
+                before = int(browser.value("document.body?.dataset.shown || 0"))
                 server.show(places(height))
-                until(lambda before=before: int(browser.value("document.body.dataset.shown || 0")) > before)
+                until(lambda before=before: int(browser.value("document.body?.dataset.shown || 0")) > before)
                 time.sleep(0.5)  # to be drawn
                 rows.append(middle_of_red(browser.photograph()))
             a_tenth = rows[0] - rows[1]

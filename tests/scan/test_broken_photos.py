@@ -213,7 +213,7 @@ def test_what_colmap_cannot_do_is_a_reason(good, tmp_path, monkeypatch, step):
 
 def test_a_photo_that_the_board_detector_fails_on_is_noted(shot, monkeypatch):
     class Failing:
-        def __init__(self, board):
+        def __init__(self, board, reading):
             pass
 
         def detectBoard(self, gray):  # OpenCV's name

@@ -63,10 +63,14 @@ def place_photos(camera: Any, board: CharucoBoard, found: Sightings) -> dict[str
         fixed = cv2.CALIB_FIX_PRINCIPAL_POINT | cv2.CALIB_FIX_ASPECT_RATIO | cv2.CALIB_ZERO_TANGENT_DIST
         fixed |= cv2.CALIB_USE_INTRINSIC_GUESS | cv2.CALIB_FIX_K1 | cv2.CALIB_FIX_K2 | cv2.CALIB_FIX_K3
         size, bent = (camera.width, camera.height), np.array([k1, 0.0, 0.0, 0.0, 0.0])
+        threads = cv2.getNumThreads()
+        cv2.setNumThreads(1)  # two sum in whatever order they come (OpenCV 5.0): other bits in a quarter of the runs
         try:
             _, lens, bent, turns, shifts = cv2.calibrateCamera(flat, seen, size, start, bent, flags=fixed)  # type: ignore[call-overload]
         except cv2.error:  # it may say that corners are all but on a line
             return {}
+        finally:
+            cv2.setNumThreads(threads)
         placed = {}
         for name, turn, shift in zip(names, turns, shifts, strict=True):
             ids, pixels = found[name]
