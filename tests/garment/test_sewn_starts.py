@@ -1,4 +1,4 @@
-"""Patterns by others as they start: ipctk finds no crossing in jackets and hoods, whose fronts are open."""
+"""Patterns by others as they start: ipctk finds no crossing, even in jackets and hoods, whose fronts are open."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ from vto_pipeline.garment.pattern.sew import SewConfig, sew
 from vto_pipeline.io.patterns.read import read_pattern
 from vto_pipeline.model.job import Job
 
-TOPS = sorted((FOREIGN / "basic tee").glob("*.json"))
+PATTERNS = sorted(FOREIGN.rglob("*.json"))
 
 
 @pytest.mark.real_data
-@pytest.mark.skipif(not TOPS, reason="shared data absent")
-@pytest.mark.parametrize("path", TOPS, ids=lambda path: path.stem)
-def test_tops_of_others_start_without_crossing_themselves(path):
+@pytest.mark.skipif(not PATTERNS, reason="shared data absent")
+@pytest.mark.parametrize("path", PATTERNS, ids=lambda path: path.stem)
+def test_patterns_of_others_start_without_crossing_themselves(path):
     job = Job()
     mesh = in_shape(sew(read_pattern(path), SewConfig(edge_mm=30.0), job), job)
     assert not ipctk.has_intersections(
         ipctk.CollisionMesh(mesh.vertices, ipctk.edges(mesh.faces), mesh.faces), np.asfortranarray(mesh.vertices)
     )
-    assert max(abs(job.metrics[f"stretch_p{p}_share"]) for p in ("01", "99")) < 0.04  # the drape takes it out
+    if path.parent.name == "basic tee":  # others are gathered into bands
+        assert max(abs(job.metrics[f"stretch_p{p}_share"]) for p in ("01", "99")) < 0.04  # the drape takes it out

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 _PROGRAM = "import sys; from vto_pipeline.cli.main import main; sys.exit(main())"
+_OUTCOMES = {0: "done", 1: "crashed", 2: "refused", 3: "refused", 4: "failed", 5: "refused"}
 _LOOK = 0.1
 """Time between two looks at whether it has ended [s]."""
 
@@ -30,6 +31,11 @@ class Ended(NamedTuple):
     seconds: float
     cpu_seconds: float
     peak_mb: float
+
+    @property
+    def outcome(self) -> str:
+        """What became of it, in a word."""
+        return "unfinished" if self.code is None else _OUTCOMES.get(self.code, "killed")
 
 
 def run_vto(arguments: Sequence[str], log: Path, limit: float) -> Ended:

@@ -15,14 +15,14 @@ from vto_pipeline.avatar.motion.align import Fit, carried, fit_of
 from vto_pipeline.avatar.motion.limits import limit_turns
 from vto_pipeline.avatar.motion.timing import brought_to
 from vto_pipeline.io.motion.joint_map import JointMap
-from vto_pipeline.io.motion.read import understood
+from vto_pipeline.io.motion.read import clip_of, understood
 from vto_pipeline.io.motion.tracked.parse import carried_by_feet, moving_skeleton
 from vto_pipeline.io.motion.tracked.turns import fitted_skeleton, turns_of
 from vto_pipeline.io.motion.upright import to_y
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Avatar
 from vto_pipeline.model.job import Job
-from vto_pipeline.model.motion import CONTACTS, AvatarMotion, Clip
+from vto_pipeline.model.motion import CONTACTS, AvatarMotion
 from vto_pipeline.numerics.kinematics import local_rotations, matrix_vectors, vector_matrices
 
 _MEASURED = 30
@@ -119,13 +119,13 @@ class LivePose:
         }
         arrays = _skeleton(window)
         self._offsets = arrays["offsets"]
-        self._fit = fit_of(_clip(arrays), self._joints, self._avatar, Job())
+        self._fit = fit_of(clip_of(arrays), self._joints, self._avatar, Job())
         self._first = self._posed(self._seen[0])
 
     def _posed(self, places: Places) -> tuple[FloatArray, FloatArray]:
         """Return pose and translation where the person is, in front of the camera."""
         known = {name: place[None] for name, place in places.items() if name in self._seen[0]}
-        clip = _clip(_skeleton(known, self._offsets))
+        clip = clip_of(_skeleton(known, self._offsets))
         turn, root = carried(clip, self._joints, self._avatar, self._fit)
         poses = matrix_vectors(local_rotations(self._avatar.parents.tolist(), turn))
         poses, _ = limit_turns(poses, self._avatar.joint_names)
@@ -154,15 +154,3 @@ def _skeleton(places: Places, offsets: FloatArray | None = None) -> dict[str, np
     parents, own = fitted_skeleton(places)
     offsets = own if offsets is None else offsets
     return moving_skeleton(parents, offsets, *turns_of(places, offsets), _FRAME_S)
-
-
-def _clip(arrays: Mapping[str, np.ndarray]) -> Clip:
-    return Clip(
-        tuple(map(str, arrays["joint_names"])),
-        arrays["parents"],
-        arrays["offsets"],
-        arrays["rest"],
-        arrays["rotations"],
-        arrays["translations"],
-        _FRAME_S,
-    )

@@ -29,7 +29,6 @@ _COLUMNS = (
     "within_1_mm_s",
     "stretch",
 )
-_OUTCOMES = {0: "done", 1: "crashed", 2: "refused", 3: "refused", 4: "failed", 5: "refused"}
 
 
 def main() -> None:
@@ -67,11 +66,10 @@ def drape_row(garment: Path, body: Path, folder: Path, settings: Sequence[str], 
     for one in settings:
         command += ["--set", one]
     ended = run_vto(command, folder.parent / f"{folder.name}.log", limit)
-    outcome = "unfinished" if ended.code is None else _OUTCOMES.get(ended.code, "killed")
     return {
         "garment": garment.stem,
         "body": body.stem,
-        "outcome": outcome,
+        "outcome": ended.outcome,
         "seconds": ended.seconds,
         **_figures(folder),
     }

@@ -38,7 +38,6 @@ _COLUMNS = (
     "mismatch_mm",
     "said",
 )
-_OUTCOMES = {0: "done", 1: "crashed", 2: "refused", 3: "refused", 4: "failed", 5: "refused"}
 
 
 def main() -> None:
@@ -84,11 +83,10 @@ def sewn_row(pattern: Path, body: Path, out: Path, edge_mm: float, limit: float)
         command += ["--set", f"{stage}.edge_mm={edge_mm:g}"]
     log = folder.parent / f"{folder.name}.log"
     ended = run_vto(command, log, limit)
-    outcome = "unfinished" if ended.code is None else _OUTCOMES.get(ended.code, "killed")
     said = [line for line in log.read_text(errors="replace").splitlines() if line.startswith("error: ")]
-    row: dict[str, Value] = {"pattern": pattern.stem, "body": body.stem, "outcome": outcome}
+    row: dict[str, Value] = {"pattern": pattern.stem, "body": body.stem, "outcome": ended.outcome}
     row |= {"seconds": ended.seconds, "cpu_s": ended.cpu_seconds, "said": said[-1][7:] if said else ""}
-    made = folder / "out" if outcome == "done" else folder / "out" / "partial"
+    made = folder / "out" if ended.outcome == "done" else folder / "out" / "partial"
     return row | (_figures(pattern, folder, made, body) if (made / "draped.ply").exists() else {})
 
 

@@ -32,7 +32,6 @@ _COLUMNS = (
     "stretch",
     "s_per_frame",
 )
-_OUTCOMES = {0: "done", 1: "crashed", 2: "refused", 3: "refused", 4: "failed", 5: "refused"}
 
 
 def main() -> None:
@@ -71,9 +70,8 @@ def motion_row(
     for one in settings:
         command += ["--set", one]
     ended = run_vto(command, out / f"{garment.stem}_{Path(motion).stem}.log", limit)
-    outcome = "unfinished" if ended.code is None else _OUTCOMES.get(ended.code, "killed")
-    reached = _figures(folder) if outcome in ("done", "failed") else {}  # else its files are of the run before
-    return {"garment": garment.stem, "motion": Path(motion).stem, "outcome": outcome, **reached}
+    reached = _figures(folder) if ended.outcome in ("done", "failed") else {}  # else its files are of the run before
+    return {"garment": garment.stem, "motion": Path(motion).stem, "outcome": ended.outcome, **reached}
 
 
 def _figures(folder: Path) -> dict[str, Value]:

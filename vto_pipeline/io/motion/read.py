@@ -93,6 +93,23 @@ def read_motion(
     return understood(arrays, path, unit, up, job)
 
 
+def clip_of(arrays: Arrays) -> Clip:
+    """Return what a parser gave as a clip, in the file's unit and axes.
+
+    Raises:
+        InputError: it is none.
+    """
+    return Clip(
+        tuple(map(str, arrays["joint_names"])),
+        arrays["parents"],
+        arrays["offsets"],
+        arrays["rest"],
+        arrays["rotations"],
+        arrays["translations"],
+        float(arrays["frame_time"]),
+    )
+
+
 def understood(arrays: Arrays, path: Path, unit: str | None, up: str | None, job: Job) -> MotionFile:
     """Return what a parser gave as a clip in metres, +Y up; see `read_motion`.
 
@@ -104,15 +121,7 @@ def understood(arrays: Arrays, path: Path, unit: str | None, up: str | None, job
         job: Notified of what was guessed.
     """
     try:
-        clip = Clip(
-            tuple(map(str, arrays["joint_names"])),
-            arrays["parents"],
-            arrays["offsets"],
-            arrays["rest"],
-            arrays["rotations"],
-            arrays["translations"],
-            float(arrays["frame_time"]),
-        )
+        clip = clip_of(arrays)
     except InputError as e:
         raise FormatError(e.problem, where=str(path)) from None
     joints = map_joints(clip.joint_names, clip.parents.tolist(), rest_places(clip)[1], str(path))
