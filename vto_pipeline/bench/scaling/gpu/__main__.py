@@ -6,6 +6,7 @@ Systems are those of a file by `--export`, which drapes a garment; without one, 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -16,10 +17,12 @@ from zlib import crc32
 
 import numpy as np
 
-from vto_pipeline.bench.bench import Value
+from vto_pipeline.bench.bench import Row, Value
 from vto_pipeline.bench.cloth.scenes import sphere
 from vto_pipeline.bench.cloth.solvers import run_scene
 from vto_pipeline.bench.live_rows import LiveRows
+from vto_pipeline.bench.machine import this_machine
+from vto_pipeline.bench.provenance import provenance
 from vto_pipeline.bench.scaling.direct_solvers import _own
 from vto_pipeline.bench.scaling.gpu.cusolver import cusolver_cholesky
 from vto_pipeline.bench.scaling.gpu.device import Device
@@ -31,6 +34,7 @@ from vto_pipeline.cloth.constraints.sweep import multipliers
 from vto_pipeline.cloth.dynamics.stepper import StepConfig
 from vto_pipeline.cloth.model.build import ClothModel
 from vto_pipeline.errors import VtoError
+from vto_pipeline.io.documents import write_json
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.numerics.cpu_threads import limited_threads
 from vto_pipeline.numerics.linear.block_matrix import to_scipy
@@ -42,7 +46,7 @@ _SWEEPS = 20
 _TOLERANCES = (1e-3, 1e-6, 1e-9)
 _MOST = 20_000  # iterations
 _BUDGET = 1.0  # s: what takes longer runs once
-_SECONDS, _WARM = 0.5, 0.2  # of a scene, and until the sheet lies on the ball [s]
+_SECONDS = 0.5  # of a scene
 _COLUMNS = ("part", "scene", "method", "threads", "seconds", "iterations", "residual", "error", "status")
 
 
@@ -66,10 +70,27 @@ def main() -> int:
         for part in arguments.parts or _PARTS:
             for row in _PARTS[part](arguments.systems, arguments.sides):
                 table.add({"part": part, **row})
+                write_document(arguments.out)
     except VtoError as error:
         sys.stderr.write(f"{error}\n")
         return error.exit_code
     return 0
+
+
+def write_document(folder: Path) -> None:
+    """Write gpu.json, a results file of all rows that a folder has got so far."""
+    with (folder / "rows.jsonl").open(encoding="utf-8") as lines:
+        rows = [Row(*_point(json.loads(line))).as_json() for line in lines]
+    head = {"bench": "gpu", "quick": False, **provenance("python -m vto_pipeline.bench.scaling.gpu")}
+    fronts = "run time of the same work elsewhere; residuals stand beside it"
+    write_json(folder / "gpu.json", {**head, "machine": this_machine(), "rows": rows, "fronts": fronts})
+
+
+def _point(row: dict[str, Any]) -> tuple[str, str, dict[str, Value], int, float, dict[str, Value]]:
+    """Return what `Row` takes: scene, method, settings, vertices, seconds, errors."""
+    settings: dict[str, Value] = {name: row.pop(name) for name in ("part", "threads") if name in row}
+    size, seconds = row.pop("vertices", 0), row.pop("seconds", 0.0)
+    return row.pop("scene"), row.pop("method"), settings, size, seconds, row
 
 
 def export(file: Path, garment: Path, body: Path, edge_mm: float, folder: Path) -> None:
@@ -183,7 +204,7 @@ def scenes(file: Path | None, sides: Sequence[int]) -> Rows:
     config = StepConfig.model_validate({})
     for side in sides:
         scene = replace(sphere(side), seconds=_SECONDS)
-        run_scene(replace(scene, seconds=_WARM), config)  # compiles
+        run_scene(scene, config)  # compiles
         for threads in reversed(_threads()):
             with limited_threads(threads):
                 (state, _), seconds = clocked(run_scene, scene, config)
@@ -207,9 +228,10 @@ def _threads() -> list[int]:
 
 
 def _misses(system: System, x: FloatArray) -> dict[str, Value]:
-    """Return what is left of the right side, and how far a solution is from the kept one, as shares."""
+    """Return the size of a system, what is left of its right side, and how far x is from its solution, as shares."""
     left = to_scipy(system.matrix) @ x.ravel() - system.right.ravel()
     return {
+        "vertices": len(x),
         "residual": float(np.linalg.norm(left) / np.linalg.norm(system.right)),
         "error": float(np.abs(x - system.solution).max() / np.abs(system.solution).max()),
     }
