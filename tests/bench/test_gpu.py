@@ -91,9 +91,11 @@ def test_a_file_keeps_systems(met, tmp_path):
 
 @pytest.fixture(scope="module")
 def system():
-    """A system of 81 rows, and its solution by SciPy."""
+    """A system of 81 rows, of condition a hundred, and its solution by SciPy."""
     rng = np.random.default_rng(3)
     matrix, right = sheet(9, rng, 2), rng.standard_normal((81, 3))
+    values = np.linalg.eigvalsh(to_scipy(matrix).toarray())
+    matrix.blocks[matrix.diagonal] -= (values[0] - 0.01 * (values[-1] - values[0])) * np.eye(3)
     return System("81", matrix, right, solved(to_scipy(matrix).toarray(), right))
 
 
@@ -187,7 +189,7 @@ def pointers(*arrays):
     return [ctypes.c_void_p(one.ctypes.data) for one in arrays]
 
 
-@pytest.mark.parametrize(("size", "blocks", "threads"), [(1, 5, 3), (8, 2, 24), (32, 1, 96)])
+@pytest.mark.parametrize(("size", "blocks", "threads"), [(1, 3, 24), (8, 2, 24), (32, 1, 96)])
 def test_the_kernel_solves(kernels, system, size, blocks, threads):
     layout = lay_out(system.matrix, size)
     width = layout.domains.shape[1]
@@ -208,7 +210,7 @@ def test_the_kernel_solves(kernels, system, size, blocks, threads):
         solutions.append(vectors[:rows].reshape(-1, 3)[layout.place])
     seen: list[object] = []
     cg(to_scipy(system.matrix), system.right.ravel(), rtol=1e-11, M=by_domains(layout), callback=seen.append)
-    assert abs(found[0] - len(seen)) <= 1  # sums in another order
+    assert abs(found[0] - len(seen)) <= 1 < 0.1 * len(seen)  # sums in another order
     assert found[1] <= 1e-11
     largest = np.abs(system.solution).max()
     np.testing.assert_allclose(solutions[0], system.solution, rtol=0, atol=1e-8 * largest)  # tolerance x condition
