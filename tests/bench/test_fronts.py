@@ -16,6 +16,7 @@ from vto_pipeline.bench.drape import budget
 from vto_pipeline.bench.report_card import fronts as module
 from vto_pipeline.bench.report_card.fronts import NEAR, Trade, distance, fronts
 from vto_pipeline.bench.sample_runs import SAMPLES
+from vto_pipeline.bench.scaling import gpu
 from vto_pipeline.bench.timing import Timing
 from vto_pipeline.cloth.drape_config import DrapeConfig
 
@@ -87,8 +88,8 @@ def test_every_results_file_says_where_todays_default_stands(path):
     """Against its own rows, by the benches as they are."""
     document = json.loads(path.read_text())
     name = document["bench"]
-    bench = BENCHES[name].module if name in BENCHES else sample_runs.__name__
-    assert name in (*BENCHES, *SAMPLES)
+    modules = dict.fromkeys(SAMPLES, sample_runs.__name__) | {key: one.module for key, one in BENCHES.items()}
+    bench = (modules | {"gpu": gpu.__name__})[name]
     found = fronts(bench, [Row.from_json(one) for one in document["rows"]], document["quick"])
     assert document["fronts"] == found, f"{path.name} does not say so: measure it again"
     assert found, "neither a front nor a reason"

@@ -253,7 +253,7 @@ def test_rows_become_a_results_file(tmp_path):
     document = read_json(tmp_path / "gpu.json")
     one, other = (Row.from_json(plain) for plain in document["rows"])
     assert (one.scene, one.method, one.vertices, one.seconds) == ("sheet 12", "own sweep", 144, 0.5)
-    assert one.settings == {"part": "sweeps", "threads": 2}
+    assert (one.settings, one.threads) == ({"part": "sweeps"}, 2)
     assert one.errors == {}
     assert other.errors == {"wait_us": 1.5}
     assert {"bench", "command", "commit", "date", "machine", "rows", "fronts"} <= set(document)

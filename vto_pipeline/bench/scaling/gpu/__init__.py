@@ -6,3 +6,5 @@ device, kernels.cu: conjugate gradients and sweeps of XPBD on the graphics proce
 cusolver: the sparse Cholesky factorisation of its vendor
 __main__: rows for both, and for our own code on more and more threads
 """
+
+TRADE = "run time of the same work elsewhere; residuals stand beside it"

@@ -24,6 +24,7 @@ from vto_pipeline.bench.live_rows import LiveRows
 from vto_pipeline.bench.machine import this_machine
 from vto_pipeline.bench.provenance import provenance
 from vto_pipeline.bench.scaling.direct_solvers import _own
+from vto_pipeline.bench.scaling.gpu import TRADE
 from vto_pipeline.bench.scaling.gpu.cusolver import cusolver_cholesky
 from vto_pipeline.bench.scaling.gpu.device import Device
 from vto_pipeline.bench.scaling.gpu.layout import SIZES, lay_out, one_by_one
@@ -80,17 +81,16 @@ def main() -> int:
 def write_document(folder: Path) -> None:
     """Write gpu.json, a results file of all rows that a folder has got so far."""
     with (folder / "rows.jsonl").open(encoding="utf-8") as lines:
-        rows = [Row(*_point(json.loads(line))).as_json() for line in lines]
+        rows = [_row(json.loads(line)).as_json() for line in lines]
     head = {"bench": "gpu", "quick": False, **provenance("python -m vto_pipeline.bench.scaling.gpu")}
-    fronts = "run time of the same work elsewhere; residuals stand beside it"
-    write_json(folder / "gpu.json", {**head, "machine": this_machine(), "rows": rows, "fronts": fronts})
+    write_json(folder / "gpu.json", {**head, "machine": this_machine(), "rows": rows, "fronts": TRADE})
 
 
-def _point(row: dict[str, Any]) -> tuple[str, str, dict[str, Value], int, float, dict[str, Value]]:
-    """Return what `Row` takes: scene, method, settings, vertices, seconds, errors."""
-    settings: dict[str, Value] = {name: row.pop(name) for name in ("part", "threads") if name in row}
-    size, seconds = row.pop("vertices", 0), row.pop("seconds", 0.0)
-    return row.pop("scene"), row.pop("method"), settings, size, seconds, row
+def _row(found: dict[str, Any]) -> Row:
+    """Return a line of the table as a row of a results file."""
+    settings = {"part": found.pop("part")}
+    size, seconds, threads = found.pop("vertices", 0), found.pop("seconds", 0.0), found.pop("threads", threads_now())
+    return Row(found.pop("scene"), found.pop("method"), settings, size, seconds, found, threads=threads)
 
 
 def export(file: Path, garment: Path, body: Path, edge_mm: float, folder: Path) -> None:
