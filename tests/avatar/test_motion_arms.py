@@ -73,7 +73,8 @@ def test_forearms_in_the_trunk_come_out_with_room_and_no_more(name):
         assert not meet(arm, rest)
     own = np.isin(avatar.weights.argmax(axis=1), [avatar.joint_names.index(f"left_{part}") for part in PARTS])
     own &= avatar.weights.max(axis=1) > 0.95
-    own &= np.linalg.norm(avatar.bind_vertices - avatar.joints[avatar.joint_names.index("left_shoulder")], axis=1) > 0.12
+    shoulder = avatar.joints[avatar.joint_names.index("left_shoulder")]
+    own &= np.linalg.norm(avatar.bind_vertices - shoulder, axis=1) > 0.12
     for pose in cleared:
         _, rest = parts_of(avatar, pose, PARTS)
         nearest = SurfaceDistance(rest).nearest(pose_avatar(avatar, pose, np.zeros(3)).vertices[own]).distance.min()

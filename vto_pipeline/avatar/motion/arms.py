@@ -47,7 +47,7 @@ class Arms:
         self._avatar = avatar
         names, bind = list(avatar.joint_names), avatar.bind_vertices
         self._chains = [[names.index(f"{side}_{part}") for part in _ARM] for side in _SIDES]
-        shoulders = [*sum(self._chains, []), *(names.index(f"{side}_clavicle") for side in _SIDES)]
+        shoulders = [names.index(f"{side}_{part}") for side in _SIDES for part in ("clavicle", *_ARM)]
         self._owner = avatar.weights.argmax(axis=1)
         trunk = np.isin(self._owner, [names.index(name) for name in _BODY])
         trunk &= avatar.weights[:, shoulders].sum(axis=1) < _BLENDS

@@ -137,9 +137,7 @@ class LivePose:
         pelvis = self._avatar.joints[self._avatar.joint_names.index("pelvis")]
         return poses[0], root[0] - pelvis
 
-    def _off_body(
-        self, poses: FloatArray, translation: FloatArray, seconds: float
-    ) -> tuple[FloatArray, FloatArray]:
+    def _off_body(self, poses: FloatArray, translation: FloatArray, seconds: float) -> tuple[FloatArray, FloatArray]:
         """Return a pose whose arms are kept off the body; they go out of the way fast, and come back slowly."""
         pelvis = self._avatar.joints[self._avatar.joint_names.index("pelvis")]
         turn, place = posed_joints(self._avatar, poses[None], (translation + pelvis)[None])
