@@ -23,7 +23,7 @@ from vto_pipeline.numerics.kinematics import local_rotations, matrix_vectors
 
 SIDES = ("left", "right")
 PARTS = ("shoulder", "elbow", "wrist")
-ROOM = 0.01  # m
+ROOM = 0.015  # m
 PLANES = 0.006  # m: what planes of places 50 mm apart may be off a rounded skin
 
 
@@ -63,7 +63,7 @@ def off_body(avatar: Avatar, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 @pytest.mark.parametrize("name", ["female", "male", "wide"])
 def test_forearms_in_the_trunk_come_out_with_room_and_no_more(name):
     avatar = body(name)
-    poses = arms_hang(avatar, np.array([1.2, 1.3]))
+    poses = arms_hang(avatar, np.array([1.2, 1.15]))
     for pose in poses:
         assert meet(*parts_of(avatar, pose, PARTS[1:]))
     cleared, swings = off_body(avatar, poses)
@@ -74,11 +74,12 @@ def test_forearms_in_the_trunk_come_out_with_room_and_no_more(name):
     own = np.isin(avatar.weights.argmax(axis=1), [avatar.joint_names.index(f"left_{part}") for part in PARTS])
     own &= avatar.weights.max(axis=1) > 0.95
     shoulder = avatar.joints[avatar.joint_names.index("left_shoulder")]
-    own &= np.linalg.norm(avatar.bind_vertices - shoulder, axis=1) > 0.12
+    far = np.linalg.norm(avatar.bind_vertices - shoulder, axis=1)
     for pose in cleared:
         _, rest = parts_of(avatar, pose, PARTS)
-        nearest = SurfaceDistance(rest).nearest(pose_avatar(avatar, pose, np.zeros(3)).vertices[own]).distance.min()
-        assert ROOM - PLANES < nearest < ROOM + 2 * PLANES
+        places = SurfaceDistance(rest).nearest(pose_avatar(avatar, pose, np.zeros(3)).vertices).distance
+        assert places[own & (far > 0.12)].min() > ROOM - PLANES
+        assert places[own & (far > 0.07)].min() < ROOM + 4 * PLANES  # planes rise towards the armpit
 
 
 def test_only_the_shoulders_turn_and_arms_with_room_stay_as_they_are():

@@ -20,13 +20,13 @@ from vto_pipeline.numerics.kinematics import matrix_vectors, vector_matrices
 _SIDES = ("left", "right")
 _ARM = ("shoulder", "elbow", "wrist")
 _BODY = ("pelvis", "spine", "chest", "left_hip", "right_hip")
-_ROOM_M = 0.01
+_ROOM_M = 0.015
 _MORE_M = 2e-3
 """What is aimed at beyond the room, so that few rounds do."""
 _SPACING_M = 0.05
 """Of the places that are looked at, and the reach of each as a part of the surface."""
 _REACH_M = 0.09  # a place that is farther from all of them is beside the body: their planes say nothing there
-_ARMPIT_M = 0.12  # from the shoulder: so far, skin and cloth are pressed between arm and trunk in everyone
+_ARMPIT_M = 0.07  # from the shoulder: so far, skin and cloth are pressed between arm and trunk in everyone
 _RIGID = 0.95  # share of the weights of one bone from which on a place of the arm goes with that bone
 _BLENDS = 0.2  # share of an arm's weights from which on a place of the trunk is armpit or shoulder
 _ROUNDS = 12
