@@ -42,9 +42,14 @@ def test_each_is_sewn_closed_and_starts_without_crossings(name, size):
     pattern = PATTERNS[name](BODIES[size])
     sewn = sew(pattern, SewConfig(edge_mm=30.0), Job())
     mesh = in_shape(sewn, Job())
-    if name == "shirt":  # sleeves gathered into cuffs by a fifth fold, and the drape untangles them
+    if name == "shirt":  # its collar lies on its back and its stand, and the drape untangles them
         start = find_collision_free_start(mesh.vertices, mesh.faces, mesh.vertices, 3e-4, Job())
         mesh = replace(mesh, vertices=start.positions)
+        parts = [np.unique(mesh.faces[sewn.panel == sewn.panels.index(one)]) for one in ("back_fall", "back_collar")]
+        fall, stand = (mesh.vertices[part] for part in parts)
+        assert fall[:, 1].min() < stand[:, 1].mean()  # the collar is folded over its stand,
+        assert fall[:, 1].max() == pytest.approx(stand[:, 1].max(), abs=5e-3)  # does not stand up,
+        assert fall[:, 2].mean() < stand[:, 2].mean()  # and lies outside of it
     assert not ipctk.has_intersections(
         ipctk.CollisionMesh(mesh.vertices, ipctk.edges(mesh.faces), mesh.faces), np.asfortranarray(mesh.vertices)
     )

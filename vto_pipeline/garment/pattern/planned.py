@@ -23,7 +23,7 @@ SIDES = {
 }
 """Which side of the body a panel stands on -> where its x, y and right side point to."""
 
-_UPRIGHT = np.array([[0.0, 0.0], [0.0, 1.0]])  # a line: panels are turned over about it
+_UPRIGHT = np.array([[0.0, 0.0], [0.0, 1.0]])  # a line: panels are flipped about it
 _EDGE = re.compile(r"(.+) (\d+)( mirrored)?")
 _TOLERANCE_M = 1e-3  # of outlines, for where their middle is
 

@@ -1,4 +1,4 @@
-"""A panel turned over, and one that is drawn as a half, with the line along which the cloth is folded: opened."""
+"""A panel flipped, and one that is drawn as a half, with the line along which the cloth is folded: opened."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ class PlannedPanel(Config):
     )
     away_m: float = Field(0.15, gt=0.0, le=1.0, description="From the body's middle [m]")
     turned_deg: float = Field(0.0, ge=-360.0, le=360.0, description="Anticlockwise, as it is seen from that side")
-    mirrored: bool = Field(False, description="Whether the panel is turned over before it is cut: the other of a pair")
+    mirrored: bool = Field(False, description="Whether the panel is flipped before it is cut: the other of a pair")
     fold: int | None = Field(None, ge=0, description="Edge at which the cloth is folded; the panel is the half drawn")
 
 
