@@ -22,7 +22,7 @@ from vto_pipeline.model.pattern import Edge, InnerLine, Notch, Pattern
 
 # mm, y down as in SVG: a leg's hem, inseam, crotch, waist and outseam; and half a skirt, its fold on the left
 LEG = [(0, 1000), (220, 1000), (240, 950), (240, 250), (180, 220), (180, 0), (-20, 0), (-20, 250)]
-HALF = [(0, 600), (350, 600), (200, 0), (0, 0)]
+HALF = [(0, 600), (350, 600), (312.5, 450), (200, 0), (0, 0)]
 LEG_M2 = 5e-7 * sum(a * d - b * c for (a, b), (c, d) in zip(LEG[1:] + LEG[:1], LEG, strict=True))
 
 
@@ -62,11 +62,12 @@ def openings(pattern):
 
 def test_a_half_cut_on_the_fold_makes_a_skirt(tmp_path):
     pattern = drawn(tmp_path)
-    fold, side = (numbered(pattern, "half", HALF, *ends) for ends in ((0, 3), (1, 2)))
+    fold, low, high = (numbered(pattern, "half", HALF, *ends) for ends in ((4, 0), (1, 2), (2, 3)))
     place = {"of": "half", "fold": fold, "at_m": [0.0, 0.7]}
+    up, down = [f" {low}", f" {high}"], [f" {high} mirrored", f" {low} mirrored"]
     seams = [
-        {"first": [f"front {side}"], "second": [f"back {side} mirrored"]},
-        {"first": [f"front {side} mirrored"], "second": [f"back {side}"]},
+        {"first": ["front" + one for one in up], "second": ["back" + one for one in reversed(down)]},
+        {"first": ["front" + one for one in down], "second": ["back" + one for one in reversed(up)]},
     ]
     made = planned(pattern, plan(tmp_path, {"front": place, "back": place}, seams), Job())
     assert [edges_area(one.edges) for one in made.panels] == pytest.approx([2 * 0.6 * 0.275] * 2)
@@ -130,7 +131,7 @@ def test_a_piece_is_turned_as_it_is_seen(tmp_path):
         seen.append(points * [-1.0, 1.0, -1.0])  # from behind
     (x, y), (u, v) = ((points - [0.2, 1.0, 0.0])[:, :2].T for points in seen)
     assert np.stack([u, v]) == pytest.approx(np.stack([-y, x]))  # a quarter turn anticlockwise about its middle
-    assert [points[:, 2] for points in seen] == [pytest.approx([0.15] * 4), pytest.approx([0.3] * 4)]
+    assert [points[:, 2] for points in seen] == [pytest.approx([0.15] * 5), pytest.approx([0.3] * 5)]
 
 
 @pytest.mark.parametrize(

@@ -82,8 +82,9 @@ def _cut(panel: Panel, wanted: PlannedPanel, name: str) -> tuple[Panel, Numbers]
 
 
 def _placed(panel: Panel, wanted: PlannedPanel, name: str) -> Placement:
-    side = wanted.stands or next((word for word in re.split(r"[^a-z]+", name.lower()) if word in SIDES), None)
-    if side is None:
+    named = [word for word in re.split(r"[^a-z]+", name.lower()) if word in SIDES]
+    side = wanted.stands or (named[0] if named else "")
+    if not side:
         raise InputError(f"panels.{name}: its name has none of {', '.join(SIDES)}; say where it stands")
     points = edges_points(panel.edges, _TOLERANCE_M)
     angle = np.deg2rad(wanted.turned_deg)
