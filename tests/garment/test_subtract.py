@@ -74,7 +74,8 @@ def beside(scene, turned):
     points = np.stack([x, z, rough] if turned else [x, rough, z], axis=-1).reshape(-1, 3)
     faces = np.vstack([np.column_stack([a, c, b]), np.column_stack([a, d, c])])
     top = scene.form.vertices.max(axis=0)
-    return TriangleMesh(points + [top[0] + 0.3, 0.7 * top[1], 0.0], faces, np.full((len(points), 3), 40, np.uint8))
+    place = np.array([top[0] + 0.3, 0.7 * top[1], 0.0])
+    return TriangleMesh(points + place, faces, np.full((len(points), 3), 40, np.uint8))
 
 
 @pytest.mark.parametrize("turned", [False, True])

@@ -191,7 +191,9 @@ def test_looks_go_on_until_one_adds_little(torn, grays):
     most = RematchConfig().rounds
     found = rematch(grays, torn, RematchConfig(), Listening())
     assert 1 < Listening.looks <= most
-    known += [(rematch(grays, torn, RematchConfig(rounds=n + 1), Job()).depth > 0).sum() for n in range(Listening.looks)]
+    known += [
+        (rematch(grays, torn, RematchConfig(rounds=n + 1), Job()).depth > 0).sum() for n in range(Listening.looks)
+    ]
     assert known[-1] == (found.depth > 0).sum()
     added = np.diff(known) / known[:-1]
     assert (added[:-1] >= LITTLE).all()

@@ -49,7 +49,7 @@ def close_notches(
     """Return the mesh with the notches of its rims filled, and how many there were.
 
     The line across a notch runs outside the mannequin or grazes it, and the rim that is left goes round the mannequin.
-    What closes it runs on as the cloth beside it: what would close a part of the opening itself stands across the cloth.
+    What closes it runs on as the cloth beside it: what would close a part of the opening stands across the cloth.
     What would cover mannequin that was seen bare is no notch but the shape of the rim, as the V of an open collar.
     Where the mannequin passes through what the line cuts off, that is the opening, and the hole is on its other side.
     A line along cloth is not across a notch: it would cut a part of the true rim off, with a second layer below it.
