@@ -149,7 +149,8 @@ def _lying(surface: TriangleMesh, job: Job) -> NDArray[np.bool_]:
         rough = np.sqrt(np.average(np.square(height - middle), weights=size))
         if rough < ROUGH * np.sqrt(area[k]) and abs(upward[:, 1].sum()) > LEVEL * size.sum():
             lying[source] = True
-            job.note(f"a level piece of {1e4 * area[k]:.0f} cm² at a height of {1e3 * middle:.0f} mm is no garment")
+            what = f"a level piece of {1e4 * area[k]:.0f} cm² at a height of {1e3 * middle:.0f} mm"
+            job.note(f"left out {what}: cloth that is worn hangs")
     return lying
 
 
