@@ -1,4 +1,4 @@
-"""Torn rims: what is a notch, and what a flap. Tubes and sheets whose areas and angles have formulas."""
+"""Torn rims: what is a notch, and what a part of the opening. Tubes whose angles have formulas."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from vto_pipeline.garment.notches import close_notches, in_sheet
-from vto_pipeline.garment.rims import drop_flaps
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import face_area_vectors, submesh
+from vto_pipeline.geometry.topology import submesh
 from vto_pipeline.model.mesh import TriangleMesh
 
 
@@ -30,10 +29,6 @@ def post(radius: float, behind: float) -> SurfaceDistance:
 
     made = trimesh.creation.cylinder(radius=radius, height=1.6, sections=96)
     return SurfaceDistance(TriangleMesh(made.vertices[:, [1, 2, 0]] - [0, 0, behind], made.faces))
-
-
-def area(mesh: TriangleMesh) -> float:
-    return float(np.linalg.norm(face_area_vectors(mesh), axis=1).sum())
 
 
 def test_a_line_across_the_mouth_of_a_hem_that_stands_off_closes_no_notch() -> None:
@@ -77,40 +72,3 @@ def test_how_far_a_strip_runs_on_as_the_cloth_beside_it_has_a_formula(half_angle
     expected = 2.0 * (radius * np.sin(half_angle) + length * np.cos(half_angle)) * lean
     assert_allclose(in_sheet(area, beside, first, last), expected, rtol=0.002)  # 400 steps a side
     assert_allclose(in_sheet(-area, beside, first, last), -expected, rtol=0.002)
-
-
-def sheet(spans: list[tuple[float, float, float, float]]) -> TriangleMesh:
-    """Of a flat sheet in squares of 2 mm, the parts between x and x, y and y [m]."""
-    x, y = np.meshgrid(np.arange(151) * 0.002, np.arange(51) * 0.002, indexing="ij")
-    at = np.arange(x.size).reshape(x.shape)
-    a, b, c, d = at[:-1, :-1].ravel(), at[1:, :-1].ravel(), at[1:, 1:].ravel(), at[:-1, 1:].ravel()
-    whole = TriangleMesh(
-        np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3),
-        np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])]),
-    )
-    u, v, _ = whole.vertices[whole.faces].mean(axis=1).T
-    kept = np.any([(u > s[0]) & (u < s[1]) & (v > s[2]) & (v < s[3]) for s in spans], axis=0)
-    return submesh(whole, kept)[0]
-
-
-def test_two_large_parts_on_one_strip_both_stay_and_so_does_the_strip() -> None:
-    """100 by 100 and 80 by 100 mm of cloth, joined by a strip 8 mm wide and 60 long; flaps hang by less than 16."""
-    strip = 0.06 * 0.008
-    whole = sheet([(0, 0.1, 0, 0.1), (0.1, 0.16, 0.046, 0.054), (0.16, 0.24, 0, 0.1)])
-    assert_allclose(area(whole), 0.1 * 0.1 + strip + 0.08 * 0.1, rtol=1e-9)
-    kept = drop_flaps(whole, 0.016, 0.12)
-    assert_allclose(area(kept), area(whole), atol=0.5 * 8 * 0.008**2)  # eight corners
-    assert area(kept) > 0.1 * 0.1 + 0.9 * strip + 0.07 * 0.1
-
-
-def test_a_small_part_on_a_strip_goes_with_its_strip() -> None:
-    """30 by 30 mm: less than ten squares of 16 mm."""
-    whole = sheet([(0, 0.1, 0, 0.1), (0.1, 0.16, 0.046, 0.054), (0.16, 0.19, 0.036, 0.066)])
-    kept = drop_flaps(whole, 0.016, 0.12)
-    assert_allclose(area(kept), 0.1 * 0.1, atol=0.5 * 4 * 0.008**2 + 0.008 * 0.012)  # corners; the begin of the strip
-
-
-def test_a_strip_that_leads_nowhere_goes() -> None:
-    whole = sheet([(0, 0.1, 0, 0.1), (0.1, 0.2, 0.046, 0.054)])
-    kept = drop_flaps(whole, 0.016, 0.12)
-    assert kept.vertices[:, 0].max() < 0.1 + 0.012
