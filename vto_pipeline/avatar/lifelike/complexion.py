@@ -1,0 +1,72 @@
+"""Colours of skin, hair and eyes, vertex by vertex."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vto_pipeline.model.arrays import ByteArray, FloatArray, IntArray
+from vto_pipeline.model.body import MorphableBody
+
+_HAIRLINE = np.array([(0.0, -0.22), (0.25, -0.20), (0.42, -0.10), (0.50, 0.10), (0.62, 0.08), (0.70, 0.17), (0.85, 0.28)])
+"""Height of the hairline above the eyes, from the back of the head to its front, both in heights of the head."""
+_SOFT = 0.03
+"""Over which hair thins out, in heights of the head."""
+_IRIS, _PUPIL = 0.62, 0.28
+"""Radii on an eye, in its own radius."""
+_WHITE, _IRIS_COLOR, _BLACK = (236, 232, 226), (92, 74, 58), (18, 16, 16)
+"""Colours of an eye, sRGB."""
+_LIPS, _LIP_TINT = 0.45, (0.93, 0.78, 0.76)
+
+
+def colors_of(
+    body: MorphableBody, vertices: FloatArray, skin: tuple[int, int, int], hair: tuple[int, int, int] | None
+) -> ByteArray:
+    """Return the colour of each vertex, sRGB, shape (V, 3).
+
+    Args:
+        body: Whose groups and named points these are.
+        vertices: Blended, at rest [m], shape (V, 3).
+        skin: sRGB.
+        hair: sRGB of short hair; None: the head is shaved.
+    """
+    colors = np.tile(np.array(skin, dtype=float), (len(vertices), 1))
+    if hair is not None:
+        share = _hair_share(body, vertices)[:, None]
+        colors += share * (np.array(hair) - colors)
+    for side in ("left", "right"):
+        own = np.unique(body.surfaces[f"{side} eye"])
+        colors[own] = _eye(vertices[own])
+    return np.rint(colors).astype(np.uint8)
+
+
+def _hair_share(body: MorphableBody, vertices: FloatArray) -> FloatArray:
+    """Return how much of each vertex hair covers, 0 to 1."""
+    eyes = (_place(body, vertices, "l-eye") + _place(body, vertices, "r-eye")) / 2
+    used = np.unique(body.surfaces["body"])
+    top = vertices[used, 1].max()
+    tall = 2 * (top - eyes[1])  # eyes are half way up a head
+    height = (vertices[:, 1] - eyes[1]) / tall
+    skull = used[height[used] > 0.15]
+    back, front = vertices[skull, 2].min(), vertices[skull, 2].max()
+    half_width = np.abs(vertices[skull, 0]).max()
+    ahead = (vertices[:, 2] - back) / (front - back)
+    share = np.clip((height - np.interp(ahead, *_HAIRLINE.T)) / _SOFT, 0.0, 1.0)
+    ear = (np.abs(vertices[:, 0]) > 0.93 * half_width) & (height < 0.16) & (ahead > 0.2)
+    return np.where(ear, 0.0, share)
+
+
+def _eye(points: FloatArray) -> FloatArray:
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    radius = np.ptp(points, axis=0).max() / 2
+    off = np.linalg.norm((points - middle)[:, :2], axis=1) / radius
+    front = points[:, 2] > middle[2]
+    colors = np.tile(np.array(_WHITE, dtype=float), (len(points), 1))
+    colors[front & (off < _IRIS)] = _IRIS_COLOR
+    colors[front & (off < _PUPIL)] = _BLACK
+    return colors
+
+
+def _place(body: MorphableBody, vertices: FloatArray, name: str) -> FloatArray:
+    place: IntArray = body.places[name]
+    middle: FloatArray = vertices[place].mean(axis=0)
+    return middle
