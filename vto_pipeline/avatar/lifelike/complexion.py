@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
+from vto_pipeline.geometry.smooth import smooth_values
 from vto_pipeline.model.arrays import ByteArray, FloatArray, IntArray
 from vto_pipeline.model.body import MorphableBody
+from vto_pipeline.model.mesh import TriangleMesh
 
-_HAIRLINE = np.array([(0.0, -0.22), (0.25, -0.20), (0.42, -0.10), (0.50, 0.10), (0.62, 0.08), (0.70, 0.17), (0.85, 0.28)])
+_HAIRLINE = np.array([(0.0, -0.22), (0.28, -0.20), (0.40, 0.02), (0.46, 0.11), (0.62, 0.11), (0.72, 0.17), (0.90, 0.28)])
 """Height of the hairline above the eyes, from the back of the head to its front, both in heights of the head."""
-_SOFT = 0.03
-"""Over which hair thins out, in heights of the head."""
+_SOFT, _ROUNDS = 0.06, 2
+"""Over which hair thins out, in heights of the head; rounds of smoothing its edge."""
 _IRIS, _PUPIL = 0.62, 0.28
 """Radii on an eye, in its own radius."""
 _WHITE, _IRIS_COLOR, _BLACK = (236, 232, 226), (92, 74, 58), (18, 16, 16)
 """Colours of an eye, sRGB."""
-_LIPS, _LIP_TINT = 0.45, (0.93, 0.78, 0.76)
 
 
 def colors_of(
@@ -48,11 +49,9 @@ def _hair_share(body: MorphableBody, vertices: FloatArray) -> FloatArray:
     height = (vertices[:, 1] - eyes[1]) / tall
     skull = used[height[used] > 0.15]
     back, front = vertices[skull, 2].min(), vertices[skull, 2].max()
-    half_width = np.abs(vertices[skull, 0]).max()
     ahead = (vertices[:, 2] - back) / (front - back)
     share = np.clip((height - np.interp(ahead, *_HAIRLINE.T)) / _SOFT, 0.0, 1.0)
-    ear = (np.abs(vertices[:, 0]) > 0.93 * half_width) & (height < 0.16) & (ahead > 0.2)
-    return np.where(ear, 0.0, share)
+    return smooth_values(TriangleMesh(vertices, body.surfaces["body"]), share, _ROUNDS)
 
 
 def _eye(points: FloatArray) -> FloatArray:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from vto_pipeline.avatar.lifelike.complexion import colors_of
@@ -19,8 +20,10 @@ from vto_pipeline.avatar.measuring.tape import mass_reading
 from vto_pipeline.avatar.model.pose import posed_vertices
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.closest import barycentric, closest_points
+from vto_pipeline.geometry.intersections import meeting_vertices, self_intersections
+from vto_pipeline.geometry.smooth import neighbour_mean
 from vto_pipeline.geometry.topology import boundary_loops, submesh
-from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Avatar, LifelikeBody, MorphableBody
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -29,6 +32,10 @@ from vto_pipeline.model.settings import Config
 _GROWTH = np.array([(0.75, 1.0), (1.10, 5.0), (1.38, 10.0), (1.50, 12.0), (1.60, 14.0)])
 """Stature [m] and age [years] in the middle of both sexes' growth (WHO 2006 and 2007), rounded."""
 _GROWN_YEARS = 30.0
+_ROUNDS = 30
+"""Of smoothing what crosses itself, at most."""
+_LID, _CLEAR = (0.9, 1.25), 1.03
+"""In an eye's radii: between which lids and sockets lie, and where they begin when the eye does not cross them."""
 
 
 class LifelikeConfig(Config):
@@ -59,14 +66,34 @@ def lifelike_body(avatar: Avatar, library: MorphableBody, config: LifelikeConfig
     age = config.age_years or _age_of(stature)
     job.measure(age_years=age, body_mass_index=build)
     try:
-        vertices = library.blended(shares(avatar.sex, age, build))
+        vertices = _round_eyes(library, library.blended(shares(avatar.sex, age, build)))
         places = {name: vertices[place].mean(axis=0) for name, place in library.places.items()}
         colors = colors_of(library, vertices, config.skin, config.hair)
         surface = np.concatenate(list(library.surfaces.values()))
-        parts = place_parts(avatar, Donor(TriangleMesh(vertices, surface, colors), places))
+        whole = TriangleMesh(vertices, surface, colors)
+        donor = submesh(whole, np.ones(len(surface), dtype=bool))[0]  # without helpers
+        parts = place_parts(avatar, Donor(donor, places))
     except KeyError as missing:
         raise InputError(f"the data for lifelike bodies have no {missing}") from None
-    return _assembled(avatar, rest, surface, colors, parts, config)
+    return _assembled(avatar, rest, donor, parts, config)
+
+
+def _round_eyes(library: MorphableBody, vertices: FloatArray) -> FloatArray:
+    """Return the vertices with lids and sockets outside the eyes that they hold [m], shape (V, 3)."""
+    skin = np.unique(library.surfaces["body"])
+    cleared = np.array(vertices)
+    for name, surface in library.surfaces.items():
+        if name == "body":
+            continue
+        eye = vertices[np.unique(surface)]
+        middle = (eye.min(axis=0) + eye.max(axis=0)) / 2
+        radius = np.linalg.norm(eye - middle, axis=1).max()
+        off = vertices[skin] - middle
+        away = np.linalg.norm(off, axis=1)
+        inside = away < _LID[1] * radius
+        apart = np.interp(away[inside], np.multiply(_LID, radius), (_CLEAR * radius, _LID[1] * radius))
+        cleared[skin[inside]] = middle + off[inside] * (apart / away[inside])[:, None]
+    return cleared
 
 
 def _age_of(stature: float) -> float:
@@ -78,8 +105,7 @@ def _age_of(stature: float) -> float:
 def _assembled(
     avatar: Avatar,
     rest: TriangleMesh,
-    surface: IntArray,
-    colors: np.ndarray,
+    donor: TriangleMesh,
     parts: list[Part],
     config: LifelikeConfig,
 ) -> LifelikeBody:
@@ -92,7 +118,7 @@ def _assembled(
     rims = boundary_loops(trunk)
     first = len(source)
     for part in parts:
-        grafted = fit_part(rest, part.seat, TriangleMesh(part.placed, surface, colors), part.tip)
+        grafted = fit_part(rest, part.seat, replace(donor, vertices=part.placed), part.tip)
         mesh = grafted.mesh
         assert mesh.colors is not None
         rim = next(rim for rim in rims if source[rim[0]] in part.seat.row)
@@ -105,18 +131,35 @@ def _assembled(
         weights.append(_weights(avatar, rest, grafted, part))
         painted.append(mesh.colors)
         first += len(mesh.vertices)
+    grown = TriangleMesh(np.concatenate(vertices), np.concatenate([*faces, *ends]).astype(np.int32))
+    body = _untangled(grown, np.arange(first) >= len(source))
     whole = replace(
         avatar,
-        bind_vertices=np.concatenate(vertices),
-        faces=np.concatenate([*faces, *ends]).astype(np.int32),
+        bind_vertices=body,
+        faces=grown.faces,
         weights=np.concatenate(weights),
-        vertices=np.concatenate(vertices),
+        vertices=body,
         landmarks={},
         loops={},
     )
     posed = posed_vertices(whole, avatar.pose, avatar.translation)
     posed[: len(source)] = avatar.vertices[source]
     return LifelikeBody(replace(whole, vertices=posed), np.concatenate(painted))
+
+
+def _untangled(mesh: TriangleMesh, movable: NDArray[np.bool_]) -> FloatArray:
+    """Return the vertices with those of faces that cross each other smoothed until none do, or rounds are spent.
+
+    Some shapes of the data have toes that touch, and a wing of the nose in its septum.
+    """
+    mean, vertices = neighbour_mean(mesh), np.array(mesh.vertices)
+    for _ in range(_ROUNDS):
+        pairs = self_intersections(TriangleMesh(vertices, mesh.faces))
+        near = meeting_vertices(pairs, mesh.faces, len(vertices)) & movable
+        if not near.any():
+            break
+        vertices[near] += 0.5 * (mean @ vertices - vertices)[near]
+    return vertices
 
 
 def _weights(avatar: Avatar, rest: TriangleMesh, grafted: Grafted, part: Part) -> FloatArray:

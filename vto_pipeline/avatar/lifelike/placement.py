@@ -12,20 +12,20 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from vto_pipeline.avatar.lifelike.graft import Seat
+from vto_pipeline.avatar.lifelike.graft import Seat, beyond
 from vto_pipeline.geometry.section import plane_section
-from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Avatar
 from vto_pipeline.model.mesh import TriangleMesh
 
 _SIDES = {"left": "l", "right": "r"}
-_REACH = {"head": 0.05, "hand": 0.045, "foot": 0.05}
+_REACH = {"head": 0.05, "hand": 0.045, "foot": 0.07}
 """Over which a part takes on the avatar's shape, for a grown body [m]."""
 _GROWN_M = 1.7
 _CHIN_M = 0.012
 """Of a grown body's chin above the row of the neck."""
-_LEAST_TALL = 0.8
-"""Of a head's height, against its girth."""
+_LEAST_TALL = 0.86
+"""Of a head's height, against its girth; a neck that leaves less room gets a smaller head."""
 _EAR_FREE = 0.14
 """How far from its middle a head's girth is taken, in its heights: ears are no part of it."""
 
@@ -84,7 +84,8 @@ def _head(avatar: Avatar, donor: Donor) -> Part:
         donor_low, donor_high, donor_girth = _girth(donor.mesh, level, 0.5 * tall)
         scale = girth / donor_girth
     room = top - body[avatar.loops["neck"], 1].mean() - _CHIN_M * top / _GROWN_M
-    upright = scale * np.clip(room / (scale * tall), _LEAST_TALL, 1.0)
+    scale = min(scale, room / (_LEAST_TALL * tall))
+    upright = min(scale, room / tall)
     middle, donor_middle = (low + high) / 2, (donor_low + donor_high) / 2
     size = np.array([scale, upright, scale])
     placed = (points - [donor_middle[0], points[donor_top, 1], donor_middle[2]]) * size + [middle[0], top, middle[2]]
@@ -133,31 +134,23 @@ def _hand(avatar: Avatar, donor: Donor, side: str) -> Part:
 
 def _foot(avatar: Avatar, donor: Donor, side: str) -> Part:
     body, points, short = avatar.bind_vertices, donor.mesh.vertices, _SIDES[side]
-    row = avatar.loops[f"{side}_ankle"]
-    heel, toe = (avatar.landmarks[f"{side}_{name}"] for name in ("heel", "toe"))
+    heel, toe = (body[avatar.landmarks[f"{side}_{name}"]] for name in ("heel", "toe"))
     up = np.array([0.0, 1.0, 0.0])
-    ankle, donor_toe = donor.places[f"{short}-ankle"], _nearest(points, donor.places[f"{short}-toe-2-4"])
-    own = (np.linalg.norm(points - ankle, axis=1) < 2 * np.linalg.norm(points[donor_toe] - ankle)) & (
-        points[:, 1] < ankle[1]
+    seat = Seat(
+        avatar.loops[f"{side}_ankle"], avatar.landmarks[f"{side}_toe"], -up, _reach(avatar, "foot")
     )
-    forward = (points[donor_toe] - ankle) * (1, 0, 1)
-    donor_frame = _frame(forward, np.cross(up, forward))
-    along = points @ donor_frame[0]
-    back, front = along[own].min(), along[own].max()
-    line = (body[toe] - body[heel]) * (1, 0, 1)
-    frame = _frame(line, np.cross(up, line))
-    scale = float(np.linalg.norm(line) / (front - back))
-    start = ankle + (back - ankle @ donor_frame[0]) * donor_frame[0]
-    start = np.array([start[0], points[own, 1].min(), start[2]])
-    sole = body[beyond_ankle(avatar, row), 1].min()
-    placed = (points - start) @ donor_frame.T @ frame * scale + [body[heel, 0], sole, body[heel, 2]]
-    return Part(f"{side}_ankle", Seat(row, toe, -up, _reach(avatar, "foot")), placed, donor_toe)
-
-
-def beyond_ankle(avatar: Avatar, row: IntArray) -> FloatArray:
-    """Return which vertices are lower than an ankle's row and near it, shape (V,)."""
-    body, middle = avatar.bind_vertices, avatar.bind_vertices[row].mean(axis=0)
-    return (body[:, 1] < middle[1]) & (np.sign(body[:, 0]) == np.sign(middle[0]))
+    ankle, tip = donor.places[f"{short}-ankle"], _nearest(points, donor.places[f"{short}-toe-2-4"])
+    forward = points[tip] - ankle
+    own = (np.linalg.norm(points - ankle, axis=1) < 2 * np.linalg.norm(forward)) & (points[:, 1] < ankle[1])
+    donor_frame, frame = (_frame(along * (1, 0, 1), np.cross(up, along)) for along in (forward, toe - heel))
+    along = (points - ankle) @ donor_frame[0]
+    scale = float(np.linalg.norm((toe - heel) * (1, 0, 1)) / np.ptp(along[own]))
+    placed = (points - ankle) @ donor_frame.T @ frame * scale
+    # the shank stands on the foot as it does on the avatar's, heel at heel and sole on sole
+    middle, sole = body[seat.row].mean(axis=0), body[beyond(TriangleMesh(body, avatar.faces), seat), 1].min()
+    ahead = (heel - middle) @ frame[0] - scale * along[own].min()
+    placed += (middle + ahead * frame[0]) * (1, 0, 1) + [0.0, sole - placed[own, 1].min(), 0.0]
+    return Part(f"{side}_ankle", seat, placed, tip)
 
 
 def _nearest(points: FloatArray, place: FloatArray) -> int:
