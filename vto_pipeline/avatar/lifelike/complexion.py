@@ -13,7 +13,9 @@ _HAIRLINE = np.array([(0.0, -0.22), (0.28, -0.20), (0.40, 0.02), (0.46, 0.11), (
 """Height of the hairline above the eyes, from the back of the head to its front, both in heights of the head."""
 _SOFT, _ROUNDS = 0.06, 2
 """Over which hair thins out, in heights of the head; rounds of smoothing its edge."""
-_IRIS, _PUPIL = 0.62, 0.28
+_BROW = (0.085, 0.016, 0.7)
+"""Height of the brows above the eyes and half their breadth, in heights of the head; how much hair they have."""
+_IRIS, _PUPIL = 0.5, 0.25
 """Radii on an eye, in its own radius."""
 _WHITE, _IRIS_COLOR, _BLACK = (236, 232, 226), (92, 74, 58), (18, 16, 16)
 """Colours of an eye, sRGB."""
@@ -43,6 +45,7 @@ def colors_of(
 def _hair_share(body: MorphableBody, vertices: FloatArray) -> FloatArray:
     """Return how much of each vertex hair covers, 0 to 1."""
     eyes = (_place(body, vertices, "l-eye") + _place(body, vertices, "r-eye")) / 2
+    eyes_apart = abs(_place(body, vertices, "l-eye")[0])
     used = np.unique(body.surfaces["body"])
     top = vertices[used, 1].max()
     tall = 2 * (top - eyes[1])  # eyes are half way up a head
@@ -51,7 +54,10 @@ def _hair_share(body: MorphableBody, vertices: FloatArray) -> FloatArray:
     back, front = vertices[skull, 2].min(), vertices[skull, 2].max()
     ahead = (vertices[:, 2] - back) / (front - back)
     share = np.clip((height - np.interp(ahead, *_HAIRLINE.T)) / _SOFT, 0.0, 1.0)
-    return smooth_values(TriangleMesh(vertices, body.surfaces["body"]), share, _ROUNDS)
+    share = smooth_values(TriangleMesh(vertices, body.surfaces["body"]), share, _ROUNDS)
+    aside, over = np.abs(vertices[:, 0]) / eyes_apart, (height - _BROW[0]) / _BROW[1]
+    brow = np.exp(-(((aside - 1.05) / 0.5) ** 4) - (over + 0.35 * (aside - 1.0) ** 2) ** 2) * (ahead > 0.8)
+    return np.maximum(share, _BROW[2] * brow)
 
 
 def _eye(points: FloatArray) -> FloatArray:

@@ -27,6 +27,7 @@ from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Avatar, LifelikeBody, MorphableBody
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.render import SKIN
 from vto_pipeline.model.settings import Config
 
 _GROWTH = np.array([(0.75, 1.0), (1.10, 5.0), (1.38, 10.0), (1.50, 12.0), (1.60, 14.0)])
@@ -44,7 +45,7 @@ class LifelikeConfig(Config):
     age_years: float | None = Field(
         None, ge=1, le=90, description="Age that face, hands and feet show; absent: 30, or a child's by its stature"
     )
-    skin: tuple[int, int, int] = Field((201, 160, 132), description="Colour of the skin, sRGB")
+    skin: tuple[int, int, int] = Field(SKIN, description="Colour of the skin, sRGB")
     hair: tuple[int, int, int] | None = Field((74, 60, 52), description="Colour of the short hair, sRGB; null: none")
 
 
