@@ -74,16 +74,18 @@ def fit_measurements(
     _report_unlikely(population(sex), held, config, job)
     share = size_share(values.get("stature"), population(sex))
     build = build_of(sex, share)
-    large, unsure_large = resized(values, 1 / share), resized(sigmas, 1 / share)
+    large, unsure_large, met = (resized(known, 1 / share) for known in (values, sigmas, held))
     expected = population(build).given(large, unsure_large)
     if share < 1.0:
         growth, unsure_growth = childs_growth(expected, large["stature"], share)
         expected = population(build).given({**growth, **large}, {**unsure_growth, **unsure_large})
+        if not any(name == "mass" or name.endswith("girth") for name in values):
+            met["mass"] = growth["mass"]  # nothing else says how lean it is, and the mean body is an adult's
     space = shape_space(SEX_SHARE[build])
-    parameters = solve_shape(space, resized(held, 1 / share), expected, config, job, mean_parameters(build, config))
-    spread = resized(dict(zip(expected.names, np.sqrt(np.diag(expected.covariance).clip(0.0)).tolist(), strict=True)), share)
-    unsure = {name: s for name, s in spread.items() if name not in held}
-    body = replace(_smaller(space.avatar(parameters), share), sex=SEX_SHARE[sex], sigmas=unsure)
+    parameters = solve_shape(space, met, expected, config, job, mean_parameters(build, config))
+    spread = np.sqrt(np.diag(expected.covariance).clip(0.0)).tolist()
+    unsure = {name: s for name, s in zip(expected.names, spread, strict=True) if name not in held}
+    body = replace(_smaller(space.avatar(parameters), share), sex=SEX_SHARE[sex], sigmas=resized(unsure, share))
     _report_errors(body, held, config, job)
     _report_folds(space, body, job)
     return body

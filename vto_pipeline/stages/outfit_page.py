@@ -21,7 +21,16 @@ OWN_PARTS = ("render_mesh", "fit_report", "fit_maps")
 """What is made of each draped garment."""
 
 _COLORS = ((0.14, 0.27, 0.53), (0.55, 0.21, 0.10), (0.19, 0.36, 0.16), (0.36, 0.20, 0.46))  # linear RGB
-_SHARED = ("body_surface", "mannequin_surface", "avatar", "lifelike_body", "measurements", "body_measurements", "audit", "trace")
+_SHARED = (
+    "body_surface",
+    "mannequin_surface",
+    "avatar",
+    "lifelike_body",
+    "measurements",
+    "body_measurements",
+    "audit",
+    "trace",
+)
 
 
 def outfit_page(stage: Stage, names: Sequence[str]) -> Stage:

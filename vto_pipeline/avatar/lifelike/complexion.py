@@ -9,7 +9,9 @@ from vto_pipeline.model.arrays import ByteArray, FloatArray, IntArray
 from vto_pipeline.model.body import MorphableBody
 from vto_pipeline.model.mesh import TriangleMesh
 
-_HAIRLINE = np.array([(0.0, -0.22), (0.28, -0.20), (0.40, 0.02), (0.46, 0.11), (0.62, 0.11), (0.72, 0.17), (0.90, 0.28)])
+_HAIRLINE = np.array(
+    [(0.0, -0.22), (0.28, -0.20), (0.40, 0.02), (0.46, 0.11), (0.62, 0.11), (0.72, 0.17), (0.90, 0.28)]
+)
 """Height of the hairline above the eyes, from the back of the head to its front, both in heights of the head."""
 _SOFT, _ROUNDS = 0.06, 2
 """Over which hair thins out, in heights of the head; rounds of smoothing its edge."""

@@ -1,8 +1,9 @@
 """One part of another mesh in place of a body's own, beyond one of its rows of vertices.
 
 The body ends at the row. The new part is cut a little beyond it; its rim is moved onto the body's surface there, and
-that move fades out along the part: the smoothest that lies on the body next to the row and is zero further away. A strip
-of triangles closes the gap. So the body is as it was up to the row, to the last bit, and the surface goes on smoothly.
+that move fades out along the part: the smoothest that lies on the body next to the row and is zero further away. A
+strip of triangles closes the gap. So the body is as it was up to the row, to the last bit, and the surface goes on
+smoothly.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ class Grafted:
 
 
 def beyond(mesh: TriangleMesh, seat: Seat) -> NDArray[np.bool_]:
-    """Return which vertices lie beyond the row: those that hang together with the tip without it, shape (V,)."""
+    """Return which vertices lie beyond the row: those that are connected to the tip without it, shape (V,)."""
     links = edges(mesh)
     links = links[~np.isin(links, seat.row).any(axis=1)]
     count = len(mesh.vertices)
@@ -163,7 +164,7 @@ def _piece_at(mesh: TriangleMesh, point: FloatArray) -> TriangleMesh:
     keep = [
         piece
         for piece in range(count)
-        if piece == main or _closed(mesh, label == piece) and _within(mesh, label == piece, low, high)
+        if piece == main or (_closed(mesh, label == piece) and _within(mesh, label == piece, low, high))
     ]
     return submesh(mesh, np.isin(label, keep))[0]
 

@@ -18,7 +18,10 @@ _PEOPLES = ("african", "asian", "caucasian")
 
 TARGETS = tuple(
     [f"{people}-{sex}-{age}" for people, sex, age in product(_PEOPLES, ("female", "male"), _AGES)]
-    + [f"universal-{sex}-{age}-averagemuscle-{mass}" for sex, age, mass in product(("female", "male"), _AGES, _BODY_MASS)]
+    + [
+        f"universal-{sex}-{age}-averagemuscle-{mass}"
+        for sex, age, mass in product(("female", "male"), _AGES, _BODY_MASS)
+    ]
 )
 """Every target that `shares` can ask for."""
 

@@ -136,9 +136,7 @@ def _foot(avatar: Avatar, donor: Donor, side: str) -> Part:
     body, points, short = avatar.bind_vertices, donor.mesh.vertices, _SIDES[side]
     heel, toe = (body[avatar.landmarks[f"{side}_{name}"]] for name in ("heel", "toe"))
     up = np.array([0.0, 1.0, 0.0])
-    seat = Seat(
-        avatar.loops[f"{side}_ankle"], avatar.landmarks[f"{side}_toe"], -up, _reach(avatar, "foot")
-    )
+    seat = Seat(avatar.loops[f"{side}_ankle"], avatar.landmarks[f"{side}_toe"], -up, _reach(avatar, "foot"))
     ankle, tip = donor.places[f"{short}-ankle"], _nearest(points, donor.places[f"{short}-toe-2-4"])
     forward = points[tip] - ankle
     own = (np.linalg.norm(points - ankle, axis=1) < 2 * np.linalg.norm(forward)) & (points[:, 1] < ankle[1])

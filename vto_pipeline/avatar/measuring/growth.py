@@ -1,6 +1,6 @@
 """Children, by the statistics of adults: at an adult's size, with a child's head and legs.
 
-The survey knows nobody shorter than a small adult, and what it says of longer bodies does not go on below: girths would
+The survey knows no body shorter than a small adult, and what it says of longer bodies does not go on below: girths would
 stay while heights shrink. So a child is looked at enlarged to that size, where all is measured and expected, and comes
 back as small as it is.
 
@@ -21,9 +21,9 @@ _HEAD, _LEGS = 0.25, 1.12
 """Powers of stature by which heads and legs grow."""
 _SURE_M = 0.005
 """Of what follows by them, at an adult's size; our assumption."""
-_LEAN_KG_M2, _LEAN_SHARE = 20.0, 0.12
-"""Body mass index of children, enlarged, and its spread: 15.4 at 1.15 m and 16.5 at 1.35 m before (WHO 2007)."""
-_BEFORE_PUBERTY = 0.93
+_LEAN_KG_M2, _LEANER_KG_M3, _LEAN_SHARE = 15.3, 3.2, 0.12
+"""Body mass index of a child of a metre, how it grows with stature, and its spread (WHO 2006 and 2007, both sexes)."""
+_BEFORE_PUBERTY = 0.95
 """Enlarged more than this, girls are built as boys are."""
 
 
@@ -45,9 +45,7 @@ def resized(values: Mapping[str, float], factor: float) -> dict[str, float]:
     return {name: value * factor ** (3 if name == "mass" else 1) for name, value in values.items()}
 
 
-def childs_growth(
-    enlarged: Population, stature: float, share: float
-) -> tuple[dict[str, float], dict[str, float]]:
+def childs_growth(enlarged: Population, stature: float, share: float) -> tuple[dict[str, float], dict[str, float]]:
     """Return what a child's growth says of its enlarged body, values and standard uncertainties [m, kg].
 
     Args:
@@ -55,12 +53,13 @@ def childs_growth(
         stature: Enlarged [m].
         share: Of the child's size in that.
     """
+    small = share * stature
     usual = dict(zip(enlarged.names, enlarged.mean.tolist(), strict=True))
     larger, longer = share ** (_HEAD - 1), share ** (_LEGS - 1)
     values = {
         "head_girth": usual["head_girth"] * larger,
         "back_neck_height": stature - (stature - usual["back_neck_height"]) * larger,
         "inside_leg": usual["inside_leg"] * longer,
-        "mass": _LEAN_KG_M2 * stature**2,
+        "mass": (_LEAN_KG_M2 + _LEANER_KG_M3 * max(small - 1.0, 0.0)) * small**2 / share**3,
     }
     return values, {**dict.fromkeys(values, _SURE_M), "mass": _LEAN_SHARE * values["mass"]}

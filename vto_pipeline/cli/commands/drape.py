@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from vto_pipeline.cli.options import PATH, lifelike_option, drape_options
+from vto_pipeline.cli.options import PATH, drape_options, lifelike_option
 from vto_pipeline.cli.session import Session, pass_session
 
 

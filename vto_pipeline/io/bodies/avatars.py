@@ -42,20 +42,20 @@ def read_lifelike(path: Path) -> LifelikeBody:
 def _arrays(avatar: Avatar) -> Arrays:
     loops = [np.asarray(loop, dtype=np.int32) for loop in avatar.loops.values()]
     return {
-            **{name: getattr(avatar, name) for name in _ARRAYS},
-            "joint_names": _strings(avatar.joint_names),
-            "sex": np.float64(avatar.sex),
-            "landmark_names": _strings(avatar.landmarks),
-            "landmark_vertices": np.array(list(avatar.landmarks.values()), dtype=np.int32),
-            "loop_names": _strings(avatar.loops),
-            "loop_lengths": np.array([len(loop) for loop in loops], dtype=np.int32),
-            "loop_vertices": np.concatenate([np.empty(0, np.int32), *loops]),
-            "parameter_names": _strings(avatar.parameters),
-            "parameter_values": np.array(list(avatar.parameters.values()), dtype=np.float64),
-            "sigma_names": _strings(avatar.sigmas),
-            "sigma_values": np.array(list(avatar.sigmas.values()), dtype=np.float64),
-            "caveats": _strings(avatar.caveats),
-        }
+        **{name: getattr(avatar, name) for name in _ARRAYS},
+        "joint_names": _strings(avatar.joint_names),
+        "sex": np.float64(avatar.sex),
+        "landmark_names": _strings(avatar.landmarks),
+        "landmark_vertices": np.array(list(avatar.landmarks.values()), dtype=np.int32),
+        "loop_names": _strings(avatar.loops),
+        "loop_lengths": np.array([len(loop) for loop in loops], dtype=np.int32),
+        "loop_vertices": np.concatenate([np.empty(0, np.int32), *loops]),
+        "parameter_names": _strings(avatar.parameters),
+        "parameter_values": np.array(list(avatar.parameters.values()), dtype=np.float64),
+        "sigma_names": _strings(avatar.sigmas),
+        "sigma_values": np.array(list(avatar.sigmas.values()), dtype=np.float64),
+        "caveats": _strings(avatar.caveats),
+    }
 
 
 def read_avatar(path: Path) -> Avatar:

@@ -17,7 +17,16 @@ from vto_pipeline.render.tint import SKIN, tint
 from vto_pipeline.stages.entry.outcome import Outcome
 from vto_pipeline.stages.outfit_page import joined_parts
 
-_ALONE = ("garment", "garment_surface", "lifelike_body", "avatar", "fitted_avatar", "body_surface", "mannequin_surface", "surface")
+_ALONE = (
+    "garment",
+    "garment_surface",
+    "lifelike_body",
+    "avatar",
+    "fitted_avatar",
+    "body_surface",
+    "mannequin_surface",
+    "surface",
+)
 """What is shown of a run without a drape: the first of these that it made."""
 
 _UNDYED = (1.0, 1.0, 1.0)  # what glTF assumes where nothing is said
