@@ -120,13 +120,15 @@ def girth(mesh: TriangleMesh, row: np.ndarray, body: Avatar, normal: np.ndarray,
 
 @pytest.mark.parametrize("name", PEOPLE)
 def test_girths_are_the_avatars(name: str) -> None:
-    """At every row from neck to ankle, and 8 mm inside those of neck, wrist and ankle, within a millimetre."""
+    """At every row from head to ankle, and 8 mm inside those of neck, wrist and ankle, within a millimetre."""
     avatar, body = person(name)
     plain, rest = (TriangleMesh(one.bind_vertices, one.faces) for one in (avatar, body.avatar))
     up = np.array([0.0, 1.0, 0.0])
     arm = avatar.joints[avatar.joint_names.index("left_wrist")] - avatar.joints[avatar.joint_names.index("left_elbow")]
     arm /= np.linalg.norm(arm)
-    rows = [(row, up, 0.0) for row in ("neck_base", "chest", "waist", "hip", "left_thigh", "left_knee", "left_calf")]
+    rows = [
+        (row, up, 0.0) for row in ("head", "neck_base", "chest", "waist", "hip", "left_thigh", "left_knee", "left_calf")
+    ]
     rows += [("neck", up, 0.0), ("neck", up, -0.008), ("left_ankle", up, 0.0), ("left_ankle", up, 0.008)]
     rows += [("left_forearm", arm, 0.0), ("left_wrist", arm, 0.0), ("left_wrist", arm, -0.008)]
     for row, normal, shift in rows:

@@ -42,7 +42,18 @@ _HEADS = ("person", "girths differ by [mm], at most", "crossings of the avatar",
 _A_ROW, _WIDE_PX, _NARROW_PX = 5, 250, 90
 _PEOPLE_PX, _PEOPLE_TALL_M = 300, 2.0
 _FACE_PX, _FACE_M = 130, 0.14
-_LEVEL_ROWS = ("neck", "neck_base", "chest", "waist", "hip", "left_thigh", "left_knee", "left_calf", "left_ankle")
+_LEVEL_ROWS = (
+    "head",
+    "neck",
+    "neck_base",
+    "chest",
+    "waist",
+    "hip",
+    "left_thigh",
+    "left_knee",
+    "left_calf",
+    "left_ankle",
+)
 _ARM_ROWS = ("left_upper_arm", "left_forearm", "left_wrist")
 
 

@@ -90,7 +90,7 @@ def fit_part(body: TriangleMesh, seat: Seat, part: TriangleMesh, tip: int) -> Gr
     if not rims:
         raise AvatarError("a part of the lifelike body does not reach down to the avatar's", hint="report the avatar")
     rim = max(rims, key=len)
-    own_face = beyond(body, seat)[body.faces].any(axis=1)
+    own_face = np.asarray(beyond(body, seat)[body.faces].any(axis=1))
     outline = plane_section(body, origin + gap * seat.axis, seat.axis, own_face).points
     frame = _across(seat.axis)
     to_rim, to_outline = (cut.vertices[rim] - origin) @ frame.T, (outline - origin) @ frame.T

@@ -7,6 +7,7 @@ avatar's, it moves as the avatar does, and cloth that lies on the one lies on th
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,14 +40,21 @@ _LID, _CLEAR = (0.9, 1.25), 1.03
 """In an eye's radii: between which lids and sockets lie, and where they begin when the eye does not cross them."""
 
 
+_Channel = Annotated[int, Field(ge=0, le=255)]
+Rgb = tuple[_Channel, _Channel, _Channel]
+
+
 class LifelikeConfig(Config):
     """Settings of the lifelike body."""
 
     age_years: float | None = Field(
-        None, ge=1, le=90, description="Age that face, hands and feet show; absent: 30, or a child's by its stature"
+        default=None,
+        ge=1,
+        le=90,
+        description="Age that face, hands and feet show; absent: 30, or a child's by its stature",
     )
-    skin: tuple[int, int, int] = Field(SKIN, description="Colour of the skin, sRGB")
-    hair: tuple[int, int, int] | None = Field((74, 60, 52), description="Colour of the short hair, sRGB; null: none")
+    skin: Rgb = Field(default=SKIN, description="Colour of the skin, sRGB")
+    hair: Rgb | None = Field(default=(74, 60, 52), description="Colour of the short hair, sRGB; null: none")
 
 
 def lifelike_body(avatar: Avatar, library: MorphableBody, config: LifelikeConfig, job: Job) -> LifelikeBody:

@@ -24,10 +24,9 @@ _REACH = {"head": 0.05, "hand": 0.045, "foot": 0.07}
 _GROWN_M = 1.7
 _CHIN_M = 0.012
 """Of a grown body's chin above the row of the neck."""
-_LEAST_TALL = 0.86
+_LEAST_TALL = 0.82
 """Of a head's height, against its girth; a neck that leaves less room gets a smaller head."""
-_EAR_FREE = 0.14
-"""How far from its middle a head's girth is taken, in its heights: ears are no part of it."""
+_ROUNDS = 8
 
 
 @dataclass(frozen=True)
@@ -78,14 +77,13 @@ def _head(avatar: Avatar, donor: Donor) -> Part:
     donor_top = int(np.argmax(points[:, 1]))
     jaw = _chin(donor)
     tall = points[donor_top, 1] - points[jaw, 1]
-    scale = 1.0
-    for _ in range(8):  # the level at which both are measured scales along
-        level = points[donor_top, 1] - below_top / scale
-        donor_low, donor_high, donor_girth = _girth(donor.mesh, level, 0.5 * tall)
-        scale = girth / donor_girth
     room = top - body[avatar.loops["neck"], 1].mean() - _CHIN_M * top / _GROWN_M
-    scale = min(scale, room / (_LEAST_TALL * tall))
-    upright = min(scale, room / tall)
+    upright = room / tall
+    for _ in range(_ROUNDS):  # the level at which both are measured scales along
+        level = points[donor_top, 1] - below_top / upright
+        donor_low, donor_high, donor_girth = _girth(donor.mesh, level, 0.5 * tall)
+        scale = min(girth / donor_girth, room / (_LEAST_TALL * tall))
+        upright = min(scale, room / tall)
     middle, donor_middle = (low + high) / 2, (donor_low + donor_high) / 2
     size = np.array([scale, upright, scale])
     placed = (points - [donor_middle[0], points[donor_top, 1], donor_middle[2]]) * size + [middle[0], top, middle[2]]

@@ -1,8 +1,8 @@
 """Children, by the statistics of adults: at an adult's size, with a child's head and legs.
 
-The survey knows no body shorter than a small adult, and what it says of longer bodies does not go on below: girths would
-stay while heights shrink. So a child is looked at enlarged to that size, where all is measured and expected, and comes
-back as small as it is.
+The survey knows no body shorter than a small adult, and what it says of longer bodies does not hold below: girths
+would stay while heights shrink. So a child is looked at enlarged to that size, where all is measured and expected, and
+comes back as small as it is.
 
 A head grows far less than a body does, and legs a little more. From 0.75 to 1.15 m of stature heads go from 0.455 to
 0.515 m round (WHO 2006; Nellhaus 1968), as the fourth root of stature does; the powers are our fit to that, and for
