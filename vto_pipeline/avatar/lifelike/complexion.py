@@ -17,6 +17,8 @@ _SOFT, _ROUNDS = 0.06, 2
 """Over which hair thins out, in heights of the head; rounds of smoothing its edge."""
 _BROW = (0.085, 0.016, 0.7)
 """Height of the brows above the eyes and half their breadth, in heights of the head; how much hair they have."""
+_FACE = 0.75
+"""Where the face begins, from the back of the head to its front."""
 _IRIS, _PUPIL = 0.5, 0.25
 """Radii on an eye, in its own radius."""
 _WHITE, _IRIS_COLOR, _BLACK = (236, 232, 226), (92, 74, 58), (18, 16, 16)
@@ -58,7 +60,8 @@ def _hair_share(body: MorphableBody, vertices: FloatArray) -> FloatArray:
     share = np.clip((height - np.interp(ahead, *_HAIRLINE.T)) / _SOFT, 0.0, 1.0)
     share = smooth_values(TriangleMesh(vertices, body.surfaces["body"]), share, _ROUNDS)
     aside, over = np.abs(vertices[:, 0]) / eyes_apart, (height - _BROW[0]) / _BROW[1]
-    brow = np.exp(-(((aside - 1.05) / 0.5) ** 4) - (over + 0.35 * (aside - 1.0) ** 2) ** 2) * (ahead > 0.8)
+    brow = np.exp(-(((aside - 1.12) / 0.55) ** 4) - (over - 0.45 * (aside - 1.0) + 0.5 * (aside - 1.2) ** 2) ** 2)
+    brow *= ahead > _FACE
     return np.maximum(share, _BROW[2] * brow)
 
 

@@ -24,7 +24,7 @@ _REACH = {"head": 0.05, "hand": 0.045, "foot": 0.07}
 _GROWN_M = 1.7
 _CHIN_M = 0.012
 """Of a grown body's chin above the row of the neck."""
-_LEAST_TALL = 0.82
+_LEAST_TALL = 0.79
 """Of a head's height, against its girth; a neck that leaves less room gets a smaller head."""
 _ROUNDS = 8
 
