@@ -21,6 +21,7 @@ from vto_pipeline.io.captures.photos import read_board
 from vto_pipeline.io.fabrics import read_fabric
 from vto_pipeline.io.motion.keyframes import parse_keyframes
 from vto_pipeline.io.patterns.seam_lines import read_seam_lines
+from vto_pipeline.io.patterns.sewing_plan import read_sewing_plan
 from vto_pipeline.pipeline.batch.order import read_order
 from vto_pipeline.stages.entry.planning import catalogue, planned
 
@@ -186,8 +187,13 @@ def test_links_lead_somewhere(page):
 def test_examples_are_read_as_they_stand(page, block, tmp_path):
     path = tmp_path / "example.yaml"
     path.write_text(block.replace("../sample_data", str(ROOT / "sample_data")))
+    schemas = {
+        "run": lambda: read_order(path),
+        "panels": lambda: read_sewing_plan(path),
+        "": lambda: planned(path, (), catalogue()),
+    }
     kinds = {
-        "schema": lambda: read_order(path) if "\nrun:" in block else planned(path, (), catalogue()),
+        "schema": lambda: schemas["panels" if "\npanels:" in block else "run" if "\nrun:" in block else ""](),
         "name": lambda: read_fabric(path),
         "instrument": lambda: read_fabric(path),
         "sex": lambda: read_measurements(path),
@@ -200,6 +206,6 @@ def test_examples_are_read_as_they_stand(page, block, tmp_path):
 
 
 def test_every_results_file_comes_from_a_bench_or_a_sample_run():
-    known = {*BENCHES, *SAMPLES}
+    known = {*BENCHES, *SAMPLES, "gpu"}  # the last is measured where there is a graphics processor
     found = {path.stem for path in (ROOT / RESULTS).glob("*.json")}
     assert {name for name in found if not name.startswith("first_run_")} <= known

@@ -7,12 +7,19 @@ import trimesh
 from scipy.spatial import ConvexHull
 
 from vto_pipeline.model.body import Avatar
+from vto_pipeline.model.mesh import TriangleMesh
 
 
 def crossing(vertices: np.ndarray, faces: np.ndarray) -> bool:
     """Whether a mesh passes through itself, by ipctk's exact test."""
     edges = trimesh.Trimesh(vertices, faces, process=False).edges_unique
     return ipctk.has_intersections(ipctk.CollisionMesh(vertices, edges, faces), vertices)
+
+
+def meet(one: TriangleMesh, other: TriangleMesh) -> bool:
+    """Whether two surfaces pass through each other, or one of them through itself, by ipctk's exact test."""
+    faces = np.vstack([one.faces, other.faces + len(one.vertices)])
+    return crossing(np.vstack([one.vertices, other.vertices]), faces)
 
 
 def independent_girth(vertices: np.ndarray, faces: np.ndarray, height: float, near: float | None) -> float:

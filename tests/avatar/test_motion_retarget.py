@@ -61,6 +61,8 @@ def test_a_motion_onto_the_body_it_came_from_is_the_same():
             poses[:, avatar.joint_names.index(f"{side}_{kind}"), 1:] *= 0.3
             x = poses[:, avatar.joint_names.index(f"{side}_{kind}"), 0]
             x[:] = abs(x) * (1 if kind == "knee" else -1)
+    for side, sign in (("left", 1.0), ("right", -1.0)):  # no arm near the trunk: it would be moved off
+        poses[:, avatar.joint_names.index(f"{side}_shoulder"), 2] += sign * 0.6
     places = rng.uniform(-0.3, 0.3, (12, 3))
     clip = clip_of(avatar, poses, places)
     motion, figures = retarget(clip, mapped(clip), avatar, RetargetConfig(hold_feet=False))

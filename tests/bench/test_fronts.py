@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import json
+from math import inf
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from vto_pipeline.bench import BENCHES, sample_runs
-from vto_pipeline.bench.bench import Row
+from vto_pipeline.bench.bench import Row, Watch
+from vto_pipeline.bench.cloth import solvers
+from vto_pipeline.bench.drape import budget
 from vto_pipeline.bench.report_card import fronts as module
 from vto_pipeline.bench.report_card.fronts import NEAR, Trade, distance, fronts
 from vto_pipeline.bench.sample_runs import SAMPLES
+from vto_pipeline.bench.scaling import gpu
+from vto_pipeline.bench.timing import Timing
+from vto_pipeline.cloth.drape_config import DrapeConfig
 
 RESULTS = sorted((Path(__file__).parents[2] / "docs" / "results").glob("[!f]*.json"))  # first_run is no bench
 
@@ -82,8 +88,8 @@ def test_every_results_file_says_where_todays_default_stands(path):
     """Against its own rows, by the benches as they are."""
     document = json.loads(path.read_text())
     name = document["bench"]
-    bench = BENCHES[name].module if name in BENCHES else sample_runs.__name__
-    assert name in (*BENCHES, *SAMPLES)
+    modules = dict.fromkeys(SAMPLES, sample_runs.__name__) | {key: one.module for key, one in BENCHES.items()}
+    bench = (modules | {"gpu": gpu.__name__})[name]
     found = fronts(bench, [Row.from_json(one) for one in document["rows"]], document["quick"])
     assert document["fronts"] == found, f"{path.name} does not say so: measure it again"
     assert found, "neither a front nor a reason"
@@ -93,3 +99,22 @@ def test_every_results_file_says_where_todays_default_stands(path):
 def test_every_bench_has_a_trade_or_a_reason(name):
     trade = module.import_module(BENCHES[name].module).TRADE
     assert isinstance(trade, Trade) or len(trade.split()) > 5
+
+
+def test_quick_benches_measure_the_default_however_slow_the_machine(monkeypatch):
+    """No scene is run: what would be measured is looked at, and every row takes longer than patience lasts."""
+    given = {}
+
+    def measured(case, scene, config, truth):
+        given[scene.name, config.solver, config.substeps] = case.most
+        return Timing(60.0), {}
+
+    monkeypatch.setattr(solvers, "_measure", measured)
+    monkeypatch.setattr(solvers, "_reference", lambda case, scene: (None, (Timing(1.0), {})))
+    found = [row for case in [*solvers._cases(True)][:2] for row in solvers._rows_of(case, Watch())]
+    is_default = solvers.TRADE.default(True)
+    assert {row.scene for row in found if is_default(row)} == {"hang 10", "sphere 10"}
+    newton = [row.settings["substeps"] for row in found if row.method == "newton"]
+    assert newton == [0.25, 1.0] * 2  # and nothing beyond it
+    assert sorted(set(given.values())) == [0.4, inf]
+    assert budget.TARGETS_MM[-1] == DrapeConfig.model_validate({}).target_error_mm

@@ -41,6 +41,32 @@ def test_panels_and_seams_are_measured(vto):
     assert "100 units a metre, assumed" in lines
 
 
+def test_a_drawing_is_sewn_by_a_plan(vto):
+    head = 'xmlns="http://www.w3.org/2000/svg" width="500mm" height="500mm" viewBox="0 0 500 500"'
+    Path("d.svg").write_text(f'<svg {head}><path id="body" d="M0,0 L400,0 L400,300 L0,300 Z"/></svg>')
+    said = vto("pattern", "d.svg").out
+    assert "no stitches in the file" in said
+    edges = [line.split() for line in said.splitlines() if line.startswith("body") and "straight" in line]
+    lengths = {row[2]: row[1] for row in edges if len(row) > 6 and row[1].isdigit()}
+    assert set(lengths) == {"400.0", "300.0"}
+    panels = "{front: {of: body, at_m: [0, 1.0]}, back: {of: body, at_m: [0, 1.0]}}"
+    sides = [row[1] for row in edges if row[2] == "300.0" and row[1].isdigit()]
+    seams = [f"{{first: [front {a}], second: [back {b}]}}" for a, b in (sides, sides[::-1])]
+    Path("p.yaml").write_text(f"schema: 1\npanels: {panels}\nseams: [{', '.join(seams)}]\n")
+    made = vto("pattern", "d.svg", "--plan", "p.yaml", "-o", "tube.json", "--json")
+    assert [seam["lengths_mm"] for seam in made.data["seams"]] == [pytest.approx([300.0, 300.0])] * 2
+    assert [one["placement"]["translation"][2] for one in json.loads(Path("tube.json").read_text())["panels"]] == [
+        pytest.approx(0.15),
+        pytest.approx(-0.15),
+    ]
+    Path("p.yaml").write_text(f"schema: 1\npanels: {panels}\nseams: [{{first: [front 9], second: [back 0]}}]\n")
+    refused = vto("pattern", "d.svg", "--plan", "p.yaml")
+    assert refused.code == 3
+    assert "front 9" in refused.err
+    assert "p.yaml" in refused.err
+    assert vto("pattern", "d.svg", "--plan", "p.yaml", "--sizes", "S,M").code == 2
+
+
 def test_one_size_is_written_and_nothing_overwritten(vto):
     document = ezdxf.new("R12")
     document.modelspace().add_text("UNITS: METRIC")

@@ -13,13 +13,17 @@ from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.model.settings import checked
 from vto_pipeline.cloth.placement.body_growth import plan_body_growth
 from vto_pipeline.cloth.placement.place import place_garment
+from vto_pipeline.garment.pattern.embed import in_shape
+from vto_pipeline.garment.pattern.sew import SewConfig, sew
 from vto_pipeline.geometry.remeshing.remesh import RemeshConfig, remesh
 from vto_pipeline.io.meshes import read_mesh
+from vto_pipeline.io.patterns.read import read_pattern
 from vto_pipeline.model.garment import Garment, RestShape
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
+HOOD = DATA / "patterns" / "garment_pattern_generator" / "basic tee" / "tee_hood.json"
 SHIRT = DATA / "garments" / "berkeley" / "shirt" / "shirt-iso.obj"
 
 
@@ -50,3 +54,16 @@ def test_a_long_sleeved_shirt_is_put_on_arms_that_hang():
     assert len(placed.vertices) > 10_000
     growth = plan_body_growth(body, placed, Job())
     assert (growth.pierced, growth.fault) == (0, (0, 0))
+
+
+@pytest.mark.real_data
+@pytest.mark.skipif(not HOOD.is_file(), reason="shared data absent")
+def test_a_body_grows_no_farther_than_it_must():
+    """Sleeves laid onto arms alone are free of faults about a body of lines only; led further, about a stouter one."""
+    body = read_mesh(DATA / "bodies" / "mh_female_averageweight.ply")
+    mesh = in_shape(sew(read_pattern(HOOD), SewConfig(edge_mm=30.0), Job()), Job())
+    garment = Garment(mesh, RestShape(mesh.vertices), laid_out=True)
+    placed = place_garment(garment, body, checked(DrapeConfig, None), Job()).mesh
+    growth = plan_body_growth(body, placed, Job())
+    assert growth.fault == (0, 0)
+    assert growth.thinned < 6

@@ -157,6 +157,43 @@ def test_a_garment_that_fits_better_upside_down_is_not_put_on_so(name, sex):
         assert found.scale == 1.0
 
 
+def deeper(mesh, depth, front=1.0):
+    """The mesh, so much deeper in front, or behind."""
+    z = mesh.vertices[:, 2:]
+    return TriangleMesh(
+        mesh.vertices * np.hstack([np.ones((len(z), 2)), np.where(front * z > 0.0, depth, 1.0)]), mesh.faces
+    )
+
+
+@pytest.mark.parametrize("axes", [np.eye(3), Z_UP.T], ids=["y up, front +z", "z up, front -y"])
+def test_what_the_file_calls_front_is_the_front_though_the_back_has_more_room_for_it(axes):
+    body = deeper(pear(), 1.15)
+    for front in (1.0, -1.0):
+        worn = deeper(skirt(), 1.2, front)
+        found = find_placement(TriangleMesh(worn.vertices @ axes, worn.faces), body, FINE, Job())
+        assert_allclose(found.turn, axes, rtol=0, atol=0)
+
+
+def test_a_garment_that_fits_far_better_the_other_way_round_is_turned_so():
+    def leaning(mesh, way):
+        x, y, z = mesh.vertices.T
+        return TriangleMesh(np.column_stack([x, y, z + 0.6 * way * y**2]), mesh.faces)
+
+    found = find_placement(leaning(skirt(), -1.0), leaning(pear(), 1.0), FINE, Job())
+    assert_allclose(found.turn, np.diag([-1.0, 1.0, -1.0]), rtol=0, atol=0)
+
+
+@pytest.mark.real_data
+@pytest.mark.skipif(not DATA.exists(), reason="the data folder is absent")
+@pytest.mark.parametrize("name", ["tshirt", "blouse-short", "tank-male", "vest", "skirt", "pants"])
+@pytest.mark.parametrize("sex", ["female", "male"])
+def test_necklines_are_deeper_in_front(name, sex):
+    """The files have z up, and the front at -y: there the necks of their tops are lower."""
+    garment = read_mesh(DATA / "garments" / "berkeley" / name / f"{name}-iso.obj")
+    found = find_placement(garment, read_mesh(DATA / "bodies" / f"mh_{sex}_averageweight.ply"), PlaceConfig(), Job())
+    assert_allclose(found.turn, Z_UP.T, rtol=0, atol=0)
+
+
 def test_a_garment_on_its_head_is_turned_where_that_fits_far_better():
     lying = TriangleMesh(skirt().vertices @ DOWN.T, skirt().faces)
     found = find_placement(lying, pear(), FINE, Job())

@@ -1,12 +1,17 @@
 """Bodies that give way where their own parts press on each other."""
 
 import numpy as np
+import pytest
 from cloth_scenes import ball
+from ipc_judge import self_crosses
 
-from vto_pipeline.cloth.collision.body.yielding import give_way
+from vto_pipeline.avatar.model.pose import named_pose
+from vto_pipeline.avatar.template.template import template
+from vto_pipeline.cloth.collision.body.yielding import YieldingBody, give_way, sunken
 from vto_pipeline.geometry.intersections import self_intersections
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.motion import BodyPath
 
 RADIUS, SKIN = 0.1, 0.003  # m
 APART, OVERLAPPING = 0.05, -0.006  # m between two balls
@@ -66,3 +71,26 @@ def test_only_what_is_asked_about_gives_way_and_creases_of_the_first_keyframe_ne
     assert give_way(given, SKIN, np.arange(0))[1] == 0.0
     creased = two_balls([OVERLAPPING, 2.0 * OVERLAPPING, APART])
     assert give_way(creased, SKIN, everywhere(creased))[1] < give_way(given, SKIN, everywhere(given))[1]
+
+
+def test_on_a_path_there_is_room_for_cloth_that_lies_in_several_layers():
+    near = two_balls([ROOM + 0.004, ROOM + 0.004, OVERLAPPING])  # no crease, though not room for a hem
+    path = BodyPath(lambda time: near.keyframes[round(time)].copy(), near.faces, 3, 1.0)
+    body = YieldingBody(path, SKIN, everywhere(near))
+    assert [body.own_crossings(frame) > 0 for frame in range(3)] == [False, False, True]
+    for frame in range(3):
+        assert 3.0 * ROOM - 1e-9 < gap_between(body.path.at(path.time(frame))) < 3.0 * ROOM + 0.01
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_groins_that_turn_inside_out_are_smoothed_until_nothing_passes_through_anything(share):
+    """By ipctk; sinking alone leaves the bottom of the fold as it is."""
+    person = named_pose(template(share), "sitting")
+    assert self_crosses(person)
+    moved = sunken(TriangleMesh(person.vertices, person.faces), np.arange(len(person.vertices)), ROOM)
+    assert not self_crosses(TriangleMesh(person.vertices + moved, person.faces))
+    far = np.linalg.norm(moved, axis=1)
+    assert 0.005 < far.max() < 0.045
+    folds = [person.joint_names.index(f"{side}_{joint}") for side in ("left", "right") for joint in ("hip", "knee")]
+    away = np.linalg.norm(person.bind_vertices[:, None] - person.joints[folds], axis=2).min(axis=1)
+    assert away[far > 1e-3].max() < 0.3  # about hips and knees, nowhere else

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.bare_parts import BareParts
-from vto_pipeline.garment.lifting import check_lifted, lift_fillings
+from vto_pipeline.garment.lifting import KeptOutside, check_lifted, lift_fillings
 from vto_pipeline.garment.openings import OpeningsConfig, close_scan_holes
 from vto_pipeline.geometry.remeshing.holes import fill_holes
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
@@ -170,3 +170,25 @@ def test_a_shoulder_that_was_not_seen_is_filled_outside_the_form(scene):
     off = np.abs(dressed_form.form_distance(filling) - dressed_form.shirt_gap(filling))
     assert np.quantile(off, 0.95) < 0.004
     assert dressed_form.form_distance(filling).min() > 0.0005
+
+
+def test_points_that_wander_are_kept_off_a_ball_though_few_are_looked_up(ball):
+    class Counting(SurfaceDistance):
+        asked = 0
+
+        def signed(self, points):
+            Counting.asked += len(points)
+            return super().signed(points)
+
+    draw = np.random.default_rng(0)
+    points = draw.normal(size=(2000, 3))
+    points *= (BALL + draw.uniform(-0.01, 0.2, (2000, 1))) / np.linalg.norm(points, axis=1, keepdims=True)
+    wanted, rounds = np.full(2000, 0.004), 40
+    kept, steps = KeptOutside(Counting(ball), points), draw.normal(0.0, 0.002, (rounds, 2000, 3))
+    for step in steps:
+        moved = points + step
+        points = kept.pushed(moved, wanted)
+        off = np.linalg.norm(moved, axis=1)
+        true = moved * (np.maximum(off, BALL + 0.004) / off)[:, None]
+        assert_allclose(points, true, atol=4e-4)  # the ball has flat faces, a degree apart from its own
+    assert 2000 < Counting.asked < 0.2 * rounds * 2000

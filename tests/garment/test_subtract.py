@@ -13,7 +13,7 @@ from vto_pipeline.garment.subtract import SubtractConfig, extract_garment, label
 from vto_pipeline.geometry.remeshing.repair import is_manifold
 from vto_pipeline.geometry.rigid import transform_mesh
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import face_components, face_normals, submesh
+from vto_pipeline.geometry.topology import concatenate, face_components, face_normals, submesh
 from vto_pipeline.model.garment import SurfaceLabels
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -63,6 +63,30 @@ def test_colour_saves_cloth_that_lies_on_the_form(scene, placed):
 def test_the_board_is_no_garment(scene, placed):
     labels = label_garment(placed, scene.form, SubtractConfig(), Job())
     assert not labels.garment[placed.vertices[:, 1] < -0.001].any()
+
+
+def beside(scene, turned):
+    """A rough plate of 20 by 20 cm, 30 cm from the form and as high as its chest; lying, or turned upright."""
+    x, z = np.meshgrid(np.arange(41) * 0.005, np.arange(41) * 0.005, indexing="ij")
+    at = np.arange(x.size).reshape(x.shape)
+    a, b, c, d = at[:-1, :-1].ravel(), at[1:, :-1].ravel(), at[1:, 1:].ravel(), at[:-1, 1:].ravel()
+    rough = np.random.default_rng(0).normal(0.0, 5e-4, x.shape)
+    points = np.stack([x, z, rough] if turned else [x, rough, z], axis=-1).reshape(-1, 3)
+    faces = np.vstack([np.column_stack([a, c, b]), np.column_stack([a, d, c])])
+    top = scene.form.vertices.max(axis=0)
+    place = np.array([top[0] + 0.3, 0.7 * top[1], 0.0])
+    return TriangleMesh(points + place, faces, np.full((len(points), 3), 40, np.uint8))
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_level_piece_beside_the_form_is_no_garment_and_one_that_hangs_is(scene, placed, turned):
+    plate = beside(scene, turned)
+    both = concatenate([placed, plate])
+    job = Job()
+    labels = label_garment(both, scene.form, SubtractConfig(), job)
+    mine = labels.garment[len(placed.vertices) :]
+    assert mine.all() if turned else not mine.any()
+    assert any("a level piece of 4" in note for note in job.notes) == (not turned)  # 20 by 20 cm, and its roughness
 
 
 def test_the_shell_is_one_manifold_piece_on_the_true_shirt(scene, placed):

@@ -6,18 +6,25 @@ import json
 from pathlib import Path
 
 import numpy as np
-from motion_shapes import random_moves, tracked_places, tracked_text
+from motion_shapes import NAMES, Moves, random_moves, tracked_places, tracked_text
 from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
 
+from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.model.pose import posed_vertices
 from vto_pipeline.avatar.motion.live import LivePose
 from vto_pipeline.avatar.motion.retarget import RetargetConfig, retarget
 from vto_pipeline.avatar.motion.timing import brought_to
 from vto_pipeline.avatar.template.template import template
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.geometry.topology import submesh
 from vto_pipeline.io.motion.read import read_motion
 from vto_pipeline.io.motion.tracked.live import LiveJoints
+from vto_pipeline.model.body import Measurements
+from vto_pipeline.model.mesh import TriangleMesh
 
 NO_LEAD = 1e-9
+SIDES = ("left", "right")
 COUNT = 20  # less than it measures over: at the last frame it knows what the whole motion tells
 
 
@@ -95,3 +102,26 @@ def test_a_leap_is_followed_in_the_time_of_the_lead_in():
     assert steps[9] < 1e-9  # at the leap itself it goes on from where it is
     assert steps[10:15].max() < 0.4 * gone
     assert_allclose(steps[15:], 0.0, atol=1e-9, rtol=0)
+
+
+def test_arms_are_kept_off_the_body_and_come_back_without_a_jump():
+    """A person whose arms hang where a wide woman has her waist, and who then holds them out."""
+    body = fit_measurements(Measurements({"stature": 1.52, "waist_girth": 1.0, "hip_girth": 1.15}, sex="female"))
+    count, hang = 60, np.deg2rad(np.r_[np.zeros(5), np.full(35, 100.0), np.full(20, 30.0)])
+    turns = np.tile(np.eye(3), (count, len(NAMES), 1, 1))
+    for name, sign in (("LeftArm", -1.0), ("RightArm", 1.0)):
+        turns[:, NAMES.index(name)] = Rotation.from_rotvec(sign * hang[:, None] * [0.0, 0.0, 1.0]).as_matrix()
+    moves = Moves(turns, np.tile([0.0, 0.95, 0.0], (count, 1)))
+    _, found = live(tracked_text(moves).splitlines(), body)
+    owner = np.array(body.joint_names)[body.weights.argmax(axis=1)]
+    arms = np.isin(owner, [f"{side}_{part}" for side in SIDES for part in ("shoulder", "elbow", "wrist")])
+    girdle = np.isin(owner, [f"{side}_clavicle" for side in SIDES])
+    shoulders = [body.joints[body.joint_names.index(f"{side}_shoulder")] for side in SIDES]
+    below = np.linalg.norm(body.bind_vertices[:, None] - shoulders, axis=2).min(axis=1) > 0.07  # m: no armpit
+    for frame in (found[25], found[39]):
+        rest, _ = submesh(TriangleMesh(frame, body.faces), ~(arms | girdle)[body.faces].any(axis=1))
+        assert 0.0 < SurfaceDistance(rest).signed(frame[arms & below]).distance.min() < 0.035  # as near as they may
+    left = [np.linalg.norm(frame - found[-1]) for frame in found[40:]]
+    assert left == sorted(left, reverse=True)
+    way, step = (np.linalg.norm(found[40] - other, axis=1).max() for other in (found[-1], found[41]))
+    assert_allclose(step / way, 1.0 - np.exp(-0.04 / 0.2), rtol=0.1)  # chords of an arc

@@ -62,6 +62,22 @@ def test_each_content_is_here_once_however_many_rows_and_addresses_name_it(web, 
     assert (tmp_path / "inputs" / index[f"{address}/right.txt"]["path"]).read_text() == "4"
 
 
+def test_copies_that_no_row_uses_are_removed(web, tmp_path):
+    _, address, _ = web
+    (tmp_path / "link").symlink_to(tmp_path)
+    rows = ordered(tmp_path, f"{address}/left.txt", f"{address}/right.txt", f"{address}/same.txt")
+    left, right, same = paths(Inputs(tmp_path / "inputs", Roots()).of_rows(rows))
+    through_a_link = Inputs(tmp_path / "link" / "inputs", Roots())
+    used = ["denim", str(tmp_path / "link" / left.relative_to(tmp_path))]
+    assert through_a_link.remove_others(used, dry_run=True) == (1, 1)
+    assert right.exists()
+    assert through_a_link.remove_others(used) == (1, 1)  # the other is of the same content, in the same folder
+    assert (left.exists(), right.parent.exists(), same.exists()) == (True, False, True)
+    assert set(read_json(tmp_path / "inputs" / INDEX)) == {f"{address}/left.txt", f"{address}/same.txt"}
+    assert Inputs(tmp_path / "inputs", Roots()).of_rows(rows)[1].data["given"]["left"]["number"] == str(right)
+    assert Inputs(tmp_path / "none", Roots()).remove_others([]) == (0, 0)
+
+
 def test_what_is_as_before_is_not_copied_again_and_what_has_changed_is(web, tmp_path):
     folder, address, fetched = web
     rows = ordered(tmp_path, f"{address}/left.txt", f"{address}/right.txt")

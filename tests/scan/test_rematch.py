@@ -18,7 +18,7 @@ from vto_pipeline.model.frames import DepthMaps
 from vto_pipeline.model.job import Job
 from vto_pipeline.scan.photos.rematch.guess import guess_surface
 from vto_pipeline.scan.photos.rematch.patches import best_mean, correlations
-from vto_pipeline.scan.photos.rematch.rematch import RematchConfig, rematch
+from vto_pipeline.scan.photos.rematch.rematch import LITTLE, RematchConfig, rematch
 from vto_pipeline.scan.photos.rematch.smooth_choice import MOST_COST, STEP_COST, peak, smooth_choice
 
 PIXEL = 0.0019
@@ -178,3 +178,23 @@ def test_a_parabola_has_its_peak_where_it_has():
     assert peak(values, 0) == 0.0
     assert best_mean(np.array([0.2, np.nan, 0.8, 0.6]), 2) == pytest.approx(0.7)
     assert best_mean(np.array([np.nan, 0.5]), 2) == -np.inf
+
+
+def test_looks_go_on_until_one_adds_little(torn, grays):
+    class Listening(Job):
+        looks = 0
+
+        def progress(self, fraction, message=""):
+            Listening.looks += "second look" in message
+
+    known = [(torn.depth > 0).sum()]
+    most = RematchConfig().rounds
+    found = rematch(grays, torn, RematchConfig(), Listening())
+    assert 1 < Listening.looks <= most
+    known += [
+        (rematch(grays, torn, RematchConfig(rounds=n + 1), Job()).depth > 0).sum() for n in range(Listening.looks)
+    ]
+    assert known[-1] == (found.depth > 0).sum()
+    added = np.diff(known) / known[:-1]
+    assert (added[:-1] >= LITTLE).all()
+    assert added[-1] < LITTLE or Listening.looks == most

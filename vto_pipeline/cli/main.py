@@ -29,6 +29,7 @@ COMMANDS = {
     "cancel": "End a run or a batch that is at work; it can be resumed.",
     "pattern": "Measure a sewing pattern, and write it in another format.",
     "between": "Make the size between two patterns, or between two meshes.",
+    "tryon": "Make a page with sliders from a batch of drapes.",
     "advise": "Advise a customer on a size: the best one, the runner-up, and the reason.",
     "fabric": "Measure a fabric's bending rigidity from hanging strips.",
     "motion": "Show what a motion holds, and carry it over to an avatar.",

@@ -120,7 +120,9 @@ def _split(lifted: Lifted, distance: SurfaceDistance, off: float, longest: float
     half = np.flatnonzero((twin > np.arange(len(twin))) & own)
     half = half[own[twin[half]]]
     length = np.linalg.norm(after.vertices[ends[half, 1]] - after.vertices[ends[half, 0]], axis=1)
-    cuts = 0.5 * length > distance.signed(after.vertices).distance[ends[half]].max(axis=1)  # its middle may be inside
+    asked, index = np.unique(ends[half], return_inverse=True)
+    off_there = distance.signed(after.vertices[asked]).distance[index.reshape(-1, 2)]
+    cuts = 0.5 * length > off_there.max(axis=1)  # its middle may be inside
     cuts[cuts] = distance.signed(after.vertices[ends[half[cuts]]].mean(axis=1)).distance < 0.0
     wanted = np.flatnonzero(cuts | (length > longest))
     chosen: list[int] = []
@@ -180,15 +182,39 @@ def _relaxed(
     factor = splu((rows[:, inner] + diags(inertia[inner])).tocsc())
     held, beside = rows[:, ~inner], ~inner
     points = np.array(patch.vertices)
-    lowest = float((distance.signed(points[free]).distance - nearest[free]).min())
+    outside = KeptOutside(distance, points[free])
+    lowest = float((outside.least - nearest[free]).min())
     for step in range(GROWTH + AT_REST):
         if inner.any():
             points[inner] = factor.solve(inertia[inner, None] * points[inner] - held @ points[beside])
         wanted = nearest[free] + min(0.0, lowest * (1.0 - (step + 1) / GROWTH))
-        near = distance.signed(points[free])
-        outward = (points[free] - near.point) / np.where(near.distance == 0.0, 1.0, near.distance)[:, None]
-        points[free] += np.maximum(wanted - near.distance, 0.0)[:, None] * outward
+        points[free] = outside.pushed(points[free], wanted)
     return points
+
+
+class KeptOutside:
+    """Keeps moving points off a mannequin: only those are looked up that may have come too near since they last were.
+
+    A signed distance changes by no more than its point moves.
+
+    Args:
+        distance: Signed distances to the mannequin [m].
+        points: Where they start [m], shape (N, 3).
+    """
+
+    def __init__(self, distance: SurfaceDistance, points: FloatArray) -> None:
+        self.distance, self.looked_up = distance, points.copy()
+        self.least = distance.signed(points).distance  # of the places looked up
+
+    def pushed(self, points: FloatArray, wanted: FloatArray) -> FloatArray:
+        """Return the points (N, 3), none nearer than wanted (N,) [m]."""
+        close = self.least - np.linalg.norm(points - self.looked_up, axis=1) < wanted
+        near = self.distance.signed(points[close])
+        self.looked_up[close], self.least[close] = points[close], near.distance
+        outward = (points[close] - near.point) / np.where(near.distance == 0.0, 1.0, near.distance)[:, None]
+        moved = points.copy()
+        moved[close] += np.maximum(wanted[close] - near.distance, 0.0)[:, None] * outward
+        return moved
 
 
 def check_lifted(lifted: Lifted, distance: SurfaceDistance, bare: BareParts | None) -> None:

@@ -11,7 +11,7 @@ from vto_pipeline.garment.loop_evidence import RIM_OUTSIDE, encloses, outside_sh
 from vto_pipeline.garment.rims import smooth_curve
 from vto_pipeline.geometry.remeshing.holes import fill_notch
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import boundary_walks, half_edges
+from vto_pipeline.geometry.topology import boundary_walks, face_normals, half_edges
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -36,6 +36,9 @@ BARE = 0.2
 OVER_CLOTH, NEARER = 0.5, 0.5
 """The line across a notch runs over nothing, and the nearest cloth is the rim. Less than this share of it may be over
 cloth, which is where cloth is so many times nearer than the rim: behind a collar, from one scan hole to the next."""
+IN_SHEET = 0.3
+"""What closes a notch runs on as the cloth beside it does: the mean cosine between their normals is larger. Round a
+sleeve that is open along two fifths of its way round it is 0.3; what closes a part of a tube's mouth has 0 or less."""
 WAVELENGTH = 0.025
 """Notches are looked for on the rim without its zigzag [m]."""
 
@@ -46,6 +49,7 @@ def close_notches(
     """Return the mesh with the notches of its rims filled, and how many there were.
 
     The line across a notch runs outside the mannequin or grazes it, and the rim that is left goes round the mannequin.
+    What closes it runs on as the cloth beside it: what would close a part of the opening stands across the cloth.
     What would cover mannequin that was seen bare is no notch but the shape of the rim, as the V of an open collar.
     Where the mannequin passes through what the line cuts off, that is the opening, and the hole is on its other side.
     A line along cloth is not across a notch: it would cut a part of the true rim off, with a second layer below it.
@@ -98,6 +102,7 @@ def _tightest_notch(
     rim is looked at, then the places beside the best.
     """
     points = mesh.vertices[half_edges(mesh)[walk, 0]]
+    beside = face_normals(mesh)[walk // 3]
     cloth, rim_there = cKDTree(mesh.vertices), cKDTree(points)
     for _ in range(2):
         points = smooth_curve(points, WAVELENGTH)
@@ -133,7 +138,7 @@ def _tightest_notch(
                 best = int(k)
         return best
 
-    candidates = _candidate_notches(points, along, at, distance, least_perimeter)[:TRIED]
+    candidates = _candidate_notches(points, beside, along, at, distance, least_perimeter)[:TRIED]
     if not candidates:
         return None
     begin, finish = np.array(candidates).T
@@ -180,7 +185,12 @@ def _between(points: FloatArray, along: FloatArray, start: int, end: int) -> Flo
 
 
 def _candidate_notches(
-    points: FloatArray, along: FloatArray, at: IntArray, distance: SurfaceDistance, least_perimeter: float
+    points: FloatArray,
+    beside: FloatArray,
+    along: FloatArray,
+    at: IntArray,
+    distance: SurfaceDistance,
+    least_perimeter: float,
 ) -> list[tuple[int, int]]:
     """Return where notches may start and end, first what leaves the roundest rim: greatest 4π area / perimeter²."""
     steps = np.arange(1, len(at) - 1)
@@ -190,23 +200,40 @@ def _candidate_notches(
     height = points @ _axis(points)
     depth = 0.5 * (height[i] + height[j]) - np.minimum.accumulate(height[j], axis=1)
     left = along[-1] - arc + across
-    round_left = _roundness_left(points, i, j, left)
-    whole = 4.0 * np.pi * np.linalg.norm(_area_vector(points)) / along[-1] ** 2
+    whole, cut_off = _area_vector(points), _cut_off(points, i, j)
+    round_left = 4.0 * np.pi * np.linalg.norm(whole - cut_off, axis=-1) / np.square(left)
+    rounder = round_left > ROUNDER * 4.0 * np.pi * np.linalg.norm(whole) / along[-1] ** 2
     notch = (arc - DETOUR * across > LEAST_DETOUR) & (depth > LEAST_DEPTH)
-    row, column = np.nonzero(notch & (left > least_perimeter) & (round_left > ROUNDER * whole))
+    runs_on = in_sheet(cut_off, beside * np.diff(along)[:, None], i, j) > IN_SHEET * arc
+    row, column = np.nonzero(notch & runs_on & (left > least_perimeter) & rounder)
     free = _outside(points[at[row]], points[j[row, column]], distance)
     row, column = row[free], column[free]
     order = np.argsort(-round_left[row, column], kind="stable")
     return [(int(at[r]), int(j[r, c])) for r, c in zip(row[order], column[order], strict=True)]
 
 
-def _roundness_left(points: FloatArray, start: IntArray, end: IntArray, length: FloatArray) -> FloatArray:
-    """Return how round the rim is that is left when the notches from start to end are closed by straight lines."""
-    swept = 0.5 * np.cumsum(np.cross(points, np.roll(points, -1, axis=0)), axis=0)
-    before = np.vstack([np.zeros(3), swept])  # area vector of the path from the first point to each
-    notch = before[end] - before[start] + np.where((end < start)[..., None], swept[-1], 0.0)
-    area = swept[-1] - notch + 0.5 * np.cross(points[start], points[end])
-    return 4.0 * np.pi * np.linalg.norm(area, axis=-1) / np.square(length)
+def _cut_off(points: FloatArray, start: IntArray, end: IntArray) -> FloatArray:
+    """Return the area vectors of what straight lines cut off a rim, from each start to its end, shape (..., 3)."""
+    swept = _sums(0.5 * np.cross(points, np.roll(points, -1, axis=0)), start, end)
+    return np.asarray(swept + 0.5 * np.cross(points[end], points[start]))
+
+
+def in_sheet(area: FloatArray, beside: FloatArray, start: IntArray, end: IntArray) -> FloatArray:
+    """Return how far notches run on as the cloth does: the mean cosine of their normals times the way round [m].
+
+    Args:
+        area: Area vector of each, along the rim [m²], shape (..., 3).
+        beside: Normals of the faces at the rim, each as long as its edge there [m], shape (L, 3).
+        start, end: Of the notches, along the rim.
+    """
+    outward = -area / np.maximum(np.linalg.norm(area, axis=-1, keepdims=True), 1e-12)
+    return np.asarray((_sums(beside, start, end) * outward).sum(axis=-1))
+
+
+def _sums(steps: FloatArray, start: IntArray, end: IntArray) -> FloatArray:
+    """Return the sums of steps (L, 3) round a loop, from each start to its end, shape (..., 3)."""
+    until = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
+    return np.asarray(until[end] - until[start] + np.where((end < start)[..., None], until[-1], 0.0))
 
 
 def _axis(points: FloatArray) -> FloatArray:

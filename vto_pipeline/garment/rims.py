@@ -20,11 +20,13 @@ from vto_pipeline.geometry.topology import (
     face_normals,
     submesh,
 )
-from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 
 LEDGE_COSINE = 0.45
 """A face near a rim that is steeper to the mannequin than this bridges the gap from cloth to body."""
+FLAP = 10.0
+"""A flap is smaller than so many squares of the width it may hang by: 20 cm² for 14 mm."""
 ROUNDS = 4
 """A rim is smoothed so often, for the arc length of a zigzag overstates the curve's and each round measures it anew."""
 BAND = 4.0
@@ -58,10 +60,11 @@ def trim_ledges(shell: TriangleMesh, mannequin: TriangleMesh, widest: float) -> 
 
 
 def drop_flaps(shell: TriangleMesh, width: float, shortest: float) -> TriangleMesh:
-    """Return the shell without what hangs on it by less than a width: erode by half of it, keep the largest piece, grow
-    back.
+    """Return the shell without what hangs on it by less than a width: erode by half of it, keep the largest piece and
+    what is too large for a flap, grow back.
 
-    Cloth between small holes hangs on nothing: they will be filled, and much of a patchy scan is such cloth.
+    Cloth between small holes hangs on nothing: they will be filled, and much of a patchy scan is such cloth. Its rims
+    are torn, so that large parts of it hang on strips; a strip from one part to another stays.
 
     Args:
         shell: The cut-out garment.
@@ -78,10 +81,30 @@ def drop_flaps(shell: TriangleMesh, width: float, shortest: float) -> TriangleMe
     if not kept_faces.any():
         return shell
     core, source = submesh(shell, kept_faces)
-    core_faces = _largest_mask(core)
-    seeds = source[np.unique(core.faces[core_faces])]
-    reach = distance_from(shell, seeds.astype(np.int32), 8.0 * radius)
-    return largest_piece(clip_to_positive(shell, 1.5 * radius - np.minimum(reach, 8.0 * radius)))
+    piece, area = component_areas(core)
+    parts = (area >= FLAP * width**2) | (area == area.max())
+    seeds = source[np.unique(core.faces[parts[piece]])]
+    reach = np.minimum(distance_from(shell, seeds.astype(np.int32), 8.0 * radius), 8.0 * radius)
+    beyond = reach - 1.5 * radius
+    beyond[shell.faces[_strips(shell, beyond)]] = -radius
+    return largest_piece(clip_to_positive(shell, -beyond))
+
+
+def _strips(shell: TriangleMesh, beyond: FloatArray) -> NDArray[np.bool_]:
+    """Return the faces of strips from one part of a shell to another, shape (F,).
+
+    Args:
+        shell: Any.
+        beyond: Of each vertex, negative in the parts, shape (V,).
+    """
+    part = np.all(beyond[shell.faces] < 0.0, axis=1)
+    piece, strip = _pieces(shell, part), _pieces(shell, ~part)
+    beside = edge_faces(shell)
+    beside = beside[beside[:, 1] >= 0]
+    beside = np.where(part[beside[:, :1]], beside, beside[:, ::-1])
+    beside = beside[part[beside[:, 0]] & ~part[beside[:, 1]]]
+    touching = np.unique(np.column_stack([strip[beside[:, 1]], piece[beside[:, 0]]]), axis=0)
+    return np.asarray(~part & (np.bincount(touching[:, 0], minlength=len(shell.faces))[strip] > 1))
 
 
 def fair_rims(shell: TriangleMesh, wavelength: float) -> TriangleMesh:
@@ -127,20 +150,21 @@ def smooth_curve(points: FloatArray, wavelength: float) -> FloatArray:
 
 def largest_piece(mesh: TriangleMesh) -> TriangleMesh:
     """Return the piece of largest area."""
-    return submesh(mesh, _largest_mask(mesh))[0]
-
-
-def _largest_mask(mesh: TriangleMesh) -> NDArray[np.bool_]:
     piece, area = component_areas(mesh)
-    return piece == int(np.argmax(area))
+    return submesh(mesh, piece == int(np.argmax(area)))[0]
 
 
 def _reached(mesh: TriangleMesh, among: NDArray[np.bool_], seeds: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return the faces connected to a seed through edges between faces of the set, shape (F,)."""
+    piece = _pieces(mesh, among)
+    return np.bincount(piece, seeds, len(mesh.faces))[piece] > 0
+
+
+def _pieces(mesh: TriangleMesh, among: NDArray[np.bool_]) -> IntArray:
+    """Return to which piece of a set each face belongs, connected through edges, shape (F,); others are alone."""
     beside = edge_faces(mesh)
     beside = beside[beside[:, 1] >= 0]
     beside = beside[among[beside].all(axis=1)]
     count = len(mesh.faces)
     graph = coo_matrix((np.ones(len(beside), np.int8), (beside[:, 0], beside[:, 1])), (count, count))
-    pieces, piece = connected_components(graph, directed=False)
-    return np.bincount(piece, seeds, pieces)[piece] > 0
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int32)

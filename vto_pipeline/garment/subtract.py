@@ -18,6 +18,7 @@ from vto_pipeline.geometry.smooth import smooth_values
 from vto_pipeline.geometry.topology import (
     component_areas,
     edges,
+    face_area_vectors,
     face_normals,
     submesh,
     vertex_normals,
@@ -37,6 +38,9 @@ LEAST_SIGMA = 1e-4
 MOST_SIGMA = 5e-3
 LARGE = 0.1
 """With pieces of a larger share of the garment it was torn, and they are cloth that will be missing."""
+LEVEL, ROUGH = 0.8, 0.02
+"""Seen from above, a board or a table that lies beside the mannequin shows more than this share of its area. Its height
+differs by less than this share of its side (standard deviation)."""
 FLOOR_REACH = 0.01
 """A board on the floor may lie so much higher than the lowest point of the mannequin [m]."""
 
@@ -122,12 +126,32 @@ def extract_garment(surface: TriangleMesh, labels: SurfaceLabels, config: Subtra
 
 def _on_floor(surface: TriangleMesh, mannequin: TriangleMesh, sigma: float, job: Job) -> NDArray[np.bool_]:
     """Return which vertices lie on or under the floor, shape (V,); none where the scan shows no floor."""
+    lying = _lying(surface, job)
     floor = floor_height(surface, float(mannequin.vertices[:, 1].min()) + FLOOR_REACH)
     if floor is None:
         job.leave_out("floor", "no level surface lies under the mannequin")
-        return np.zeros(len(surface.vertices), dtype=bool)
+        return lying
     job.measure(floor_mm=floor * 1e3)
-    return surface.vertices[:, 1] < floor + 3.0 * sigma
+    return lying | (surface.vertices[:, 1] < floor + 3.0 * sigma)
+
+
+def _lying(surface: TriangleMesh, job: Job) -> NDArray[np.bool_]:
+    """Return which vertices belong to a level piece beside the largest, as a board on a table, shape (V,): cloth that
+    is worn hangs."""
+    piece, area = component_areas(surface)
+    lying = np.zeros(len(surface.vertices), dtype=bool)
+    for k in np.flatnonzero(np.arange(len(area)) != np.argmax(area)):
+        one, source = submesh(surface, piece == k)
+        upward = face_area_vectors(one)
+        size = np.linalg.norm(upward, axis=1)
+        height = one.vertices[one.faces, 1].mean(axis=1)
+        middle = np.average(height, weights=size)
+        rough = np.sqrt(np.average(np.square(height - middle), weights=size))
+        if rough < ROUGH * np.sqrt(area[k]) and abs(upward[:, 1].sum()) > LEVEL * size.sum():
+            lying[source] = True
+            what = f"a level piece of {1e4 * area[k]:.0f} cm² at a height of {1e3 * middle:.0f} mm"
+            job.note(f"left out {what}: cloth that is worn hangs")
+    return lying
 
 
 def _distance_evidence(distance: FloatArray, sigma: float, thickness: float) -> FloatArray:

@@ -6,4 +6,5 @@ batch_page: the summary of a batch
 card, facts: a card for notebooks; the numbers of a surface
 scene, layers, packing, scales, render_colors, body_loops: its 3D view
 live/: a view of what moves now
+try_on/: sliders between the drapes of a grid
 """

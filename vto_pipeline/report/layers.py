@@ -16,20 +16,21 @@ from vto_pipeline.report.body_loops import loop_ribbons
 from vto_pipeline.report.render_colors import join_parts
 from vto_pipeline.report.scales import CLEARANCE, SCAN, STRETCH, Key, Ramp
 
-_SKIN, _CLOTH, _FORM, _MARK, _TAPE = "#d6b59c", "#6a8fc0", "#b9b5ad", "#d62728", "#2f4b7c"
+SKIN, CLOTH = "#d6b59c", "#6a8fc0"
+_FORM, _MARK, _TAPE = "#b9b5ad", "#d62728", "#2f4b7c"
 _GROUPS = ("garment", "body", "marks", "scan")
 _PLAIN = (  # artifact, name, group, colour where it has none of its own
-    ("render_mesh", "Garment", "garment", _CLOTH),
-    ("draped", "Simulated cloth", "garment", _CLOTH),
-    ("garment", "Garment as scanned", "garment", _CLOTH),
-    ("avatar", "Body", "body", _SKIN),
-    ("worn_by", "Body", "body", _SKIN),
+    ("render_mesh", "Garment", "garment", CLOTH),
+    ("draped", "Simulated cloth", "garment", CLOTH),
+    ("garment", "Garment as scanned", "garment", CLOTH),
+    ("avatar", "Body", "body", SKIN),
+    ("worn_by", "Body", "body", SKIN),
     ("mannequin_surface", "Mannequin", "body", _FORM),
     ("crossings", "Crossings", "marks", _MARK),
-    ("garment_surface", "Garment scan", "scan", _CLOTH),
-    ("body_surface", "Body scan", "scan", _SKIN),
+    ("garment_surface", "Garment scan", "scan", CLOTH),
+    ("body_surface", "Body scan", "scan", SKIN),
 )
-_MOVING = (("Garment in motion", "garment", _CLOTH), ("Body in motion", "body", _SKIN))
+_MOVING = (("Garment in motion", "garment", CLOTH), ("Body in motion", "body", SKIN))
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ def list_layers(parts: Mapping[str, Any]) -> list[PageLayer]:
     layers = []
     for artifact, name, group, color in _PLAIN:
         if artifact in parts:
-            mesh, skin = _surface(parts[artifact]), _skin(parts[artifact])
+            mesh, skin = surface_of(parts[artifact]), skin_of(parts[artifact])
             layers.append(PageLayer(name, mesh, group, color if mesh.colors is None else mesh.colors, skin=skin))
     avatar = parts.get("avatar")
     if isinstance(avatar, Avatar) and avatar.loops:
@@ -86,14 +87,14 @@ def list_layers(parts: Mapping[str, Any]) -> list[PageLayer]:
     return sorted(layers, key=lambda layer: _GROUPS.index(layer.group))
 
 
-def _skin(value: Any) -> GlbPart | None:
+def skin_of(value: Any) -> GlbPart | None:
     """Return the only part of a render mesh, if it has a picture."""
     if isinstance(value, TriangleMesh | Avatar) or len(value) != 1:
         return None
     return value[0] if value[0].texture is not None else None
 
 
-def _surface(value: TriangleMesh | Avatar | Sequence[GlbPart]) -> TriangleMesh:
+def surface_of(value: TriangleMesh | Avatar | Sequence[GlbPart]) -> TriangleMesh:
     if isinstance(value, TriangleMesh):
         return value
     return value.mesh if isinstance(value, Avatar) else join_parts(value)

@@ -83,18 +83,22 @@ const viewer = (() => {
     }
   }
 
-  /** Put a moving mesh where it is in a frame; between two frames, in between. */
-  function moveTo(geometry, frame) {
+  /** Put a moving mesh at a mean of its frames, given as pairs of a frame and its share. */
+  function blend(geometry, shares) {
     const motion = geometry.motion;
-    const first = Math.min(Math.floor(frame), motion.weights.length - 1);
-    const next = Math.min(first + 1, motion.weights.length - 1);
     const placed = motion.mean.slice();
     motion.shapes.forEach((shape, k) => {
-      const [a, b] = [motion.weights[first][k], motion.weights[next][k]];
-      const weight = motion.step * (a + (b - a) * (frame - first));
+      const weight = motion.step * shares.reduce((sum, [frame, share]) => sum + share * motion.weights[frame][k], 0);
       for (let i = 0; i < placed.length; i++) placed[i] += weight * shape[i];
     });
     place(geometry, placed);
+  }
+
+  /** Put a moving mesh where it is in a frame; between two frames, in between. */
+  function moveTo(geometry, frame) {
+    const last = geometry.motion.weights.length - 1;
+    const first = Math.min(Math.floor(frame), last);
+    blend(geometry, [[first, 1 - (frame - first)], [Math.min(first + 1, last), frame - first]]);
   }
 
   const channels = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255);
@@ -447,12 +451,19 @@ const viewer = (() => {
   frame(...SIDES.Reset);
   draw();
 
-  /** For scripts that move what is shown: places of each mesh, by number; the view goes along, by a way [m]. */
+  /** For scripts that move what is shown. */
   return {
+    /** Places of each mesh, by number; the view goes along, by a way [m]. */
     place(meshes, way) {
       meshes.forEach((places, k) => place(geometries[k], places));
       camera.target = camera.target.map((value, k) => value + way[k]);
       redraw();
+    },
+    /** Show some layers, by number, their meshes at a mean of their frames: pairs of a frame and its share. */
+    blend(numbers, shares) {
+      layers.forEach((layer, k) => (layer.visible = numbers.includes(k)));
+      for (const k of numbers) if (layers[k].shape.motion) blend(layers[k].shape, shares);
+      refresh();
     },
   };
 })();

@@ -12,7 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from vto_pipeline.avatar.motion.align import Fit, carried, fit_of
+from vto_pipeline.avatar.motion.arms import Arms
 from vto_pipeline.avatar.motion.limits import limit_turns
+from vto_pipeline.avatar.motion.retarget import posed_joints
 from vto_pipeline.avatar.motion.timing import brought_to
 from vto_pipeline.io.motion.joint_map import JointMap
 from vto_pipeline.io.motion.read import clip_of, understood
@@ -32,6 +34,8 @@ _AT_ORIGIN_M = 1e-3
 """Hips that never leave the origin by more are the origin: places count from them."""
 _LEAP_M, _LEAP_RAD = 0.4, 1.5
 """From one frame to the next: nobody goes so far, or turns a joint so far; it is another person, or a loss."""
+_OUT_S, _BACK_S = 0.04, 0.2
+"""In which an arm goes most of the way off the body, and back to where the person's is."""
 
 Places = Mapping[str, FloatArray]
 
@@ -62,6 +66,7 @@ class LivePose:
         self._first: tuple[FloatArray, FloatArray]
         self._seen: list[Places] = []
         self._last: Places = {}
+        self._arms, self._swings, self._swung = Arms(avatar), np.zeros((2, 3)), 0.0
         self._walked = np.zeros(3)
 
     def at(self, places: Places, seconds: float) -> tuple[FloatArray, FloatArray]:
@@ -78,7 +83,7 @@ class LivePose:
         if len(self._seen) < _MEASURED:
             self._seen.append(places)
             self._measure()
-        poses, translations = self._posed(places)
+        poses, translations = self._off_body(*self._posed(places), seconds)
         motion = AvatarMotion(
             self._avatar.joint_names,
             np.stack([self._first[0], poses]),
@@ -131,6 +136,17 @@ class LivePose:
         poses, _ = limit_turns(poses, self._avatar.joint_names)
         pelvis = self._avatar.joints[self._avatar.joint_names.index("pelvis")]
         return poses[0], root[0] - pelvis
+
+    def _off_body(self, poses: FloatArray, translation: FloatArray, seconds: float) -> tuple[FloatArray, FloatArray]:
+        """Return a pose whose arms are kept off the body; they go out of the way fast, and come back slowly."""
+        pelvis = self._avatar.joints[self._avatar.joint_names.index("pelvis")]
+        turn, place = posed_joints(self._avatar, poses[None], (translation + pelvis)[None])
+        needed = self._arms.swings(turn, place)[0]
+        returns = np.linalg.norm(self._swings, axis=1) > np.linalg.norm(needed, axis=1)
+        left = np.exp((self._swung - seconds) / np.where(returns, _BACK_S, _OUT_S))
+        self._swings, self._swung = needed + left[:, None] * (self._swings - needed), seconds
+        turn = self._arms.swung(turn, self._swings[None])
+        return matrix_vectors(local_rotations(self._avatar.parents.tolist(), turn))[0], translation
 
     def _led_in(self, wanted: tuple[FloatArray, FloatArray], seconds: float) -> tuple[FloatArray, FloatArray]:
         """Return turns of the joints and translation between where the lead-in begins and what is wanted."""

@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from vto_pipeline.avatar.motion.align import carry_over
+from vto_pipeline.avatar.motion.arms import Arms, eased
 from vto_pipeline.avatar.motion.balance import Balance, balance
 from vto_pipeline.avatar.motion.figures import plant_drift, spikes
 from vto_pipeline.avatar.motion.foot_skate import hold_feet
@@ -52,6 +53,7 @@ class MotionFigures:
         below_floor: Deepest that a heel or ball dips below the floor [m].
         balance: The zero moment point.
         limited: Joint -> share of frames in which its turn was limited.
+        arms_moved: Share of frames in which an arm had no room beside the body, and was moved off it.
     """
 
     plants: int
@@ -62,6 +64,7 @@ class MotionFigures:
     below_floor: float
     balance: Balance
     limited: dict[str, float]
+    arms_moved: float
 
 
 def retarget(
@@ -95,6 +98,12 @@ def retarget(
         turn, root = hold_feet(turn, place, planted, avatar, clip.frame_time)
         poses = matrix_vectors(local_rotations(avatar.parents.tolist(), turn))
         turn, place = posed_joints(avatar, poses, root)
+    job.progress(0.5, "keep the arms off the body")
+    arms = Arms(avatar)
+    swings = arms.swings(turn, place)
+    turn = arms.swung(turn, eased(swings, clip.frame_time))
+    poses = matrix_vectors(local_rotations(avatar.parents.tolist(), turn))
+    turn, place = posed_joints(avatar, poses, root)
     after = contact_places(turn, place, avatar)
     job.progress(0.7, "find the zero moment point")
     figures = MotionFigures(
@@ -106,6 +115,7 @@ def retarget(
         below_floor=float(max(-after[..., 1].min(), 0.0)),
         balance=balance(turn, place, avatar, clip.frame_time),
         limited=limited,
+        arms_moved=float(swings.any(axis=(1, 2)).mean()),
     )
     _report(figures, before, place, clip.frame_time, job)
     pelvis = avatar.joints[avatar.joint_names.index("pelvis")]
@@ -145,6 +155,8 @@ def _report(figures: MotionFigures, contacts: FloatArray, place: FloatArray, fra
     if often:
         said = ", ".join(f"{name} {part:.0%}" for name, part in sorted(often.items(), key=lambda one: -one[1]))
         job.warn(f"joints bent further than people can, in a share of the frames, were limited: {said}")
+    if figures.arms_moved:
+        job.note(f"arms were moved off the body in {figures.arms_moved:.0%} of the frames")
     if figures.drift_after > _DRIFT_M and figures.plants:
         job.warn(f"planted feet drift by up to {1e3 * figures.drift_after:.1f} mm: a leg does not reach")
     if figures.spikes_after > figures.spikes_before:

@@ -136,14 +136,18 @@ def _rows_of(case: SolverCase, watch: Watch) -> Iterator[Row]:
     count = len(scene.start)
     fine: dict[str, Value] = {**case.settings, "substeps": case.reference}
     yield watch.row(case.name, "reference", fine, count, lambda: reference()[1])
+    usual = choose_method(scene.model, scene.start, None, None, None)
     for method in METHODS:
         for substeps, sweeps in _budgets(scene, method, case.factors):
+            default = (method, substeps, sweeps) == (usual.method, usual.substeps, usual.sweeps)
             spent: dict[str, Value] = {**case.settings, "substeps": substeps, "sweeps": sweeps}
             config = StepConfig.model_validate({"solver": method, "substeps": substeps, "sweeps": sweeps})
-            measure = partial(_measure, case, scene, config, lambda: reference()[0])
+            given = replace(case, most=inf) if default else case  # what stands on the report card is always measured
+            measure = partial(_measure, given, scene, config, lambda: reference()[0])
             row = watch.row(case.name, method, spent, count, measure)
             yield row
-            if row.seconds > case.patience:
+            cheaper = method == usual.method and substeps * sweeps < usual.substeps * usual.sweeps
+            if row.seconds > case.patience and not cheaper:
                 break
 
 

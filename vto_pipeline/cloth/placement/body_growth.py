@@ -63,6 +63,11 @@ class BodyGrowth(NamedTuple):
         return self.crossing, sum(len(piece.astray()) for piece in self.pieces)
 
     @property
+    def thinned(self) -> int:
+        """After how many steps of thinning the body begins."""
+        return len(self.body.keyframes) - 1
+
+    @property
     def pierced(self) -> int:
         """How many limbs go through cloth."""
         return sum(len(places) > 0 for piece in self.pieces for places in piece.pierced)
@@ -94,7 +99,9 @@ def plan_body_growth(body: TriangleMesh, garment: TriangleMesh, job: Job) -> Bod
     Where it crosses however thin, or a limb goes through another opening than is there for it, the garment is not about
     the body, and is led there: sleeve by sleeve onto the limbs, as a whole, part by part about the body, and about
     thinner ones. Of all that was tried and is still worn there, the one with the fewest limbs through cloth is taken,
-    which no move of a little frees; among these that with the least crossing and the fewest limbs astray.
+    which no move of a little frees; among these that with the least crossing and the fewest limbs astray. Where a way
+    is free of faults only about limbs thinned to lines, further ones are tried: that body has far to grow, through
+    cloth that lies anyhow about it.
 
     A garment that is too small for where it is worn starts larger: tight is no reason to be worn elsewhere, a skirt
     about the neck.
@@ -114,8 +121,8 @@ def plan_body_growth(body: TriangleMesh, garment: TriangleMesh, job: Job) -> Bod
     def best_of(ways: Iterable[TriangleMesh], best: BodyGrowth) -> BodyGrowth:
         for led in ways:
             if area[worn & _enclosed(led, body)].sum() >= enough:
-                best = min(best, thinning.growth(led), key=lambda one: (one.pierced, *one.fault))
-            if best.fault == (0, 0):
+                best = min(best, thinning.growth(led), key=lambda one: (one.pierced, *one.fault, one.thinned))
+            if best.fault == (0, 0) and best.thinned < _LINES:
                 break
         return best
 

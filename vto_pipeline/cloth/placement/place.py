@@ -28,6 +28,8 @@ _CLOSE = 0.9  # of the best coarse worth: these are looked at again with fine cu
 _ALIKE = 0.98  # as good, but for where the cubes happen to lie
 _LARGER, _STEPS = 1.2, 4  # a garment may start up to twice as large as it is
 _FALLING = 0.85  # of the best worth yet: larger garments need not be tried
+_FACING = 0.85  # of the best score: with more, the score does not tell a garment's front from its back
+_ABOUT_FACE = np.diag([-1.0, 1.0, -1.0])
 _DEEP = 0.01  # m
 _HEIGHTS = 6  # tried where limbs go through cloth
 _WORTH_A_TRY = 0.5  # of the score of the first place: less is beside the body
@@ -124,6 +126,7 @@ def find_placement(
         )
     if stands.score < config.turned_well * best.score:
         best = _best_orientation_if_larger(metres, cubes, config, turns)
+    best = _facing_as_files_do(metres, cubes, best, stands, config)
     as_turned = 1.0 if (best.turn == stands.turn).all() else _relative_score(stands.score, best.score)
     if as_turned >= _ALIKE:
         best = stands
@@ -274,6 +277,31 @@ def _best_orientation_if_larger(
     relative = sum(one / max(one.max(), 1e-9) for one in scores[fits : fits + 2])
     turn = turns[int(np.argmax(relative))]
     return VoxelFit(garment, body, 1e-3 * config.cube_mm, config.cloth_in_body).best_placement(turn)
+
+
+def _facing_as_files_do(
+    garment: TriangleMesh, body: BodyCubes, best: VoxelPlacement, stands: VoxelPlacement, config: PlaceConfig
+) -> VoxelPlacement:
+    """Return the best place, or that the other way round if so the front of the file is the front of the body.
+
+    Files have the front at +z where y is up, and at -y where z is up. A body fills a garment worn back to front almost
+    as well, or better, so the score counts only where it is clear.
+
+    Args:
+        garment: As large as it is [m].
+        body: To be inside.
+        best: Its best place.
+        stands: Its best place as it is turned in the file.
+        config: Search.
+    """
+    if not _is_upright(best.turn) or best.turn[0, 0] != -1.0:
+        return best
+    turn = _ABOUT_FACE @ best.turn
+    if (turn == stands.turn).all():
+        other = stands
+    else:
+        other = VoxelFit(garment, body, 1e-3 * config.cube_mm, config.cloth_in_body).best_placement(turn)
+    return other if other.score >= _FACING * best.score else best
 
 
 def _enlarge_until_body_inside(

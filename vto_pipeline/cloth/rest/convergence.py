@@ -144,7 +144,7 @@ def relax_to_rest(
         looks += 1
         share = looks * LOOK / limits.seconds
         cut_short = stepper.out_of_time and after.time < result.state.time + _WHOLE * span
-        moved, brief = _rms(after.positions - before), span < LOOK or cut_short
+        moved, brief = rms(after.positions - before), span < LOOK or cut_short
         if newton_steps.diverged(residual, moved):
             stepper.contact_memory = known
             continue
@@ -154,21 +154,21 @@ def relax_to_rest(
                 "the garment has fallen off the body: nothing holds it",
                 hint="does it go around the body, right way up, and is it small enough?",
             )
-        if residual >= limits.residual or _rms(after.positions - stood_at) > _THERE * limits.error:
+        if residual >= limits.residual or rms(after.positions - stood_at) > _THERE * limits.error:
             stood, stood_at = 0.0, after.positions
             newton_steps.indefinite_step = np.inf
         elif stepper.was_positive_definite:
             stood += span
         if not brief:  # a shorter time tells nothing about rest
             moves.append(moved)
-            drifts.append(0.5 * _rms(after.positions - earlier) if len(moves) > 1 else moved)
+            drifts.append(0.5 * rms(after.positions - earlier) if len(moves) > 1 else moved)
             earlier = before
             whole = newton_steps.took_full_step and len(moves) > 1
             stable = whole or stood >= _FOLDS * newton_steps.indefinite_step
             to_come = max(moves[-2:]) if whole else max(moved, _still_to_come(drifts))
             result.error = max(to_come, _VAGUE) if stepper.can_use_exact_stiffness and not stable else to_come
             if not exact:
-                result.error += np.inf if coarse is None else _rms(after.positions - coarse) / 3.0
+                result.error += np.inf if coarse is None else rms(after.positions - coarse) / 3.0
         seconds = time.perf_counter() - began
         row = TraceRow(seconds, stepper.steps, 1e3 * result.error, result.residual, contacts=stepper.pushing_contacts)
         result.trace.append(row)
@@ -206,7 +206,8 @@ def relax_to_rest(
     return result
 
 
-def _rms(moves: FloatArray) -> float:
+def rms(moves: FloatArray) -> float:
+    """Return the root mean square length of these vectors, shape (V, 3)."""
     return float(np.sqrt((moves**2).sum(axis=1).mean()))
 
 

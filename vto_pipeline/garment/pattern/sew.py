@@ -68,7 +68,7 @@ def sew(pattern: Pattern, config: SewConfig, job: Job) -> Sewn:
     unplaced = [panel.name for panel in pattern.panels if panel.placement is None]
     if unplaced:
         problem = f"the file does not say where panels stand in space: {', '.join(unplaced[:5])}"
-        raise GarmentError(problem, hint="JSON of GarmentCode does, and what vto pattern writes of it")
+        raise GarmentError(problem, hint="JSON of GarmentCode does; for others, vto pattern --plan FILE does")
     edge = 1e-3 * config.edge_mm
     samples = sample_edges(pattern, edge)
     flat = [triangulate_panel(panel, samples, edge) for panel in pattern.panels]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -85,6 +85,28 @@ class Inputs:
             files = list_files(address)
             self._here[address] = self._known(address, files) or self._copied(address, files)
         return self._here[address]
+
+    def remove_others(self, used: Collection[str], dry_run: bool = False) -> tuple[int, int]:
+        """Remove the copies that are none of these paths, nor what they lie in; return how many and their size [B].
+
+        Args:
+            used: What rows were given.
+            dry_run: Only count.
+        """
+        here, paths = self._folder.resolve(), [Path(one).resolve() for one in used]
+        kept = {path.relative_to(here).parts[0] for path in paths if path.is_relative_to(here)}
+        count = size = 0
+        for copy in sorted(self._folder.glob("[!.]*/")):
+            if copy.name in kept:
+                continue
+            count += 1
+            size += sum(path.stat().st_size for path in copy.rglob("*") if path.is_file())
+            if not dry_run:
+                shutil.rmtree(copy)
+        if count and not dry_run:
+            self._index = {key: one for key, one in self._index.items() if (self._folder / str(one["path"])).exists()}
+            write_json(self._folder / INDEX, self._index)
+        return count, size
 
     def _known(self, address: str, files: Sequence[RemoteFile]) -> Path | None:
         entry = self._index.get(address)

@@ -45,6 +45,7 @@ def motion_facts(
         "below_floor_mm": 1e3 * figures.below_floor,
         "balanced_share": figures.balance.inside_share,
         "limited_share": figures.limited,
+        "arms_moved_share": figures.arms_moved,
         "limbs_crossing": list(crossing),
     }
 
@@ -63,6 +64,7 @@ def motion_lines(facts: dict[str, Any]) -> list[str]:
         ("frames with a jerk", f"{facts['spikes_before']} before, {facts['spikes_after']} after"),
         ("deepest below the floor", f"{facts['below_floor_mm']:.1f} mm"),
         ("zero moment point inside", "no foot on the floor" if share is None else f"{share:.0%} of the frames"),
+        ("arms moved off the body", f"{facts['arms_moved_share']:.0%} of the frames"),
         ("limbs through the body", "{} of {} frames looked at".format(*facts["limbs_crossing"])),
     ]
     return table_lines(("", ""), rows)[2:]

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 @click.option("--base", default="M", show_default=True, metavar="SIZE", help="The size that others are graded from.")
 @click.option("--format", "form", type=click.Choice(("json", "dxf", "svg")), default="json", help="Of graded sizes.")
 @click.option("--unit", type=click.Choice(sorted(LENGTH_M)), help="Unit of length, in place of the file's.")
+@click.option("--plan", type=PATH, metavar="FILE", help="Where panels stand and what is sewn to what.")
 @click.option(
     "--seams",
     default="auto",
@@ -59,6 +60,7 @@ def pattern_command(
     base: str,
     form: str,
     unit: str | None,
+    plan: Path | None,
     seams: str,
     fabric: str,
 ) -> None:
@@ -71,6 +73,7 @@ def pattern_command(
     vto pattern tee.json
     vto pattern P1043.dxf --type trousers
     vto pattern shirt.dxf --size M -o shirt_M.svg
+    vto pattern tee.svg --plan sewing.yaml -o tee.json
     vto pattern tee.json --sizes S,M,L,XL --base M -o tee_sizes/ --format dxf
     vto pattern patterns/
     vto pattern scanned_tee.ply --seams seams.yaml -o tee.json -o tee.svg
@@ -81,6 +84,8 @@ def pattern_command(
     from vto_pipeline.model.job import Job
 
     files = _files(paths)
+    if plan is not None and (sizes is not None or len(files) != 1):
+        raise ConfigError("--plan takes one pattern, and does not go with --sizes")
     if sizes is not None:
         if len(files) != 1 or size is not None:
             raise ConfigError("--sizes takes one pattern, and does not go with --size")
@@ -92,12 +97,14 @@ def pattern_command(
     if len(paths) == 1 and not paths[0].is_dir():
         job = Job()
         if files[0].suffix.lower() in MESHES:
-            if size is not None:
-                raise ConfigError("--size goes with patterns, and a mesh is given")
+            if size is not None or plan is not None:
+                raise ConfigError("--size and --plan go with patterns, and a mesh is given")
             taken = take_apart(files[0], seams, fabric, unit, job)
             _describe(session, files[0], taken.pattern, outputs, kind, job, taken)
         else:
             pattern = _sized(read_pattern(files[0], unit=unit, job=job), size)
+            if plan is not None:
+                pattern = _as_planned(pattern, plan, job)
             _describe(session, files[0], pattern, outputs, kind, job, None)
         return
     if outputs:
@@ -183,6 +190,16 @@ def _describe(
 
 def _sized(pattern: Pattern, size: str | None) -> Pattern:
     return pattern if size is None else pattern.of_size(size)
+
+
+def _as_planned(pattern: Pattern, plan: Path, job: Job) -> Pattern:
+    from vto_pipeline.garment.pattern.planned import planned
+    from vto_pipeline.io.patterns.sewing_plan import read_sewing_plan
+
+    try:
+        return planned(pattern, read_sewing_plan(plan), job)
+    except InputError as e:
+        raise InputError(e.problem, where=e.where or str(plan), hint=e.hint) from None
 
 
 def _row(path: Path, size: str | None, unit: str | None) -> dict[str, Any]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from vto_pipeline.cli.tables import table_lines
 from vto_pipeline.garment.pattern.figures import SeamFigures, panel_figures, seam_figures
+from vto_pipeline.io.patterns.loops import edges_length
 from vto_pipeline.model.pattern import Pattern
 
 
@@ -53,7 +54,7 @@ def pattern_lines(pattern: Pattern) -> list[str]:
     lines = table_lines(heads, rows)
     seams = _seams(pattern)
     if not seams:
-        return [*lines, "", "no stitches in the file"]
+        return [*lines, "", "no stitches in the file; a plan names edges by these numbers:", "", *_edge_lines(pattern)]
     sewn = []
     for size, seam in seams:
         first, second = (f"{1e3 * length:.1f}" for length in seam.lengths)
@@ -65,3 +66,13 @@ def pattern_lines(pattern: Pattern) -> list[str]:
 def _seams(pattern: Pattern) -> list[tuple[str, SeamFigures]]:
     """Return each size and seam."""
     return [(size, seam) for size in pattern.sizes for seam in seam_figures(pattern.of_size(size))]
+
+
+def _edge_lines(pattern: Pattern) -> list[str]:
+    """Return the table of all edges: number, length, and where they begin and end."""
+    rows = []
+    for panel in pattern.of_size(pattern.sizes[0]).panels:
+        for number, edge in enumerate(panel.edges):
+            ends = [f"{1e3 * x:.0f}, {1e3 * y:.0f}" for x, y in edge.points[[0, -1]]]
+            rows.append((panel.name, str(number), f"{1e3 * edges_length([edge]):.1f}", edge.shape, *ends))
+    return table_lines(("panel", "edge", "mm", "shape", "from mm", "to mm"), rows)

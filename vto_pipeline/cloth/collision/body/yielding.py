@@ -15,15 +15,18 @@ from numpy.typing import NDArray
 
 from vto_pipeline.geometry.intersections import self_intersections
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.geometry.smooth import neighbour_mean
 from vto_pipeline.geometry.topology import vertex_normals
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.motion import BodyPath
 
-_STEP, _STEPS = 3e-3, 10  # m of sinking at a time, and how often: less than 30 mm on either side
-_SMOOTHINGS = 2  # times that sinking is averaged with that of neighbours
+_STEP, _STEPS = 3e-3, 15  # m of sinking at a time, and how often: less than 45 mm on either side
+_SMOOTHINGS = 2  # times that sinking, or the bottom of a fold, is averaged with that of neighbours
+_UNFOLDINGS, _RINGS = 10, 2  # how often folds that are left are smoothed at most, and how far about them
 _ROOM = 2.0  # skins between parts of the body that come near each other: one for the cloth on either
+_HEMS = 3.0  # times that where cloth is carried along: a closing groin draws it in by its hem, in several layers
 _REMEMBERED = 3  # frames
 
 
@@ -37,8 +40,8 @@ class YieldingBody:
     """
 
     def __init__(self, path: BodyPath, skin: float, about: NDArray[np.int64]) -> None:
-        self._posed, self._room = path, _ROOM * skin
-        self._about = about[~_pressed(TriangleMesh(path.at(0.0), path.faces), about, self._room)]
+        self._posed, self._room = path, _HEMS * _ROOM * skin
+        self._about = about[~_pressed(TriangleMesh(path.at(0.0), path.faces), about, _ROOM * skin)]
         self._known: OrderedDict[int, tuple[int, FloatArray]] = OrderedDict()
         self.path = BodyPath(self._at, path.faces, path.frames, path.frame_time)
 
@@ -93,26 +96,48 @@ def give_way(
 def sunken(mesh: TriangleMesh, about: NDArray[np.int64], room: float) -> FloatArray:
     """Return how the skin moves so that its parts leave room between them, as far as that goes [m], shape (V, 3).
 
+    The bottom of a deep fold turns inside out under skinning, and has no side that could sink. It is smoothed, as flesh
+    that is squeezed there fills it.
+
     Args:
         mesh: A body.
         about: Its vertices that may sink, shape (N,).
         room: To leave [m].
     """
     moved = np.zeros_like(mesh.vertices)
-    corners = mesh.faces.reshape(-1)
-    around = np.roll(mesh.faces, 1, axis=1).reshape(-1)
-    count = np.bincount(corners, minlength=len(moved)) + 1.0
-    for _ in range(_STEPS):
-        now = TriangleMesh(mesh.vertices + moved, mesh.faces)
-        about = about[_pressed(now, about, room)]
-        if len(about) == 0:
+    mean = neighbour_mean(mesh)
+    steps = _STEPS
+    for _ in range(_UNFOLDINGS + 1):
+        pressed = about
+        while steps > 0:
+            now = TriangleMesh(mesh.vertices + moved, mesh.faces)
+            pressed = pressed[_pressed(now, pressed, room)]
+            if len(pressed) == 0:
+                break
+            sinks = np.zeros(len(moved))
+            sinks[pressed] = _STEP
+            for _ in range(_SMOOTHINGS):
+                sinks = 0.5 * (sinks + mean @ sinks)
+            moved -= sinks[:, None] * vertex_normals(now)
+            steps -= 1
+        places = mesh.vertices + moved
+        folded = _folded(TriangleMesh(places, mesh.faces), about)
+        if not folded.any():
             break
-        sinks = np.zeros(len(moved))
-        sinks[about] = _STEP
+        for _ in range(_RINGS):
+            folded |= mean @ folded > 0.0
         for _ in range(_SMOOTHINGS):
-            sinks = (sinks + np.bincount(corners, sinks[around], len(moved))) / count
-        moved -= sinks[:, None] * vertex_normals(now)
+            places[folded] = 0.5 * (places + mean @ places)[folded]
+        moved = places - mesh.vertices
     return moved
+
+
+def _folded(mesh: TriangleMesh, about: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return which of these vertices belong to triangles that meet others, shape (V,)."""
+    chosen, crossing = np.zeros((2, len(mesh.vertices)), np.bool_)
+    chosen[about] = True
+    crossing[mesh.faces[self_intersections(mesh)]] = True
+    return chosen & crossing
 
 
 def _pressed(mesh: TriangleMesh, about: NDArray[np.int64], room: float) -> NDArray[np.bool_]:

@@ -3,7 +3,6 @@
 read: a file as a pattern
 entities, texts: what a block holds, in curves and in words
 piece: a block as a panel
-fold: half a panel opened at its mirror line
 borders: where one edge of an outline ends and the next begins
 stitch_texts, placement_text: stitches, and where a panel stands in space, in words
 write: a pattern as a file of release 12

@@ -11,9 +11,9 @@ from vto_pipeline.errors import FormatError
 from vto_pipeline.io.patterns.dxf import layers
 from vto_pipeline.io.patterns.dxf.borders import split_at_borders
 from vto_pipeline.io.patterns.dxf.entities import Piece
-from vto_pipeline.io.patterns.dxf.fold import Fold, fold_of
 from vto_pipeline.io.patterns.dxf.placement_text import placement_of
 from vto_pipeline.io.patterns.dxf.texts import key_and_value
+from vto_pipeline.io.patterns.fold import Fold, fold_of
 from vto_pipeline.io.patterns.loops import JOIN_M, Chain, Joined, anticlockwise, edges_area, join
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.pattern import Edge, InnerLine, Notch, Panel
@@ -54,23 +54,14 @@ def panel_of(piece: Piece, block: str, scale: float, notes: list[str]) -> Panel:
     edges = split_at_borders(anticlockwise(outline), turns)
     cut = split_at_borders(anticlockwise(cut), turns) if cut else ()
     mirror = fold_of(chains.get(layers.MIRROR, []))
-    if mirror is not None:
-        fold = Fold(mirror)
-        edges = split_at_borders(edges, np.concatenate([turns, mirror])) if len(turns) else edges
-        if fold.cuts_off(edges):
-            edges, lines, notches = fold.opened(edges), list(fold.lines(lines)), fold.notches(notches)
-            drills = fold.drills(drills)
-            cut = fold.opened(cut) if cut and fold.cuts_off(cut) else ()
-            notes.append(f"block {block}: drawn as a half, opened at its mirror line")
-        else:
-            lines.append(InnerLine("mirror", chains[layers.MIRROR][0].edges))
-    grain = fold_of(chains.get(layers.GRAIN, []))
+    if mirror is not None and len(turns):
+        edges = split_at_borders(edges, np.concatenate([turns, mirror]))
     _note_the_rest(piece, block, notes)
-    return Panel(
+    panel = Panel(
         values.get("PIECE NAME") or block,
         edges,
         values.get("SIZE", ""),
-        grain,
+        fold_of(chains.get(layers.GRAIN, [])),
         notches,
         tuple(lines),
         drills if len(drills) else None,
@@ -78,6 +69,12 @@ def panel_of(piece: Piece, block: str, scale: float, notes: list[str]) -> Panel:
         placement=next(filter(None, (placement_of(text) for _, text in piece.texts)), None),
         notes=_remarks(piece),
     )
+    if mirror is None:
+        return panel
+    if Fold(mirror).cuts_off(edges):
+        notes.append(f"block {block}: drawn as a half, opened at its mirror line")
+        return Fold(mirror).opened_panel(panel)
+    return replace(panel, lines=(*panel.lines, InnerLine("mirror", chains[layers.MIRROR][0].edges)))
 
 
 def _remarks(piece: Piece) -> tuple[str, ...]:

@@ -34,8 +34,8 @@ SUPPORT_PX = 2.0
 """Depth maps within this distance show a place of the surface."""
 FARTHEST_PX = 40.0
 """Nothing is guessed farther than this from all confirmed depth."""
-AGAIN_PX = 20.0
-"""So near to what a look has found, the guess is better than before, and the next one looks again."""
+LITTLE = 0.002
+"""A look that adds a smaller share to the depth is the last."""
 LEAST_COSINE = 0.17
 """Photos that see a place at a steeper slant than 80 degrees tell nothing."""
 PASSES = 2
@@ -56,7 +56,7 @@ class RematchConfig(Config):
     """Settings of the second look."""
 
     rounds: int = Field(
-        default=3, ge=0, le=10, description="Each reaches further into gaps; 0 leaves the second look out"
+        default=6, ge=0, le=10, description="At most; each reaches further into gaps; 0 leaves the second look out"
     )
     views: int = Field(default=7, ge=3, le=20, description="Photos of a place that are compared, the least slanted")
     needed: int = Field(default=2, ge=1, le=12, description="Photos that must each find the place that is chosen")
@@ -105,14 +105,14 @@ def rematch(grays: Iterable[NDArray[np.uint8]], maps: DepthMaps, config: Rematch
         np.asarray(np.linalg.inv(maps.world_from_cam), dtype=np.float64),
     )
     before = int((maps.depth > 0).sum())
-    new: FloatArray | None = None
+    known = before
     for number in range(config.rounds):
-        maps, new = _round(photos, maps, new, pixel, config)
-        job.progress(0.95 + 0.05 * (number + 1) / config.rounds, f"second look {number + 1} of {config.rounds}")
-        if len(new) == 0:
+        maps = _round(photos, maps, pixel, config)
+        last, known = known, int((maps.depth > 0).sum())
+        job.progress(0.95 + 0.05 * (number + 1) / config.rounds, f"second look {number + 1} of {config.rounds} at most")
+        if known - last < LITTLE * last:
             break
-    added = int((maps.depth > 0).sum()) - before
-    job.measure(rematched_share=round(added / (before + added), 3))
+    job.measure(rematched_share=round(1.0 - before / known, 3))
     return maps
 
 
@@ -121,19 +121,16 @@ def look_bytes(photos: int, pixels: int) -> float:
     return photos * pixels * MAP_BYTES + PATCH_BYTES * min(MOST_PATCHES, photos * pixels / PATCH_PIXELS)
 
 
-def _round(
-    photos: _Photos, maps: DepthMaps, last_new: FloatArray | None, pixel: float, config: RematchConfig
-) -> tuple[DepthMaps, FloatArray]:
-    """One look, near what the last one found, if there was one. Returns the maps and the places found, (N, 3)."""
+def _round(photos: _Photos, maps: DepthMaps, pixel: float, config: RematchConfig) -> DepthMaps:
+    """One look at all that lacks depth: where the last one found nothing, too, for the guess is a better one now."""
     mesh, points = guess_surface(maps, pixel)
     shown = supporting_views(depth_only(maps), mesh.vertices, SUPPORT_PX * pixel) >= 2
-    near, reach = (points, FARTHEST_PX) if last_new is None else (last_new, AGAIN_PX)
-    distance, _ = cKDTree(near).query(mesh.vertices, distance_upper_bound=reach * pixel)
+    distance, _ = cKDTree(points).query(mesh.vertices, distance_upper_bound=FARTHEST_PX * pixel)
     distance[shown] = np.inf
     nearest = np.argsort(distance, kind="stable")[: min(MOST_PATCHES, int(np.isfinite(distance).sum()))]
     lacking: IntArray = np.sort(nearest).astype(np.int32)
     if len(lacking) == 0:
-        return maps, np.zeros((0, 3))
+        return maps
     middle = int(np.ceil(config.reach_px / STEP_PX))
     offsets: FloatArray = np.asarray(STEP_PX * pixel * np.arange(-middle, middle + 1), dtype=np.float64)
     for _ in range(PASSES):
@@ -154,7 +151,7 @@ def _round(
     ways[views[place, other], lacking[place]] = own[place, other]
     new = np.zeros(len(mesh.vertices), dtype=bool)
     new[lacking[sure]] = True
-    return _filled(maps, last, normals, moved, ways, new), mesh.vertices[new]
+    return _filled(maps, last, normals, moved, ways, new)
 
 
 def _least_slanted(

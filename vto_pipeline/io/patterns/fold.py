@@ -1,4 +1,4 @@
-"""A panel drawn as one half, with the line along which the cloth is folded: opened."""
+"""A panel flipped, and one that is drawn as a half, with the line along which the cloth is folded: opened."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from vto_pipeline.io.patterns.loops import Chain, edges_points, reversed_edge
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.model.pattern import Edge, InnerLine, Notch
+from vto_pipeline.model.pattern import Edge, InnerLine, Notch, Panel
 
 _ON_LINE_M = 5e-4  # drawn by hand or rounded to a hundredth of an inch
 
@@ -46,12 +46,16 @@ class Fold:
         one_side = min(float(offset.max()), -float(offset.min())) <= _ON_LINE_M
         return one_side and any(self._lies_on(edge) for edge in loop)
 
-    def opened(self, loop: Sequence[Edge]) -> tuple[Edge, ...]:
-        """Return an outline and its mirror picture as one, without the edges along the fold."""
+    def half(self, loop: Sequence[Edge]) -> list[int]:
+        """Return the numbers of the edges of an outline that do not lie along the fold, in order from its end."""
         on = [self._lies_on(edge) for edge in loop]
         first = next(k for k in range(len(loop)) if on[k - 1] and not on[k])
         order = [(first + k) % len(loop) for k in range(len(loop))]
-        half = [loop[k] for k in order if not on[k]]
+        return [k for k in order if not on[k]]
+
+    def opened(self, loop: Sequence[Edge]) -> tuple[Edge, ...]:
+        """Return an outline and its mirror picture as one, without the edges along the fold."""
+        half = [loop[k] for k in self.half(loop)]
         other = [reversed_edge(self.mirrored_edge(edge)) for edge in reversed(half)]
         whole = [*half, *other]
         joint = len(half)  # the halves meet on the line, to within what was taken for on it
@@ -61,18 +65,43 @@ class Fold:
             whole[k] = replace(whole[k], points=points)
         return tuple(whole)
 
+    def opened_panel(self, panel: Panel) -> Panel:
+        """Return a panel that the line cuts off, with its other half."""
+        return replace(
+            panel,
+            edges=self.opened(panel.edges),
+            lines=self.lines(panel.lines),
+            notches=self.notches(panel.notches),
+            drills=None if panel.drills is None else self.drills(panel.drills),
+            cut=self.opened(panel.cut) if panel.cut and self.cuts_off(panel.cut) else (),
+        )
+
+    def mirrored_panel(self, panel: Panel) -> Panel:
+        """Return a panel on the other side of the line, anticlockwise: its edges come in reverse."""
+
+        def turned(loop: Sequence[Edge]) -> tuple[Edge, ...]:
+            return tuple(reversed_edge(self.mirrored_edge(edge)) for edge in reversed(loop))
+
+        return replace(
+            panel,
+            edges=turned(panel.edges),
+            grain=None if panel.grain is None else self.mirrored(panel.grain),
+            lines=tuple(InnerLine(one.kind, tuple(map(self.mirrored_edge, one.curves))) for one in panel.lines),
+            notches=tuple(map(self._mirrored_notch, panel.notches)),
+            drills=None if panel.drills is None else self.mirrored(panel.drills),
+            cut=turned(panel.cut),
+            placement=None,
+        )
+
     def notches(self, notches: Sequence[Notch]) -> tuple[Notch, ...]:
         """Return notches and their mirror pictures."""
+        off = [one for one in notches if abs(self.offset(one.position[None])[0]) > _ON_LINE_M]
+        return (*notches, *map(self._mirrored_notch, off))
+
+    def _mirrored_notch(self, notch: Notch) -> Notch:
         turn = 2.0 * float(np.arctan2(self.along[1], self.along[0]))
-        return tuple(notches) + tuple(
-            replace(
-                one,
-                position=self.mirrored(one.position[None])[0],
-                angle=None if one.angle is None else turn - one.angle,
-            )
-            for one in notches
-            if abs(self.offset(one.position[None])[0]) > _ON_LINE_M
-        )
+        angle = None if notch.angle is None else turn - notch.angle
+        return replace(notch, position=self.mirrored(notch.position[None])[0], angle=angle)
 
     def lines(self, lines: Sequence[InnerLine]) -> tuple[InnerLine, ...]:
         """Return lines and their mirror pictures."""
