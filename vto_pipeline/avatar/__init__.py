@@ -7,5 +7,6 @@ model/: shape and pose
 motion/: how an avatar moves as another skeleton does
 measuring/: what each measurement means, the tape that reads it, and the population
 scan/: registration to a scan, and how sure the result is
+lifelike/: face, fingers and toes for pictures
 silhouettes/: outlines in two photos
 """

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from vto_pipeline.avatar.measuring.definitions import DEFINITIONS, definition
+from vto_pipeline.avatar.measuring.growth import build_of, childs_growth, resized, size_share
 from vto_pipeline.avatar.measuring.population import Population, population
 from vto_pipeline.avatar.measuring.tape import Reading, Tape
 from vto_pipeline.avatar.model.shape import SEX_SHARE, ShapeSpace, shape_space
@@ -70,17 +71,30 @@ def fit_measurements(
         raise AvatarError("no measurement is given", hint="give at least stature")
     held = {name: value for name, value in values.items() if name not in sigmas}
     sex = config.sex if measurements.sex == "neutral" else measurements.sex
-    prior = population(sex)
-    _report_unlikely(prior, held, config, job)
-    expected = prior.given(values, sigmas)
-    space = shape_space(SEX_SHARE[sex])
-    parameters = solve_shape(space, held, expected, config, job, mean_parameters(sex, config))
+    _report_unlikely(population(sex), held, config, job)
+    share = size_share(values.get("stature"), population(sex))
+    build = build_of(sex, share)
+    large, unsure_large, met = (resized(known, 1 / share) for known in (values, sigmas, held))
+    expected = population(build).given(large, unsure_large)
+    if share < 1.0:
+        growth, unsure_growth = childs_growth(expected, large["stature"], share)
+        expected = population(build).given({**growth, **large}, {**unsure_growth, **unsure_large})
+        if not any(name == "mass" or name.endswith("girth") for name in values):
+            met["mass"] = growth["mass"]  # nothing else says how lean it is, and the mean body is an adult's
+    space = shape_space(SEX_SHARE[build])
+    parameters = solve_shape(space, met, expected, config, job, mean_parameters(build, config))
     spread = np.sqrt(np.diag(expected.covariance).clip(0.0)).tolist()
     unsure = {name: s for name, s in zip(expected.names, spread, strict=True) if name not in held}
-    body = replace(space.avatar(parameters), sigmas=unsure)
+    body = replace(_smaller(space.avatar(parameters), share), sex=SEX_SHARE[sex], sigmas=resized(unsure, share))
     _report_errors(body, held, config, job)
     _report_folds(space, body, job)
     return body
+
+
+def _smaller(body: Avatar, share: float) -> Avatar:
+    """Return a body in the bind pose, so many times as large."""
+    vertices = share * body.bind_vertices
+    return replace(body, bind_vertices=vertices, vertices=vertices, joints=share * body.joints)
 
 
 @lru_cache(maxsize=4)

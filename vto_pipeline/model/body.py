@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from vto_pipeline.errors import InputError
-from vto_pipeline.model.arrays import FloatArray, IntArray, freeze
+from vto_pipeline.model.arrays import ByteArray, FloatArray, IntArray, freeze
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.notebook import Presented
 
@@ -132,6 +134,53 @@ class SkinnedBody:
     def mesh(self) -> TriangleMesh:
         """The body at rest."""
         return TriangleMesh(self.vertices, self.faces)
+
+
+@dataclass(frozen=True)
+class MorphableBody:
+    """A body of foreign topology at rest and the shapes it can be blended into.
+
+    Args:
+        vertices: At rest [m], shape (V, 3); helpers that belong to no surface included.
+        surfaces: Name -> triangles, shape (F, 3): "body" and whatever else it has, such as eyes.
+        places: Name -> vertices whose middle is a named point, such as a joint, shape (N,).
+        targets: Name -> vertices (N,) and how far each of them moves at a share of one [m], shape (N, 3).
+    """
+
+    vertices: FloatArray
+    surfaces: Mapping[str, IntArray]
+    places: Mapping[str, IntArray]
+    targets: Mapping[str, tuple[IntArray, FloatArray]]
+
+    def blended(self, shares: Mapping[str, float]) -> FloatArray:
+        """Return the vertices with these shares of targets [m], shape (V, 3)."""
+        vertices = np.array(self.vertices)
+        for name, share in shares.items():
+            place, offset = self.targets[name]
+            np.add.at(vertices, place, share * offset)
+        return vertices
+
+
+@dataclass(frozen=True)
+class LifelikeBody:
+    """An avatar with face, fingers and toes: for pictures, while cloth meets the avatar itself.
+
+    Args:
+        avatar: The body, of a topology of its own, without landmarks and loops; it is posed as any avatar.
+        colors: sRGB of each vertex, shape (V, 3).
+    """
+
+    avatar: Avatar
+    colors: ByteArray
+
+    def __post_init__(self) -> None:
+        count = len(self.avatar.bind_vertices)
+        object.__setattr__(self, "colors", freeze("lifelike body colors", self.colors, (count, 3), "u1"))
+
+    @property
+    def mesh(self) -> TriangleMesh:
+        """The posed body."""
+        return TriangleMesh(self.avatar.vertices, self.avatar.faces, self.colors)
 
 
 @dataclass(frozen=True)

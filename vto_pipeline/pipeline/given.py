@@ -83,6 +83,7 @@ def resolve(key: str, value: Any, base: Path, kind: ArtifactKind, where: str) ->
         if is_address(value):
             hint = "`vto batch` copies from stores; elsewhere give files and folders"
             raise InputError(f"given.{key}: {value} lies in a store, not on a disk", where=where, hint=hint)
+        value = str((kind.stands_for and kind.stands_for(value)) or value)
         check_answers(base / Path(value).expanduser())
         path = resolved(base / Path(value).expanduser())
         if path.is_dir() and not (kind.in_folder and kind.in_folder(path)):

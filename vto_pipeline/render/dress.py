@@ -63,12 +63,14 @@ def deform_render_mesh(
 
 
 def body_part(body: TriangleMesh, config: DressConfig) -> GlbPart:
-    """Return the body as a part of its own, in the colour of skin.
+    """Return the body as a part of its own, in its own colours or that of skin.
 
     Args:
         body: As it stands under the draped garment [m].
         config: Settings.
     """
+    if body.colors is not None:
+        return GlbPart(BODY, body, normals=vertex_normals(body), roughness=0.6, double_sided=False)
     shape = decimate(TriangleMesh(body.vertices, body.faces), config.max_triangles)
     red, green, blue = (float(value) for value in decode_srgb(np.array(SKIN, dtype=np.uint8)))
     normals = vertex_normals(shape)

@@ -27,6 +27,7 @@ GIVEN = {
     "body.mesh": "body_mesh",
     "fabric": "fabric",
     "motion": "motion",
+    "lifelike": "lifelike_data",
 }
 """Key under `given:` in a document -> artifact."""
 

@@ -10,6 +10,7 @@ from pydantic import Field
 from vto_pipeline.avatar.from_measurements import MeasurementsConfig, fit_measurements
 from vto_pipeline.avatar.from_scan import ScanConfig, fit_scan
 from vto_pipeline.avatar.from_silhouettes import SilhouettesConfig, fit_silhouettes
+from vto_pipeline.avatar.lifelike.lifelike import LifelikeConfig, lifelike_body
 from vto_pipeline.avatar.measuring.avatar_measurements import landmarks, measure_avatar
 from vto_pipeline.avatar.model.pose import clear_pose
 from vto_pipeline.io.captures.images import read_image
@@ -62,6 +63,10 @@ def _pose(inputs: Inputs, settings: PoseConfig, job: Job) -> Outputs:
         job.leave_out("posing", "the avatar keeps the pose it was fitted in")
         return {"avatar": avatar}
     return {"avatar": clear_pose(avatar, settings.pose)}
+
+
+def _lifelike(inputs: Inputs, settings: LifelikeConfig, job: Job) -> Outputs:
+    return {"lifelike_body": lifelike_body(inputs["avatar"], inputs["lifelike_data"], settings, job)}
 
 
 def _measure(inputs: Inputs, settings: Config, job: Job) -> Outputs:
@@ -131,6 +136,15 @@ STAGES: tuple[Stage, ...] = (
         makes=("avatar",),
         run=_pose,
         settings=PoseConfig,
+    ),
+    Stage(
+        name="lifelike",
+        about="the avatar with a face, fingers and toes, for pictures",
+        needs=("avatar", "lifelike_data"),
+        makes=("lifelike_body",),
+        run=_lifelike,
+        settings=LifelikeConfig,
+        uses=("scipy", "libigl"),
     ),
     Stage(
         name="measure",

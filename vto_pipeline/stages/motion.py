@@ -83,9 +83,10 @@ def _assess_motion(inputs: Inputs, settings: MotionFitConfig, job: Job) -> Outpu
 
 
 def _animate(inputs: Inputs, settings: Config, job: Job) -> Outputs:
-    avatar, cloth = inputs["avatar"], inputs["draped_motion"]
+    cloth, lifelike = inputs["draped_motion"], inputs.get("lifelike_body")
+    avatar, colors = (inputs["avatar"], None) if lifelike is None else (lifelike.avatar, lifelike.colors)
     normals = vertex_normals(TriangleMesh(avatar.bind_vertices, avatar.faces))
-    made, error = animated_glb(avatar, normals, inputs["avatar_motion"], cloth)
+    made, error = animated_glb(avatar, normals, inputs["avatar_motion"], cloth, colors)
     job.measure(cloth_error_mm=1e3 * error)
     return {"moving_scene": made}
 
@@ -134,6 +135,7 @@ STAGES: tuple[Stage, ...] = (
         name="animate",
         about="avatar and garment in motion, in a file for viewers",
         needs=("avatar", "avatar_motion", "draped_motion"),
+        optional=("lifelike_body",),
         makes=("moving_scene",),
         run=_animate,
         uses=("pygltflib",),

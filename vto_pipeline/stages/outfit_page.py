@@ -8,18 +8,29 @@ from typing import Any
 
 import numpy as np
 
-from vto_pipeline.geometry.topology import concatenate
+from vto_pipeline.geometry.topology import concatenate, vertex_normals
+from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.render import GlbPart
 from vto_pipeline.model.settings import Config
 from vto_pipeline.pipeline.stage import Stage
 from vto_pipeline.render.dress import BODY
+from vto_pipeline.render.tuck import innermost
 
 OWN_PARTS = ("render_mesh", "fit_report", "fit_maps")
 """What is made of each draped garment."""
 
 _COLORS = ((0.14, 0.27, 0.53), (0.55, 0.21, 0.10), (0.19, 0.36, 0.16), (0.36, 0.20, 0.46))  # linear RGB
-_SHARED = ("body_surface", "mannequin_surface", "avatar", "measurements", "body_measurements", "audit", "trace")
+_SHARED = (
+    "body_surface",
+    "mannequin_surface",
+    "avatar",
+    "lifelike_body",
+    "measurements",
+    "body_measurements",
+    "audit",
+    "trace",
+)
 
 
 def outfit_page(stage: Stage, names: Sequence[str]) -> Stage:
@@ -56,7 +67,12 @@ def joined_parts(garments: Mapping[str, Sequence[GlbPart]]) -> list[GlbPart]:
     """Return the parts of several garments' render meshes, by their names, inner first, and their body once."""
     names, every = list(garments), [(name, part) for name, some in garments.items() for part in some]
     parts = [_named_part(part, name, names) for name, part in every if part.name != BODY]
-    return parts + [part for _, part in every if part.name == BODY][:1]  # all wear the same
+    bodies = [part for _, part in every if part.name == BODY]  # all wear the same, tucked under each
+    return parts + [replace(body, mesh=innermost([one.mesh for one in bodies], _normals(body))) for body in bodies[:1]]
+
+
+def _normals(part: GlbPart) -> FloatArray:
+    return vertex_normals(part.mesh) if part.normals is None else part.normals
 
 
 def _named_part(part: GlbPart, name: str, names: Sequence[str]) -> GlbPart:

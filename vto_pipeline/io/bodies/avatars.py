@@ -11,7 +11,7 @@ from vto_pipeline.errors import FormatError
 from vto_pipeline.io.arrays import Arrays, read_arrays, write_arrays
 from vto_pipeline.io.files import check_file
 from vto_pipeline.io.sandbox import run_limited
-from vto_pipeline.model.body import Avatar
+from vto_pipeline.model.body import Avatar, LifelikeBody
 
 _LIMIT_BYTES = 200_000_000
 _ARRAYS = ("bind_vertices", "faces", "joints", "parents", "weights", "pose", "translation", "vertices")
@@ -19,25 +19,43 @@ _ARRAYS = ("bind_vertices", "faces", "joints", "parents", "weights", "pose", "tr
 
 def write_avatar(path: Path, avatar: Avatar) -> None:
     """Write an avatar as an archive of plain arrays."""
+    write_arrays(path, _arrays(avatar))
+
+
+def write_lifelike(path: Path, body: LifelikeBody) -> None:
+    """Write a lifelike body: an avatar's archive with its colours."""
+    write_arrays(path, {**_arrays(body.avatar), "colors": body.colors})
+
+
+def read_lifelike(path: Path) -> LifelikeBody:
+    """Read a lifelike body that `write_lifelike` wrote.
+
+    Raises:
+        InputError: no such file; FormatError: no lifelike body.
+    """
+    arrays = read_arrays(path)
+    if "colors" not in arrays:
+        raise FormatError("an avatar without colours; expected a lifelike body", where=str(path))
+    return LifelikeBody(_avatar(arrays, path), arrays["colors"])
+
+
+def _arrays(avatar: Avatar) -> Arrays:
     loops = [np.asarray(loop, dtype=np.int32) for loop in avatar.loops.values()]
-    write_arrays(
-        path,
-        {
-            **{name: getattr(avatar, name) for name in _ARRAYS},
-            "joint_names": _strings(avatar.joint_names),
-            "sex": np.float64(avatar.sex),
-            "landmark_names": _strings(avatar.landmarks),
-            "landmark_vertices": np.array(list(avatar.landmarks.values()), dtype=np.int32),
-            "loop_names": _strings(avatar.loops),
-            "loop_lengths": np.array([len(loop) for loop in loops], dtype=np.int32),
-            "loop_vertices": np.concatenate([np.empty(0, np.int32), *loops]),
-            "parameter_names": _strings(avatar.parameters),
-            "parameter_values": np.array(list(avatar.parameters.values()), dtype=np.float64),
-            "sigma_names": _strings(avatar.sigmas),
-            "sigma_values": np.array(list(avatar.sigmas.values()), dtype=np.float64),
-            "caveats": _strings(avatar.caveats),
-        },
-    )
+    return {
+        **{name: getattr(avatar, name) for name in _ARRAYS},
+        "joint_names": _strings(avatar.joint_names),
+        "sex": np.float64(avatar.sex),
+        "landmark_names": _strings(avatar.landmarks),
+        "landmark_vertices": np.array(list(avatar.landmarks.values()), dtype=np.int32),
+        "loop_names": _strings(avatar.loops),
+        "loop_lengths": np.array([len(loop) for loop in loops], dtype=np.int32),
+        "loop_vertices": np.concatenate([np.empty(0, np.int32), *loops]),
+        "parameter_names": _strings(avatar.parameters),
+        "parameter_values": np.array(list(avatar.parameters.values()), dtype=np.float64),
+        "sigma_names": _strings(avatar.sigmas),
+        "sigma_values": np.array(list(avatar.sigmas.values()), dtype=np.float64),
+        "caveats": _strings(avatar.caveats),
+    }
 
 
 def read_avatar(path: Path) -> Avatar:

@@ -45,12 +45,12 @@ def parse_makehuman(name: str) -> Arrays:
     folder = Path(name)
     base = check_file(folder / BASE, {".obj"}, _LIMIT_BYTES)
     points = parse_obj(str(base))["vertices"] * LENGTH_M["dm"]
-    groups = _groups(base)
+    groups = parse_groups(base)
     faces = groups.get(_BODY_GROUP)
     if faces is None:
         raise FormatError(f"no group {_BODY_GROUP!r}; found {', '.join(list(groups)[:8])}", where=str(base))
     for target, share in _shares(folder).items():
-        place, offset = _target(folder / target, len(points))
+        place, offset = parse_target(folder / target, len(points))
         np.add.at(points, place, share * LENGTH_M["dm"] * offset)
     used = np.unique(faces)
     arrays: Arrays = {"vertices": points[used], "faces": np.searchsorted(used, faces)}
@@ -60,8 +60,12 @@ def parse_makehuman(name: str) -> Arrays:
     return arrays
 
 
-def _groups(path: Path) -> dict[str, NDArray[np.int64]]:
-    """Triangles of each group of an OBJ file, shape (F, 3)."""
+def parse_groups(path: Path) -> dict[str, NDArray[np.int64]]:
+    """Return the triangles of each group of an OBJ file, shape (F, 3).
+
+    Raises:
+        FormatError: a corner is no number.
+    """
     found: dict[str, list[tuple[int, int, int]]] = {}
     group = ""
     for number, line in enumerate(read_lines(path), start=1):
@@ -94,8 +98,16 @@ def _shares(folder: Path) -> dict[str, float]:
     return {str(target): float(share) for target, share in data.items()}
 
 
-def _target(path: Path, count: int) -> tuple[NDArray[np.int64], FloatArray]:
-    """Vertices (N,) and offsets (N, 3) [dm] of a target."""
+def parse_target(path: Path, count: int) -> tuple[NDArray[np.int64], FloatArray]:
+    """Return vertices (N,) and offsets (N, 3) [dm] of a target.
+
+    Args:
+        path: A .target file, gzipped or not.
+        count: Vertices of the base mesh.
+
+    Raises:
+        InputError, FormatError: no such file, or other than lines of a vertex and three numbers.
+    """
     check_file(path, {".target", ".gz"}, _LIMIT_BYTES)
     try:
         if path.suffix == ".gz":
@@ -107,7 +119,8 @@ def _target(path: Path, count: int) -> tuple[NDArray[np.int64], FloatArray]:
         raise FormatError(f"not a gzipped target: {e}", where=str(path)) from None
     lines = data.decode("utf-8", errors="replace").splitlines()
     kept = [(text, k) for k, text in enumerate(lines, start=1) if text.strip() and not text.lstrip().startswith("#")]
-    rows = parse_rows([text for text, _ in kept], [k for _, k in kept], path)
+    # a target without a line is the mean itself: MakeHuman's own data hold such ones
+    rows = parse_rows([text for text, _ in kept], [k for _, k in kept], path) if kept else np.zeros((0, 4))
     place = rows[:, 0].astype(np.int64) if rows.shape[1:] == (4,) and np.isfinite(rows).all() else None
     if place is None or (place != rows[:, 0]).any() or (place < 0).any() or (place >= count).any():
         raise FormatError(f"expected lines of a vertex number (0..{count - 1}) and three offsets", where=str(path))

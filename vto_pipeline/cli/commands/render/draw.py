@@ -31,18 +31,17 @@ def meshes_of(path: Path) -> tuple[list[TriangleMesh], Path]:
     from vto_pipeline.io.meshes import read_mesh
     from vto_pipeline.pipeline.execution.folder import is_run
     from vto_pipeline.stages.entry.outcome import open_run
-    from vto_pipeline.stages.entry.shown import painted, shown_artifacts, shown_meshes
+    from vto_pipeline.stages.entry.shown import painted, shown_surfaces
 
     written_by_run = path.suffix.lower() == ".glb" and path.parent.name == "out" and is_run(path.parents[1])
     if written_by_run:  # its parts are known, and each has its colour
         return [painted(part) for part in read_glb(path)], path.parent / "pictures"
     if not (path.is_dir() and is_run(path)):
         return [read_mesh(path)], path.parent / "pictures"
-    outcome = open_run(path)
-    names = shown_artifacts(outcome, detailed=True)
-    if not names:
+    meshes = shown_surfaces(open_run(path))
+    if not meshes:
         raise InputError("this run made nothing that can be drawn", where=str(path), hint="has it ended?")
-    return [mesh for name in names for mesh in shown_meshes(name, outcome.read(name))], path / "out" / "pictures"
+    return meshes, path / "out" / "pictures"
 
 
 def draw_views(
