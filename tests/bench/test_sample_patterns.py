@@ -42,7 +42,7 @@ def test_each_is_sewn_closed_and_starts_without_crossings(name, size):
     pattern = PATTERNS[name](BODIES[size])
     sewn = sew(pattern, SewConfig(edge_mm=30.0), Job())
     mesh = in_shape(sewn, Job())
-    if name == "shirt":  # its collar lies on its back and its stand, and the drape untangles them
+    if name == "shirt":  # sleeves gathered into cuffs by a fifth fold, and the drape untangles them
         start = find_collision_free_start(mesh.vertices, mesh.faces, mesh.vertices, 3e-4, Job())
         mesh = replace(mesh, vertices=start.positions)
     assert not ipctk.has_intersections(
@@ -51,21 +51,6 @@ def test_each_is_sewn_closed_and_starts_without_crossings(name, size):
     assert len(boundary_loops(mesh)) == OPENINGS[name]
     assert max(seam_gaps(pattern, mesh.texture, mesh.faces, mesh.vertices)) < 1e-3
     assert max(one.share for one in seam_figures(pattern)) == pytest.approx(GATHERED.get(name, 0.0), abs=0.02)
-
-
-@pytest.mark.parametrize("size", BODIES)
-def test_the_shirt_starts_with_its_collar_folded_over(size):
-    """Also once its back is off the stand that it lies on."""
-    sewn = sew(PATTERNS["shirt"](BODIES[size]), SewConfig(edge_mm=15.0), Job())
-    mesh = in_shape(sewn, Job())
-    freed = find_collision_free_start(mesh.vertices, mesh.faces, mesh.vertices, 3e-4, Job())
-    assert freed.crossings_left == 0
-    for where in (mesh.vertices, freed.positions):
-        for part in ("back_{}", "front_{}_left", "front_{}_right"):
-            numbers = [sewn.panels.index(part.format(one)) for one in ("fall", "collar")]
-            fall, stand = (where[np.unique(mesh.faces[sewn.panel == number])] for number in numbers)
-            assert fall[:, 1].max() < stand[:, 1].max() + 4e-3  # it rolls over the edge of the stand
-            assert fall[:, 1].min() < stand[:, 1].max() - 0.03  # and hangs down by most of its 45 mm
 
 
 @pytest.mark.parametrize("name", PATTERNS)

@@ -29,7 +29,6 @@ _ROUNDS = 20  # at each of the holds
 _HOLDS = (0.1, 0.01, 1e-3, 1e-4, 1e-5, 1e-6)  # weights of staying in place against the frames
 _SMOOTH = 0.03  # weight of a neighbour's frame against a triangle's own sides
 _MOMENTUM = 0.9  # of the last move; plain alternation takes several times the rounds
-_OPPOSITE = -0.5  # cosine between the normals of two panels that face opposite ways
 _BULGE = 0.1  # of its reach
 _LEAST_COT = 0.05  # weights stay positive where a corner is blunt
 
@@ -66,7 +65,7 @@ def embed(mesh: TriangleMesh, frames: FloatArray) -> FloatArray:
     rows, columns = start.ravel(), end.ravel()
     links = coo_array((weight.ravel(), (rows, columns)), shape=(count, count))
     links = links + links.T
-    twin, turns = _neighbours(mesh, frames)
+    twin, turns = _neighbours(mesh)
     area = float(np.abs(np.linalg.det(mesh.texture[:, 1:] - mesh.texture[:, :1])).mean())
     x = place = mesh.vertices + _bulge(mesh, frames)
     for share in _HOLDS:
@@ -104,25 +103,14 @@ def _bulge(mesh: TriangleMesh, frames: FloatArray) -> FloatArray:
     normals = np.cross(frames[:, :, 0], frames[:, :, 1])
     out = np.stack([np.bincount(mesh.faces.ravel(), np.repeat(normals[:, k], 3)) for k in range(3)], axis=1)
     out = out / np.maximum(np.linalg.norm(out, axis=1), 1e-12)[:, None]
-    around = mesh.vertices - mesh.vertices.mean(axis=0)
-    away = np.linalg.norm(around, axis=1)
-    out[(out * around).sum(axis=1) < -1e-6 * away.max()] *= -1.0  # a collar's right side faces inwards
+    away = np.linalg.norm(mesh.vertices - mesh.vertices.mean(axis=0), axis=1)
     return np.asarray(_BULGE * (away.max() - away**2 / away.max())[:, None] * out)
 
 
-def _neighbours(mesh: TriangleMesh, frames: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return the other half of each half-edge, (3F,), -1 for none, and what turns the axes there to these.
-
-    Where panels are placed with their right sides to each other, the seam between them is a fold, as a collar's:
-    nothing smooths it.
-    """
-    assert mesh.texture is not None
-    normals = np.repeat(np.cross(frames[:, :, 0], frames[:, :, 1]), 3, axis=0)
-    middles = np.repeat(mesh.vertices[mesh.faces].mean(axis=1), 3, axis=0)
+def _neighbours(mesh: TriangleMesh) -> tuple[IntArray, FloatArray]:
+    """Return the other half of each half-edge, (3F,), -1 for none, and what turns the axes there to these."""
     twin = opposite_half_edges(mesh)
-    opposite = (normals * normals[twin]).sum(axis=1) < _OPPOSITE
-    ahead = ((middles[twin] - middles) * normals).sum(axis=1) > 0.0
-    twin = np.where(opposite & ahead, -1, twin)
+    assert mesh.texture is not None
     here = (np.roll(mesh.texture, -1, axis=1) - mesh.texture).reshape(-1, 2)
     angle = np.arctan2(*-here[twin].T[::-1]) - np.arctan2(*here.T[::-1])
     cos, sin = np.cos(angle), np.sin(angle)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -37,18 +36,6 @@ def piece(name: str, side: str, away: float, path: Sequence[Point | list[Point]]
     return Panel(name, tuple(edges), placement=Placement(turn, turn @ [*shift, away]))
 
 
-def folded(panel: Panel, height: float) -> Panel:
-    """Return a panel turned down outside about a level line: drawn above what it is sewn to, it hangs beside it.
-
-    Args:
-        panel: Placed.
-        height: Of the line [m].
-    """
-    assert panel.placement is not None
-    turn, (x, y, z) = panel.placement.rotation, panel.placement.translation
-    return replace(panel, placement=Placement(turn @ np.diag([1.0, -1.0, -1.0]), np.array([x, 2.0 * height - y, z])))
-
-
 def mirrored(path: Sequence[Point | list[Point]]) -> list[Point | list[Point]]:
     """Return a path on the other side of the y axis, anticlockwise again; it begins with the same corner."""
     turned: list[Point | list[Point]] = [
@@ -66,7 +53,7 @@ def sewn(name: str, stature: float, panels: Sequence[Panel], seams: Sequence[Sea
         panels: At that body's heights.
         seams: Edges of the first side in the order of its outline, and those of the second against it.
     """
-    top = max(_top(panel) for panel in panels)
+    top = max(float(e.points[:, 1].max()) + p.placement.translation[1] for p in panels if p.placement for e in p.edges)
     rise = np.array([0.0, top * (_FILE_STATURE / stature - 1.0), 0.0])
     stitches = tuple(
         Stitch(tuple(Side(*one) for one in first), tuple(Side(*one, forward=False) for one in second))
@@ -78,10 +65,3 @@ def sewn(name: str, stature: float, panels: Sequence[Panel], seams: Sequence[Sea
         place = Placement(one.placement.rotation, one.placement.translation + rise)
         placed.append(Panel(one.name, one.edges, grain=one.grain, placement=place))
     return Pattern(name, tuple(placed), stitches)
-
-
-def _top(panel: Panel) -> float:
-    """Return the greatest height of a placed panel [m]."""
-    assert panel.placement is not None
-    up, lift = panel.placement.rotation[1, :2], panel.placement.translation[1]
-    return float(max((edge.points @ up).max() for edge in panel.edges) + lift)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vto_pipeline.bench.samples.patterns.pieces import Point, Seam, folded, mirrored, piece, sewn
+from vto_pipeline.bench.samples.patterns.pieces import Point, Seam, mirrored, piece, sewn
 from vto_pipeline.bench.samples.patterns.tape import Tape
 from vto_pipeline.model.pattern import Panel, Pattern
 from vto_pipeline.numerics.plane_curves import curve_length
@@ -21,7 +21,6 @@ _AWAY = 0.16  # m: of panels from the middle of the body
 _SLOPE = np.deg2rad(20.0)  # of sleeves, downwards
 _BESIDE = 0.06  # m: of sleeves from the trunk
 _BAND, _CUFF = 0.035, 0.06  # m: heights of a collar's stand and of a cuff
-_FALL = (0.045, 0.065, 0.03)  # m: how far a collar falls behind and at its points, and how much each quarter spreads
 _BUST_DART = (0.03, 0.10)  # m: how wide and how long
 
 
@@ -151,7 +150,7 @@ def dress(tape: Tape) -> Pattern:
 
 
 def shirt(tape: Tape) -> Pattern:
-    """Return a shirt, buttoned up, with long sleeves, cuffs that these are gathered into, and a collar folded over."""
+    """Return a shirt, buttoned up, with long sleeves, cuffs that these are gathered into, and a collar's stand."""
     trunk = _Trunk(tape, 0.14, 0.46)
     length, width, band = 0.22 * tape.stature, 0.08 * tape.stature, 0.065 * tape.stature
     panels, seams = _open_trunk(trunk, 0.06, 0.0)
@@ -171,9 +170,8 @@ def shirt(tape: Tape) -> Pattern:
         seams.append(([(f"{where}_sleeve_{which}", ends[0])], [(f"{where}_cuff_{which}", ends[1])]))
     for near, far in (("front_cuff_left", "back_cuff_left"), ("back_cuff_right", "front_cuff_right")):
         seams += [([(near, 0)], [(far, 3)]), ([(near, 2)], [(far, 1)])]
-    stand, ring = _stand(trunk, panels)
-    fall, roll = _fall(stand, trunk.neck[1] + _BAND)
-    return sewn("shirt", tape.stature, [*panels, *arms, *stand, *fall], [*seams, *ring, *roll])
+    collar, ring = _stand(trunk, panels)
+    return sewn("shirt", tape.stature, [*panels, *arms, *collar], [*seams, *ring])
 
 
 def jacket(tape: Tape) -> Pattern:
@@ -249,28 +247,6 @@ def _stand(trunk: _Trunk, panels: list[Panel]) -> tuple[list[Panel], list[Seam]]
         ([("back", 4), ("back", 5)], [("back_collar", 1), ("back_collar", 0)]),
         ([("front_collar_left", 1)], [("back_collar", 4)]),
         ([("front_collar_right", 2)], [("back_collar", 2)]),
-    ]
-    return pieces, seams
-
-
-def _fall(stand: list[Panel], roll: float) -> tuple[list[Panel], list[Seam]]:
-    """Return the three pieces of a collar that falls over its stand from the height of its roll, and their seams."""
-    behind, before, spread = _FALL
-    front, back = _length(stand[0], 2), 0.5 * _length(stand[2], 3)
-    side: Path = [(0.0, roll), (front, roll), (front + spread, roll + behind), (-spread, roll + before)]
-    end = (back + spread, roll + behind)
-    whole: Path = [(-back, roll), (0.0, roll), (back, roll), end, (-end[0], end[1])]
-    pieces = [
-        folded(piece("front_fall_left", "front", 0.13, side, (0.01, 0.0)), roll),
-        folded(piece("front_fall_right", "front", 0.13, mirrored(side), (-0.01, 0.0)), roll),
-        folded(piece("back_fall", "back", 0.13, whole), roll),
-    ]
-    seams: list[Seam] = [
-        ([("front_collar_left", 2)], [("front_fall_left", 0)]),
-        ([("front_collar_right", 1)], [("front_fall_right", 3)]),
-        ([("back_collar", 3)], [("back_fall", 1), ("back_fall", 0)]),
-        ([("front_fall_left", 1)], [("back_fall", 4)]),
-        ([("front_fall_right", 2)], [("back_fall", 2)]),
     ]
     return pieces, seams
 
