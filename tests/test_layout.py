@@ -7,6 +7,7 @@ import inspect
 import pickle
 import re
 import statistics
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -39,6 +40,12 @@ def test_folders_stay_small_and_have_a_map(folder):
     if folder.parent != ROOT and len(files) + len(rooms) > 1:
         said = set(re.findall(r"\w+", (folder / "__init__.py").read_text()))
         assert {path.stem for path in files + rooms} - said == set(), "__init__ is the folder's map"
+
+
+def test_test_files_have_names_of_their_own():
+    """pytest imports them by name alone: two of a name end the collection."""
+    names = Counter(path.name for path in (ROOT / "tests").rglob("test_*.py"))
+    assert [name for name, count in names.items() if count > 1] == []
 
 
 def test_no_circle_of_imports():
