@@ -66,6 +66,14 @@ def test_the_verdict_is_in_words(monkeypatch):
     assert entry["front"] == ["other", "third"]
 
 
+def test_points_have_the_same_names_whatever_the_order_of_their_settings(monkeypatch):
+    one, other = (
+        [row("ours", 1.0, 2.0, **made), row("theirs", 2.0, 1.0)] for made in ({"b": 1, "a": 2.5}, {"a": 2.5, "b": 1})
+    )
+    assert of(one, monkeypatch) == of(other, monkeypatch)
+    assert of(one, monkeypatch)[0]["default"] == "ours, a 2.5, b 1"
+
+
 def test_truth_failures_and_other_scenes_do_not_count(monkeypatch):
     rows = [row("ours", 1.0, 1.0), row("other", 2.0, 2.0), row("reference", 0.1, 0.0), row("failed", 0.0, 0.0)]
     (entry,) = of([*rows, row("alone", 0.1, 0.1, "sphere")], monkeypatch)

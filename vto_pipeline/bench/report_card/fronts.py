@@ -113,9 +113,8 @@ def _label(trade: Trade, row: Row) -> str:
 
 
 def _words(name: str, settings: Mapping[str, Any]) -> str:
-    return ", ".join(
-        [name, *(f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in settings.items() if v is not None)]
-    )
+    known = sorted((k, v) for k, v in settings.items() if v is not None)  # a results file has them in this order
+    return ", ".join([name, *(f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in known)])
 
 
 def _is_point(row: Row, error: str) -> bool:
