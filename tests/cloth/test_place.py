@@ -7,7 +7,7 @@ import pytest
 from cloth_scenes import moved, tube
 from numpy.testing import assert_allclose
 
-from vto_pipeline.cloth.placement.place import PlaceConfig, find_placement
+from vto_pipeline.cloth.placement.place import PlaceConfig, _as_files_have_it, find_placement
 from vto_pipeline.cloth.placement.voxel_fit import BodyCubes, VoxelFit, quarter_turns
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.remeshing.remesh import RemeshConfig, remesh
@@ -131,6 +131,8 @@ def test_quarter_turns_are_the_rotations_of_a_cube_and_cubes_turn_like_meshes():
     for turn in turns:
         assert_allclose(turn @ turn.T, np.eye(3), rtol=0, atol=0)
         assert np.linalg.det(turn) == pytest.approx(1.0)
+    usual = [turn for turn in turns if _as_files_have_it(turn)]
+    assert_allclose(usual, [np.eye(3), Z_UP.T], rtol=0, atol=0)
     worn = moved(skirt(), 0.037, 0.0, 0.021)
     cubes = VoxelFit(worn, BodyCubes(pear()), 0.02, 2.0)
     for turn in turns[5::6]:
@@ -181,6 +183,16 @@ def test_a_garment_that_fits_far_better_the_other_way_round_is_turned_so():
 
     found = find_placement(leaning(skirt(), -1.0), leaning(pear(), 1.0), FINE, Job())
     assert_allclose(found.turn, np.diag([-1.0, 1.0, -1.0]), rtol=0, atol=0)
+
+
+def test_a_loose_skirt_is_not_put_on_upside_down_though_the_body_fills_it_better_so():
+    body, loose = pear(), tube(1.0, 0.3, 48, 21, base=0.3)
+    radius = 0.17 + 0.03 * (loose.vertices[:, 1:2] - 0.3) / 0.3  # a little wider above, where the body is narrower
+    worn = TriangleMesh(loose.vertices * np.hstack([radius, np.ones_like(radius), radius]), loose.faces)
+    cubes = VoxelFit(worn, BodyCubes(body), 0.01, 2.0)
+    down, up = (cubes.best_placement(turn).score for turn in (DOWN, np.eye(3)))
+    assert up < 0.99 * down
+    assert_allclose(find_placement(worn, body, FINE, Job()).turn, np.eye(3), rtol=0, atol=0)
 
 
 @pytest.mark.real_data

@@ -28,8 +28,6 @@ _CLOSE = 0.9  # of the best coarse worth: these are looked at again with fine cu
 _ALIKE = 0.98  # as good, but for where the cubes happen to lie
 _LARGER, _STEPS = 1.2, 4  # a garment may start up to twice as large as it is
 _FALLING = 0.85  # of the best worth yet: larger garments need not be tried
-_FACING = 0.85  # of the best score: with more, the score does not tell a garment's front from its back
-_ABOUT_FACE = np.diag([-1.0, 1.0, -1.0])
 _DEEP = 0.01  # m
 _HEIGHTS = 6  # tried where limbs go through cloth
 _WORTH_A_TRY = 0.5  # of the score of the first place: less is beside the body
@@ -53,7 +51,11 @@ class PlaceConfig(Config):
         0.95, ge=0, le=1, description="auto keeps a garment whose place scores this share of the best"
     )
     turned_well: float = Field(
-        0.95, ge=0, le=1, description="A garment is not turned if its orientation scores this share of the best"
+        0.85,
+        ge=0,
+        le=1,
+        description="Share of the best score with which a garment stays as files have it: y up and front +z, or z up "
+        "and front -y",
     )
     buried: float = Field(
         0.1,
@@ -115,30 +117,30 @@ def find_placement(
             return own
     scale = _scale(garment, cubes, config, job)
     metres = TriangleMesh(scale * garment.vertices, garment.faces)
-    stands, best = _best_orientation(metres, cubes, config)
-    turns = quarter_turns()
-    if _is_upright(best.turn):  # as files have it: to be tight is no reason to be upside down
-        turns = [turn for turn in turns if _is_upright(turn)]
-    if round(best.score, 6) <= 0.0:  # but for what the transforms round
+    ways = _promising_orientations(metres, cubes, config)
+    stands, fullest = ways[0], max(ways, key=lambda way: way.score)
+    if round(fullest.score, 6) <= 0.0:  # but for what the transforms round
         raise InputError(
             "the body fills this garment nowhere: it goes around nothing of the body",
             hint="give it as it is worn, sewn and open; drape.place=as_it_stands drapes it from where it lies",
         )
-    if stands.score < config.turned_well * best.score:
+    best = ways[_preferred([way.turn for way in ways], np.array([way.score for way in ways]), config)]
+    if not _as_files_have_it(best.turn):
+        turns = quarter_turns()
+        if _is_upright(fullest.turn):  # to be tight is no reason to be upside down
+            turns = [turn for turn in turns if _is_upright(turn)]
         best = _best_orientation_if_larger(metres, cubes, config, turns)
-    best = _facing_as_files_do(metres, cubes, best, stands, config)
-    as_turned = 1.0 if (best.turn == stands.turn).all() else _relative_score(stands.score, best.score)
-    if as_turned >= _ALIKE:
+    if (best.turn == stands.turn).all():
         best = stands
-    elif as_turned >= config.turned_well:
-        job.note(
-            f"garment not turned, though ({_axis_names(best)}) as (x, y, z) would score {1 / as_turned - 1:.1%} better"
-        )
-        best = stands
+        gain = fullest.score / max(stands.score, 1e-9)
+        if gain * _ALIKE > 1.0:
+            job.note(
+                f"garment not turned, though ({_axis_names(fullest)}) as (x, y, z) would score {gain - 1.0:.1%} better"
+            )
     else:
         job.note(
             f"garment turned: its ({_axis_names(best)}) is the body's (x, y, z); as it stood, it scored "
-            f"{as_turned:.0%} of the best"
+            f"{_relative_score(stands.score, best.score):.0%} of the best"
         )
     stretch, best = _enlarge_until_body_inside(metres, cubes, best, config)
     if stretch > 1.0:
@@ -238,19 +240,32 @@ def _least_pierced(
     return best
 
 
-def _best_orientation(
-    garment: TriangleMesh, body: BodyCubes, config: PlaceConfig
-) -> tuple[VoxelPlacement, VoxelPlacement]:
-    """Return the best place of the garment as it is turned, and of all quarter turns."""
+def _promising_orientations(garment: TriangleMesh, body: BodyCubes, config: PlaceConfig) -> list[VoxelPlacement]:
+    """Return the best places of the garment as it is turned in the file, first, and after promising quarter turns."""
     cube = 1e-3 * config.cube_mm
     turns = quarter_turns()
     cubes = VoxelFit(garment, body, _COARSE * cube, config.cloth_in_body)
     coarse = np.array([cubes.best_placement(turn).score for turn in turns])
     promising = coarse >= np.maximum(_CLOSE * coarse.max(), config.turned_well * coarse[0])
-    promising[0] = True
     cubes = VoxelFit(garment, body, cube, config.cloth_in_body)
-    ways = [cubes.best_placement(turn) for turn, look in zip(turns, promising, strict=True) if look]
-    return ways[0], max(ways, key=lambda way: way.score)
+    looks = zip(turns, promising, strict=True)
+    return [cubes.best_placement(turn) for turn, look in looks if look or _as_files_have_it(turn)]
+
+
+def _preferred(turns: Sequence[FloatArray], scores: FloatArray, config: PlaceConfig) -> int:
+    """Return which turn is taken: one as files have garments, unless another is far better.
+
+    A body fills a garment that is back to front, or a loose skirt upside down, almost as well or better. So the score
+    counts only where it is clear.
+    """
+    best = int(np.argmax(scores))
+    usual = (k for k, turn in enumerate(turns) if _as_files_have_it(turn))
+    return next((k for k in usual if scores[k] >= config.turned_well * scores[best]), best)
+
+
+def _as_files_have_it(turn: FloatArray) -> bool:
+    """Return whether it brings y up and front +z, or z up and front -y, to the body's y and z."""
+    return _is_upright(turn) and turn[0, 0] == 1.0
 
 
 def _is_upright(turn: FloatArray) -> bool:
@@ -274,34 +289,9 @@ def _best_orientation_if_larger(
         if scores[-1].max() < _FALLING * max(one.max() for one in scores):
             break
     fits = int(np.argmax([one.max() for one in scores]))
-    relative = sum(one / max(one.max(), 1e-9) for one in scores[fits : fits + 2])
-    turn = turns[int(np.argmax(relative))]
+    relative = np.sum([one / max(one.max(), 1e-9) for one in scores[fits : fits + 2]], axis=0)
+    turn = turns[_preferred(turns, relative, config)]
     return VoxelFit(garment, body, 1e-3 * config.cube_mm, config.cloth_in_body).best_placement(turn)
-
-
-def _facing_as_files_do(
-    garment: TriangleMesh, body: BodyCubes, best: VoxelPlacement, stands: VoxelPlacement, config: PlaceConfig
-) -> VoxelPlacement:
-    """Return the best place, or that the other way round if so the front of the file is the front of the body.
-
-    Files have the front at +z where y is up, and at -y where z is up. A body fills a garment worn back to front almost
-    as well, or better, so the score counts only where it is clear.
-
-    Args:
-        garment: As large as it is [m].
-        body: To be inside.
-        best: Its best place.
-        stands: Its best place as it is turned in the file.
-        config: Search.
-    """
-    if not _is_upright(best.turn) or best.turn[0, 0] != -1.0:
-        return best
-    turn = _ABOUT_FACE @ best.turn
-    if (turn == stands.turn).all():
-        other = stands
-    else:
-        other = VoxelFit(garment, body, 1e-3 * config.cube_mm, config.cloth_in_body).best_placement(turn)
-    return other if other.score >= _FACING * best.score else best
 
 
 def _enlarge_until_body_inside(
