@@ -12,7 +12,7 @@ import pytest
 from vto_pipeline.pipeline.batch.ledger import Ledger, read_ledger
 from vto_pipeline.pipeline.batch.row import RowResult
 from vto_pipeline.pipeline.batch.summary import COLUMNS, failure_kind, write_parquet
-from vto_pipeline.report.batch_page import build_batch_page
+from vto_pipeline.report.batch.page import build_batch_page
 
 PROBLEMS = {
     "b": ("failed", 4, "200 pairs of triangles of garment and body still cross, near (-0.17, 1.18)"),

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from vto_pipeline.model.cloth import TraceRow, seconds_within
 from vto_pipeline.report.budgets import budget_lines
 from vto_pipeline.report.chart import log_chart
+from vto_pipeline.report.document import document
 from vto_pipeline.report.layers import list_layers
 from vto_pipeline.report.scene import build_page_scene, script_json
 from vto_pipeline.report.tables import left_out_table, measurement_table
 from vto_pipeline.report.verdicts import collect_verdicts, fit_reports
-from vto_pipeline.report.wording import centimetres, duration, figure, label, number
 
-_HERE = Path(__file__).parent
 _GOOD_MM = (5.0, 1.0)  # distances to the final shape for which the page says when they were reached
 
 
@@ -29,18 +27,12 @@ def build_page(run_record: Mapping[str, Any], parts: Mapping[str, Any]) -> str:
             garments, "fit_reports" by name, "measurements", "openings", "audit", "trace", and "motion", of garment and
             body. Others are ignored.
     """
-    from jinja2 import Environment, StrictUndefined
-
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters |= {"cm": centimetres, "duration": duration, "label": label, "number": number}
-    environment.globals |= {"figure": figure}
     layers = list_layers(parts)
     trace = parts.get("trace", [])
     frame_time = parts["motion"][0].frame_time if "motion" in parts else None
-    return environment.from_string(_asset("page.html")).render(
+    return document(
+        "page.html",
         title=_title(parts),
-        style=_asset("page.css"),
-        viewer=_asset("viewer.js"),
         scene=script_json(build_page_scene(layers, frame_time)) if layers else "",
         moves=frame_time is not None,
         verdicts=collect_verdicts(run_record, parts),
@@ -73,7 +65,3 @@ def _title(parts: Mapping[str, Any]) -> str:
     if "garment" in parts or "garment_surface" in parts:
         return "Scanned garment"
     return "Body" if "avatar" in parts or "body_surface" in parts else "Run"
-
-
-def _asset(name: str) -> str:
-    return (_HERE / name).read_text(encoding="utf-8")

@@ -226,7 +226,7 @@ def _write_tables(session: Session, folder: Path) -> None:
     from vto_pipeline.io.files import replacing
     from vto_pipeline.pipeline.batch.ledger import read_ledger
     from vto_pipeline.pipeline.batch.summary import write_parquet
-    from vto_pipeline.report.batch_page import build_batch_page
+    from vto_pipeline.report.batch.page import build_batch_page
 
     batch = read_ledger(folder)
     with replacing(folder / "page.html") as beside:

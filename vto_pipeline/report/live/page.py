@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from importlib.resources import files
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vto_pipeline.report.document import asset, document
 from vto_pipeline.report.layers import PageLayer
 from vto_pipeline.report.live.codec import STEP_M
 from vto_pipeline.report.packing import PackedMesh, pack
@@ -37,20 +37,10 @@ def live_page(title: str, layers: Sequence[PageLayer]) -> LivePage:
         title: For people.
         layers: What is shown, the body last; a mesh each.
     """
-    from jinja2 import Environment, StrictUndefined
-
     packed = [pack(layer.mesh, len(layer.mesh.faces) if layer.skin else _TRIANGLES) for layer in layers]
     scene = build_page_scene([_thinned(layer, one) for layer, one in zip(layers, packed, strict=True)])
     scene["live"] = {"step": STEP_M, "counts": [len(one.source) for one in packed]}
-    report, here = files("vto_pipeline.report"), files(__package__)
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    html = environment.from_string((here / "live.html").read_text("utf-8")).render(
-        title=title,
-        style=(report / "page.css").read_text("utf-8"),
-        scene=script_json(scene),
-        viewer=(report / "viewer.js").read_text("utf-8"),
-        live=(here / "live.js").read_text("utf-8"),
-    )
+    html = document("live/live.html", title=title, scene=script_json(scene), live=asset("live/live.js"))
     return LivePage(html, tuple(one.source for one in packed))
 
 

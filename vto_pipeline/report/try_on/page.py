@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
 
 from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.report.document import asset, document
 from vto_pipeline.report.layers import PageLayer
 from vto_pipeline.report.scene import build_page_scene, script_json
 from vto_pipeline.report.try_on.between import deepest_inside, left_out
@@ -84,8 +84,6 @@ def build_try_on_page(
         choices: There may be none.
         fitted: For every combination of options, the last choice turning fastest.
     """
-    from jinja2 import Environment, StrictUndefined
-
     counts = [len(one.values) for one in sliders]
     axes = [one.values for one in sliders]
     missed = [left_out(_on_grid(layer, counts), axes).ravel() for one in fitted for layer in one.garments]
@@ -105,18 +103,15 @@ def build_try_on_page(
         ],
     }
     measured = _measured(np.concatenate(missed))
-    here, report = files(__package__), files("vto_pipeline.report")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    html = environment.from_string((here / "try_on.html").read_text("utf-8")).render(
+    html = document(
+        "try_on/try_on.html",
         title=title,
         count=sum(len(one.fits) for one in fitted),
         left_out=measured,
         inside=max(inside),
-        style=(report / "page.css").read_text("utf-8"),
         scene=script_json(scene),
         grid=script_json(grid),
-        viewer=(report / "viewer.js").read_text("utf-8"),
-        script=(here / "try_on.js").read_text("utf-8"),
+        script=asset("try_on/try_on.js"),
     )
     return TryOnPage(html, measured, max(inside))
 

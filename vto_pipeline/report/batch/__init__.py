@@ -1,0 +1,4 @@
+"""The page of a batch.
+
+page: the page
+"""
