@@ -19,12 +19,12 @@ from scipy.sparse.linalg import LinearOperator, cg
 from vto_pipeline.bench.bench import Row
 from vto_pipeline.bench.cloth.scenes import sphere
 from vto_pipeline.bench.cloth.solvers import run_scene
-from vto_pipeline.bench.scaling.direct_solvers import _own
+from vto_pipeline.bench.scaling.direct_solvers import own_cholesky
 from vto_pipeline.bench.scaling.gpu import device
 from vto_pipeline.bench.scaling.gpu.__main__ import write_document
 from vto_pipeline.bench.scaling.gpu.layout import SIZES, lay_out, one_by_one
 from vto_pipeline.bench.scaling.gpu.systems import System, read_systems, recorded_systems, write_systems
-from vto_pipeline.bench.scaling.throughput import _cloth, _compiled_sweep
+from vto_pipeline.bench.scaling.throughput import compiled_sweep, sheet_cloth
 from vto_pipeline.cloth.constraints.sweep import multipliers
 from vto_pipeline.cloth.dynamics.stepper import StepConfig
 from vto_pipeline.cloth.implicit_step.linear_system import LinearSystem
@@ -142,7 +142,7 @@ def by_domains(layout):
 
 def test_conjugate_gradients_by_domains_end_where_the_factorisation_does(met):
     last = met[1]
-    own = _own(last.matrix)
+    own = own_cholesky(last.matrix)
     own.factor()
     wanted, counts = own.solve(last.right), []
     for size in SIZES:
@@ -157,7 +157,7 @@ def test_conjugate_gradients_by_domains_end_where_the_factorisation_does(met):
 
 
 def test_constraints_of_a_colour_share_no_vertex_and_none_is_lost():
-    model, _ = _cloth(12)
+    model, _ = sheet_cloth(12)
     for data in model.constraints:
         fine = one_by_one(data, 144)
         for first, last in zip(fine.colours[:-1], fine.colours[1:], strict=True):
@@ -218,10 +218,10 @@ def test_the_kernel_solves(kernels, system, size, blocks, threads):
 
 
 def test_the_kernel_sweeps_as_we_do(kernels):
-    model, x = _cloth(9)
+    model, x = sheet_cloth(9)
     x = x + 1e-3 * np.random.default_rng(1).standard_normal(x.shape)
     bend, stretch = (one_by_one(data, 81) for data in model.constraints)
-    here, lambdas, sweep = x.copy(), multipliers((bend, stretch)), _compiled_sweep()
+    here, lambdas, sweep = x.copy(), multipliers((bend, stretch)), compiled_sweep()
     there, strained, bent = x.copy(), np.zeros((len(stretch.vertices), 3)), np.zeros(len(bend.vertices))
     for _ in range(4):
         sweep(here, x, model.inverse_mass, (bend, stretch), lambdas, H, False)

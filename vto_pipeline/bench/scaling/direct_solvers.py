@@ -70,7 +70,7 @@ def _measure(prepare: Callable[[BlockMatrix], Direct], count: int) -> Measured:
     }
 
 
-def _own(matrix: BlockMatrix) -> Direct:
+def own_cholesky(matrix: BlockMatrix) -> Direct:
     """Return the solver of `cloth.implicit_step.linear_system`."""
     weights, between = np.empty((0, 4)), np.empty((0, 3, 3))
     order = dissection(matrix.starts, matrix.columns)
@@ -135,7 +135,7 @@ def _mkl_threads(count: int) -> Iterator[None]:
 
 
 _SOLVERS: dict[str, Callable[[BlockMatrix], Direct]] = {
-    "own Cholesky": _own,
+    "own Cholesky": own_cholesky,
     "MKL PARDISO": _pardiso,
     "SuperLU": _superlu,
 }

@@ -91,8 +91,8 @@ def _measure(make: Callable[[int, bool], Kernel], count: int, threads: int) -> M
 
 def projection_sweep(count: int, threaded: bool) -> Kernel:
     """Return one Gauss-Seidel sweep over a sheet of count x count vertices."""
-    model, x = _cloth(count)
-    sweep = _compiled_sweep()
+    model, x = sheet_cloth(count)
+    sweep = compiled_sweep()
     start, lambdas = x.copy(), multipliers(model.constraints)
     w, constraints = model.inverse_mass, model.constraints
     moved = _data_bytes(model) + 2 * sum(each.nbytes for each in lambdas) + w.nbytes + 2 * x.nbytes
@@ -102,7 +102,7 @@ def projection_sweep(count: int, threaded: bool) -> Kernel:
 
 
 def _forces(count: int, threaded: bool) -> Kernel:
-    model, x = _cloth(count)
+    model, x = sheet_cloth(count)
     forces = np.zeros_like(x)
     return Kernel(
         lambda: add_forces(x, model.constraints, forces),
@@ -112,7 +112,7 @@ def _forces(count: int, threaded: bool) -> Kernel:
 
 
 def _stiffness_assembly(count: int, threaded: bool) -> Kernel:
-    model, x = _cloth(count)
+    model, x = sheet_cloth(count)
     stiffness = Stiffness(model)
     places = sum(4 * len(data.vertices) * data.vertices.shape[1] ** 2 for data in model.constraints)
     moved = _data_bytes(model) + x.nbytes + places + 2 * stiffness.assemble(x).blocks.nbytes
@@ -120,7 +120,7 @@ def _stiffness_assembly(count: int, threaded: bool) -> Kernel:
 
 
 def _block_multiply(count: int, threaded: bool) -> Kernel:
-    model, x = _cloth(count)
+    model, x = sheet_cloth(count)
     matrix, product = Stiffness(model).assemble(x, 1.0, _H**2), np.zeros_like(x)
     moved = matrix.blocks.nbytes + matrix.columns.nbytes + matrix.starts.nbytes + 2 * x.nbytes
     return Kernel(lambda: multiply(matrix, x, product), moved, 18 * len(matrix.blocks))
@@ -136,11 +136,11 @@ _KERNELS = {
 
 def sheet_system(count: int, h: float) -> BlockMatrix:
     """Return M + h² K of a sheet of count x count vertices, a little strained and bent, for a step h [s]."""
-    model, x = _cloth(count)
+    model, x = sheet_cloth(count)
     return Stiffness(model).assemble(x, 1.0, h * h)
 
 
-def _cloth(count: int) -> tuple[ClothModel, FloatArray]:
+def sheet_cloth(count: int) -> tuple[ClothModel, FloatArray]:
     """Return a sheet, and positions at which it is a little strained and bent."""
     across, along, faces = grid(count)
     flat = np.column_stack([across, along, np.zeros(len(along))])
@@ -156,7 +156,7 @@ def _data_bytes(model: ClothModel) -> int:
     return sum(value.nbytes for value in arrays)
 
 
-def _compiled_sweep() -> Any:
+def compiled_sweep() -> Any:
     """Return a sweep that Python can call; not cached, since its file does not change with the constraints."""
 
     @njit(error_model="numpy")

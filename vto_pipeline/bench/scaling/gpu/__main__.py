@@ -23,13 +23,13 @@ from vto_pipeline.bench.cloth.solvers import run_scene
 from vto_pipeline.bench.live_rows import LiveRows
 from vto_pipeline.bench.machine import this_machine
 from vto_pipeline.bench.provenance import provenance
-from vto_pipeline.bench.scaling.direct_solvers import _own
+from vto_pipeline.bench.scaling.direct_solvers import own_cholesky
 from vto_pipeline.bench.scaling.gpu import TRADE
 from vto_pipeline.bench.scaling.gpu.cusolver import cusolver_cholesky
 from vto_pipeline.bench.scaling.gpu.device import Device
 from vto_pipeline.bench.scaling.gpu.layout import SIZES, lay_out, one_by_one
 from vto_pipeline.bench.scaling.gpu.systems import System, read_systems, recorded_systems, write_systems
-from vto_pipeline.bench.scaling.throughput import _cloth, _compiled_sweep, seconds_of, sheet_system
+from vto_pipeline.bench.scaling.throughput import compiled_sweep, seconds_of, sheet_cloth, sheet_system
 from vto_pipeline.bench.timing import clocked, threads_now, timed
 from vto_pipeline.cloth.constraints.sweep import multipliers
 from vto_pipeline.cloth.dynamics.stepper import StepConfig
@@ -110,7 +110,7 @@ def systems_of(file: Path | None, sides: Sequence[int]) -> Iterator[System]:
     for side in sides:
         matrix = sheet_system(side, _STEP)
         right = np.random.default_rng(0).standard_normal((side**2, 3))
-        own = _own(matrix)
+        own = own_cholesky(matrix)
         own.factor()
         yield System(f"{side**2} sheet", matrix, right, own.solve(right))
 
@@ -118,7 +118,7 @@ def systems_of(file: Path | None, sides: Sequence[int]) -> Iterator[System]:
 def processor_systems(file: Path | None, sides: Sequence[int]) -> Rows:
     """Our factorisation and solution on 1, 2, 4 ... threads."""
     for system in systems_of(file, sides):
-        own = _own(system.matrix)
+        own = own_cholesky(system.matrix)
         own.factor()
         for threads in _threads():
             with limited_threads(threads):
@@ -162,9 +162,9 @@ def device_elimination(file: Path | None, sides: Sequence[int]) -> Rows:
 
 def processor_sweeps(file: Path | None, sides: Sequence[int]) -> Rows:
     """One sweep of XPBD by ours on 1, 2, 4 ... threads."""
-    sweep = _compiled_sweep()
+    sweep = compiled_sweep()
     for side in sides:
-        model, x = _cloth(side)
+        model, x = sheet_cloth(side)
         for threads in _threads():
             with limited_threads(threads):
                 timing = seconds_of(partial(_swept, sweep, model, model.constraints, x, threads > 1))
@@ -174,9 +174,9 @@ def processor_sweeps(file: Path | None, sides: Sequence[int]) -> Rows:
 
 def device_sweeps(file: Path | None, sides: Sequence[int]) -> Rows:
     """One sweep of XPBD on the device; where ours leads from the same positions in the same order."""
-    device, sweep = Device(), _compiled_sweep()
+    device, sweep = Device(), compiled_sweep()
     for side in sides:
-        model, x = _cloth(side)
+        model, x = sheet_cloth(side)
         bend, stretch = (one_by_one(data, side**2) for data in model.constraints)
         there, seconds = device.sweeps(_SWEEPS, x, model.inverse_mass, bend, stretch, _H)
         here = _swept(sweep, model, (bend, stretch), x, False)
