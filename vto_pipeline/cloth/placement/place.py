@@ -143,6 +143,10 @@ def find_placement(
             f"{_relative_score(stands.score, best.score):.0%} of the best"
         )
     stretch, best = _enlarge_until_body_inside(metres, cubes, best, config)
+    if config.place == "auto":
+        best = _where_limbs_go_through_openings(
+            TriangleMesh(stretch * metres.vertices, metres.faces), cubes, best, config, job
+        )
     if stretch > 1.0:
         job.warn(f"too small: this body needs it {stretch - 1:.0%} larger; it starts stretched by that much")
     share = _relative_score(best.score_in_place, best.score)
@@ -203,6 +207,25 @@ def _as_laid_out(garment: TriangleMesh, body: BodyCubes, config: PlaceConfig, jo
         f"({', '.join(f'{1e3 * part:.0f}' for part in best.shift)}) mm (x, y, z)"
     )
     return Placement(1.0, best.turn, 1.0, best.shift)
+
+
+def _where_limbs_go_through_openings(
+    garment: TriangleMesh, body: BodyCubes, best: VoxelPlacement, config: PlaceConfig, job: Job
+) -> VoxelPlacement:
+    """Return the best place, or the next best height at which fewer limbs go through cloth.
+
+    A trunk fills a loose skirt as well as hips do, but there its arms are in the way.
+    """
+    thinning = Thinning(body.mesh)
+
+    def at_other_heights() -> list[VoxelPlacement]:
+        fit = VoxelFit(garment, body, 1e-3 * config.cube_mm, config.cloth_in_body)
+        return fit.best_placements(best.turn, _HEIGHTS)
+
+    def pierced(there: TriangleMesh) -> int:  # what sleeves on arms put right need not be led
+        return thinning.limbs_astray(there) and plan_body_growth(body.mesh, there, Job()).pierced
+
+    return _least_pierced(best, at_other_heights, garment, pierced, job)
 
 
 def _least_pierced(
