@@ -58,6 +58,16 @@ def test_where_a_file_has_arms_go_through_cloth_another_height_is_taken():
     assert any("fewer limbs" in note for note in job.notes)
 
 
+def test_a_mesh_whose_best_place_has_arms_through_it_goes_to_another_height():
+    """A trunk fills a loose skirt better than the hips do. Without arms it stays there."""
+    loose, job, body = skirt(1.3), Job(), figure(BELOW)
+    arms = height_of_arms()
+    top, bottom = top_and_bottom(find_placement(loose, body, PlaceConfig(), job), loose)
+    assert not bottom < arms < top
+    assert any("fewer limbs" in note for note in job.notes)
+    assert find_placement(loose, figure(1.5), PlaceConfig(), Job()).shift[1] == 0.0
+
+
 @pytest.mark.parametrize("top", [2.35, 3.0])
 def test_what_lies_beside_the_body_wherever_the_file_has_it_is_looked_for(top):
     body = figure(BELOW)
