@@ -237,3 +237,7 @@ class Thinning:
         led = lead_onto_limbs(garment, self.after(0), self.limbs, thin, pieces)
         there = [piece.misplaced() for piece in pieces_with_limbs(led, self.limbs, thin)]
         return sum(len(one & other) for one, other in zip(here, there, strict=True))
+
+    def limbs_in_the_way(self, garment: TriangleMesh) -> int:
+        """Return how many limbs go through cloth that no opening is there for alone: arms, of what has no sleeves."""
+        return sum(len(piece.in_the_way()) for piece in pieces_with_limbs(garment, self.limbs, self.after(_LINES)))

@@ -46,18 +46,25 @@ class Piece(NamedTuple):
 
     def astray(self) -> list[int]:
         """Return the limbs that go through cloth, or not through the opening that is there for them alone."""
-        alone = [self.meant.count(opening) == 1 for opening in self.meant]
+        alone = self._alone()
         return [
             limb
             for limb, (meant, through) in enumerate(zip(self.meant, self.through, strict=True))
-            if len(self.pierced[limb]) > 0 or (meant >= 0 and alone[limb] and len(through) > 0 and meant not in through)
+            if len(self.pierced[limb]) > 0 or (limb in alone and len(through) > 0 and meant not in through)
         ]
 
     def misplaced(self) -> set[int]:
         """Return the limbs that are astray, or never come to the opening that is there for them alone."""
-        alone = {limb for limb, opening in enumerate(self.meant) if opening >= 0 and self.meant.count(opening) == 1}
-        idle = {limb for limb in alone if self.meant[limb] not in self.through[limb]}
+        idle = {limb for limb in self._alone() if self.meant[limb] not in self.through[limb]}
         return idle | set(self.astray())
+
+    def in_the_way(self) -> set[int]:
+        """Return the limbs that go through cloth, and that no opening is there for alone: they are not to be worn."""
+        return {limb for limb, places in enumerate(self.pierced) if len(places) > 0} - self._alone()
+
+    def _alone(self) -> set[int]:
+        """Return the limbs that have an opening to themselves."""
+        return {limb for limb, opening in enumerate(self.meant) if opening >= 0 and self.meant.count(opening) == 1}
 
     def missed(self, limb: int) -> str:
         """Return in words how far from its opening a limb goes through cloth; nothing where that is unknown."""

@@ -144,7 +144,7 @@ def find_placement(
         )
     stretch, best = _enlarge_until_body_inside(metres, cubes, best, config)
     if config.place == "auto":
-        best = _where_limbs_go_through_openings(
+        best = _where_no_limb_is_in_the_way(
             TriangleMesh(stretch * metres.vertices, metres.faces), cubes, best, config, job
         )
     if stretch > 1.0:
@@ -209,23 +209,19 @@ def _as_laid_out(garment: TriangleMesh, body: BodyCubes, config: PlaceConfig, jo
     return Placement(1.0, best.turn, 1.0, best.shift)
 
 
-def _where_limbs_go_through_openings(
+def _where_no_limb_is_in_the_way(
     garment: TriangleMesh, body: BodyCubes, best: VoxelPlacement, config: PlaceConfig, job: Job
 ) -> VoxelPlacement:
-    """Return the best place, or the next best height at which fewer limbs go through cloth.
+    """Return the best place, or the next best height at which fewer limbs are in the way.
 
-    A trunk fills a loose skirt as well as hips do, but there its arms are in the way.
+    A trunk may fill a loose skirt better than the hips do, but there its arms go through the cloth.
     """
-    thinning = Thinning(body.mesh)
 
     def at_other_heights() -> list[VoxelPlacement]:
         fit = VoxelFit(garment, body, 1e-3 * config.cube_mm, config.cloth_in_body)
         return fit.best_placements(best.turn, _HEIGHTS)
 
-    def pierced(there: TriangleMesh) -> int:  # what sleeves on arms put right need not be led
-        return thinning.limbs_astray(there) and plan_body_growth(body.mesh, there, Job()).pierced
-
-    return _least_pierced(best, at_other_heights, garment, pierced, job)
+    return _least_pierced(best, at_other_heights, garment, Thinning(body.mesh).limbs_in_the_way, job)
 
 
 def _least_pierced(
