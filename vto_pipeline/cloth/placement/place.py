@@ -147,6 +147,7 @@ def find_placement(
         best = _where_no_limb_is_in_the_way(
             TriangleMesh(stretch * metres.vertices, metres.faces), cubes, best, config, job
         )
+    job.metrics["needs_larger_share"] = stretch - 1.0
     if stretch > 1.0:
         job.warn(f"too small: this body needs it {stretch - 1:.0%} larger; it starts stretched by that much")
     share = _relative_score(best.score_in_place, best.score)
