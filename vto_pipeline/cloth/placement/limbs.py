@@ -96,6 +96,13 @@ class Limbs:
         _, piece = connected_components(self._graph[level][:, level], directed=False)
         return level[piece == np.bincount(piece, self._area[level]).argmax()].astype(np.int32)
 
+    @property
+    def parting(self) -> float:
+        """Height at which the legs part [m]; minus infinity where no two legs are known."""
+        legs = [limb for limb in self.limbs if limb.name.endswith("leg")]
+        tops = [float(limb.axis[limb.along <= limb.joins][-1, 1]) for limb in legs]
+        return sum(tops) / len(tops) if tops else -np.inf
+
     def ways_in(self, thin: TriangleMesh) -> list[FloatArray]:
         """Return the shortest ways over the skin from the end of each limb to the belt [m], shape (N, 3) each.
 

@@ -152,7 +152,7 @@ def relax_to_rest(
         if after.positions[:, 1].max() < limits.lowest:
             raise FallenError(
                 "the garment has fallen off the body: nothing holds it",
-                hint="does it go around the body, right way up, and is it small enough?",
+                hint="does it go around the body, right way up, and is it tight enough above the legs to be held?",
             )
         if residual >= limits.residual or rms(after.positions - stood_at) > _THERE * limits.error:
             stood, stood_at = 0.0, after.positions

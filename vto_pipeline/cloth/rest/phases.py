@@ -17,6 +17,7 @@ from vto_pipeline.cloth.model.build import ClothModel, ClothState, at_rest, with
 from vto_pipeline.cloth.placement.body_growth import plan_body_growth
 from vto_pipeline.cloth.placement.clear_body import OVERSTRETCHED, clear_body_crossings, longest_stretch
 from vto_pipeline.cloth.placement.collision_free_start import find_collision_free_start
+from vto_pipeline.cloth.placement.limbs import Limbs
 from vto_pipeline.cloth.rest.convergence import SettleLimits, SettlingResult, relax_to_rest
 from vto_pipeline.cloth.rest.true_distance import some_positions
 from vto_pipeline.cloth.simulation import default_skin
@@ -187,7 +188,7 @@ class Phases:
             seconds=self._config.settle_seconds,
             finest=self._config.finest,
             deadline=deadline,
-            lowest=float(body.vertices[:, 1].min()),
+            lowest=_lowest_hold(body, state.positions),
         )
         faces, rest = self._model.faces, self._rest.positions
 
@@ -233,3 +234,12 @@ class Phases:
         every = (*before, self)
         counters = [count for one in every for count in one._counters]
         report_counters(counters, [collider for one in every for collider in one._colliders], self._job)
+
+
+def _lowest_hold(body: TriangleMesh, positions: FloatArray) -> float:
+    """Return the height under which nothing can hold cloth that is here [m].
+
+    That is where the body ends; or where its legs part, for cloth above: what slides past its hips ends at its feet.
+    """
+    parting = Limbs(body).parting
+    return max(float(body.vertices[:, 1].min()), parting if float(positions[:, 1].max()) > parting else -np.inf)
