@@ -6,13 +6,14 @@ from cloth_scenes import moved
 from figures import ARM, SHOULDER, arm_end, figure, tunic
 from numpy.testing import assert_allclose
 
-from vto_pipeline.cloth.placement.body_growth import plan_body_growth
+from vto_pipeline.cloth.placement.body_growth import Thinning, _least_faulty, plan_body_growth
 from vto_pipeline.cloth.placement.limb_openings import pieces_with_limbs
 from vto_pipeline.cloth.placement.limbs import Limbs
 from vto_pipeline.errors import IntersectingError
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import boundary_loops
 from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
 
 
 def distance_to_bone(points, a, b):
@@ -101,3 +102,15 @@ def test_a_thin_body_stays_within_the_full_one():
     assert len(growth.body.keyframes) > 1
     outside = SurfaceDistance(body).signed(growth.body.keyframes.reshape(-1, 3)).distance
     assert outside.max() < 1e-9
+
+
+def test_what_is_too_small_for_arms_to_find_its_sleeves_starts_larger():
+    """Three quarters of its size: arms go through the cloth wherever it is led, and do not once it is 20 % larger."""
+    body, made = figure(0.9), tunic(0.3)
+    middle = made.vertices.mean(axis=0)
+    small = TriangleMesh(middle + 0.75 * (made.vertices - middle), made.faces)
+    assert _least_faulty(Thinning(body), small).pierced > 0
+    job = Job()
+    growth = plan_body_growth(body, small, job)
+    assert growth.fault == (0, 0)
+    assert any("20% larger" in warning for warning in job.warnings)

@@ -38,6 +38,7 @@ _FEW = 1500  # vertices of a garment that is led
 _LED_BY = (0, 3, 6)  # steps of thinning after which the garment is led about the body: the thin one leaves room
 _STILL_WORN = 0.5  # of the body's surface that was in the garment: with less, it is led to another part of the body
 _LARGER = (1.1, 1.2, 1.35, 1.5)  # times: so much it may start larger than it is
+_LED_LARGER = 1.2  # times, to be led: small enough for sleeves to stay near their arms
 
 
 class BodyGrowth(NamedTuple):
@@ -104,7 +105,7 @@ def plan_body_growth(body: TriangleMesh, garment: TriangleMesh, job: Job) -> Bod
     cloth that lies anyhow about it.
 
     A garment that is too small for where it is worn starts larger: tight is no reason to be worn elsewhere, a skirt
-    about the neck.
+    about the neck. So it does where limbs go through cloth however it is led: they may find their openings then.
 
     Args:
         body: Closed or with holes [m].
@@ -112,6 +113,30 @@ def plan_body_growth(body: TriangleMesh, garment: TriangleMesh, job: Job) -> Bod
         job: Warned when the garment is led, or no thinning gets the body clear of it.
     """
     thinning = Thinning(body)
+    best = _least_faulty(thinning, garment)
+    if best.pierced > 0:
+        larger = _least_faulty(thinning, _times_larger(garment, _LED_LARGER))
+        if larger.fault == (0, 0):
+            job.warn(f"too small: it starts {_LED_LARGER - 1:.0%} larger, for limbs to find their openings")
+            best = larger
+    if best.garment is not garment:
+        way = 1e3 * np.linalg.norm(best.garment.vertices - garment.vertices, axis=1)
+        job.warn(
+            f"the garment does not surround the body as it stands; it was moved by {np.median(way):.0f} mm (median), "
+            f"{way.max():.0f} mm at most, before the body grows"
+        )
+    if best.crossing > 0:
+        best = _larger(best, thinning, job)
+    if best.crossing > 0:
+        job.warn(
+            f"the garment does not surround the body: {best.crossing} pairs of triangles cross it even at its thinnest"
+        )
+    return best
+
+
+def _least_faulty(thinning: Thinning, garment: TriangleMesh) -> BodyGrowth:
+    """Return the growth with the fewest faults, of the garment where it is and wherever it is led."""
+    body = thinning.after(0)
     first = best = thinning.growth(garment)
     if first.fault == (0, 0):
         return first
@@ -133,18 +158,6 @@ def plan_body_growth(body: TriangleMesh, garment: TriangleMesh, job: Job) -> Bod
         best = best_of((TriangleMesh(few.prolong(led.vertices), garment.faces) for led in ways), best)
     if few is None or (best.pierced == 0 and best.fault != (0, 0)):  # limbs that few do not free, all do not, either
         best = best_of(_led(garment, first.pieces, thinning, astray=astray), best)
-    if best is not first:
-        way = 1e3 * np.linalg.norm(best.garment.vertices - garment.vertices, axis=1)
-        job.warn(
-            f"the garment does not surround the body as it stands; it was moved by {np.median(way):.0f} mm (median), "
-            f"{way.max():.0f} mm at most, before the body grows"
-        )
-    if best.crossing > 0:
-        best = _larger(best, thinning, job)
-    if best.crossing > 0:
-        job.warn(
-            f"the garment does not surround the body: {best.crossing} pairs of triangles cross it even at its thinnest"
-        )
     return best
 
 
@@ -176,14 +189,18 @@ def _few_vertices(garment: TriangleMesh) -> CoarseGarment | None:
 
 def _larger(tight: BodyGrowth, thinning: Thinning, job: Job) -> BodyGrowth:
     """Return the growth with the garment so much larger about its middle that nothing crosses; as it was if none is."""
-    positions = tight.garment.vertices
-    middle = positions.mean(axis=0)
     for times in _LARGER:
-        larger = thinning.growth(TriangleMesh(middle + times * (positions - middle), tight.garment.faces))
+        larger = thinning.growth(_times_larger(tight.garment, times))
         if larger.fault == (0, 0):
             job.warn(f"too small: it starts {times - 1:.0%} larger, where it is worn")
             return larger
     return tight
+
+
+def _times_larger(garment: TriangleMesh, times: float) -> TriangleMesh:
+    """Return the garment so many times as large, about its middle."""
+    middle = garment.vertices.mean(axis=0)
+    return TriangleMesh(middle + times * (garment.vertices - middle), garment.faces)
 
 
 def _enclosed(garment: TriangleMesh, body: TriangleMesh) -> NDArray[np.bool_]:
