@@ -6,6 +6,7 @@ import trimesh
 from numpy.testing import assert_allclose
 
 from vto_pipeline.garment.simulation_mesh import SimulationMeshConfig, least_angles, remesh_for_simulation
+from vto_pipeline.geometry.intersections import self_intersections
 from vto_pipeline.geometry.remeshing.remesh import edge_lengths
 from vto_pipeline.geometry.remeshing.repair import is_manifold
 from vto_pipeline.geometry.remeshing.rims import perimeter
@@ -179,3 +180,29 @@ def test_an_opening_that_no_edges_can_follow_is_named():
         before, after = (max(perimeter(m, loop) for loop in boundary_loops(m)) for m in (mesh, made))
         assert (abs(after / before - 1.0) > 0.02) == named
         assert any("an opening is" in text for text in job.warnings) == named
+
+
+def folded(gap, width=0.3, arm=0.12, fine=0.008):
+    """A sheet folded by 180 degrees, its halves this far apart [m]."""
+    r = 0.5 * gap
+    s = np.arange(0.0, 2.0 * arm + np.pi * r, fine)
+    turn = np.clip((s - arm) / r, 0.0, np.pi)
+    y = np.minimum(s, arm) + r * np.sin(turn) - np.maximum(s - arm - np.pi * r, 0.0)
+    x = np.arange(0.0, width, fine)
+    vertices = np.stack(np.broadcast_arrays(x[None], y[:, None], r * np.cos(turn)[:, None]), axis=-1).reshape(-1, 3)
+    at = np.arange(len(s) * len(x)).reshape(len(s), len(x))
+    a, b, c, d = at[:-1, :-1].ravel(), at[:-1, 1:].ravel(), at[1:, 1:].ravel(), at[1:, :-1].ravel()
+    return TriangleMesh(vertices, np.vstack([np.column_stack([a, b, d]), np.column_stack([b, c, d])]).astype(np.int32))
+
+
+@pytest.mark.parametrize(("gap", "edge_mm"), [(0.02, 10.0), (0.02, 20.0), (0.004, 10.0)])
+def test_it_warns_exactly_where_layers_that_lay_apart_cross(gap, edge_mm):
+    fold, job = folded(gap), Job()
+    made = remesh_for_simulation(fold, SimulationMeshConfig(edge_mm=edge_mm), job)
+    assert len(self_intersections(fold)) == 0
+    crossed = len(self_intersections(made))
+    warned = [text for text in job.warnings if "pairs of triangles cross" in text]
+    assert len(warned) == (crossed > 0)
+    if crossed:
+        assert f"{crossed} pairs" in warned[0]
+        assert gap < 0.01  # one edge: layers farther apart are told apart

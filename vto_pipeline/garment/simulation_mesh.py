@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from vto_pipeline.errors import GarmentError
+from vto_pipeline.geometry.intersections import self_intersections
 from vto_pipeline.geometry.remeshing.holes import fill_holes
 from vto_pipeline.geometry.remeshing.remesh import SAME_RIM, RemeshConfig, edge_lengths, remesh
 from vto_pipeline.geometry.remeshing.repair import RepairConfig, is_manifold, is_oriented, repair
@@ -136,9 +137,22 @@ def _remesh_piece(piece: TriangleMesh, config: SimulationMeshConfig, job: Job) -
         job.notes += tried.notes
         for name in ("hausdorff_mm", "deviation_rms_mm", "opening_change"):
             job.measure(**{name: max(_figure(job, name), _figure(tried, name))})
+        _warn_of_crossings(piece, made, job)
         return made
     job.warn(f"a piece of {len(piece.faces)} faces could not be remeshed and is used as it is")
     return piece
+
+
+def _warn_of_crossings(before: TriangleMesh, after: TriangleMesh, job: Job) -> None:
+    """Warn where layers that lay apart cross: what is put back on the surface may meet the wrong one of a fold."""
+    pairs = self_intersections(after)
+    if len(pairs) == 0 or len(self_intersections(before)) > 0:
+        return
+    x, y, z = after.vertices[after.faces[pairs[0, 0]]].mean(axis=0)
+    job.warn(
+        f"remeshing made {len(pairs)} pairs of triangles cross, near ({x:.2f}, {y:.2f}, {z:.2f}): layers lie closer "
+        "there than such triangles can tell apart, and may jam; try another edge length (edge_mm)"
+    )
 
 
 def _without_pinholes(piece: TriangleMesh, edge: float, job: Job) -> TriangleMesh:
