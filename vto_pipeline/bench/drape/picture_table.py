@@ -26,14 +26,15 @@ def write_picture_table(
     bodies: Mapping[str, Path],
     folder: Callable[[Mapping[str, Value]], Path],
 ) -> None:
-    """Write a PNG with a picture of each row's drape, or as far as it got.
+    """Write a PNG with a picture of each row's drape on one of these bodies, or as far as it got.
 
     Args:
         path: Of the PNG.
-        rows: With "garment", "body", "fabric", "outcome", "settled", "too_small" and "seconds".
+        rows: Of these bodies and others, with "garment", "body", "fabric", "outcome", "settled", "too_small" and "seconds".
         bodies: Mesh files by name.
         folder: Returns where a row's run is.
     """
+    rows = [row for row in rows if row["body"] in bodies]
     across = list(dict.fromkeys((str(row["body"]), str(row["fabric"])) for row in rows))
     down = list(dict.fromkeys(str(row["garment"]) for row in rows))
     tall = _TALL + 2 * _LINE
