@@ -30,7 +30,7 @@ def write_picture_table(
 
     Args:
         path: Of the PNG.
-        rows: Of these bodies and others, with "garment", "body", "fabric", "outcome", "settled", "too_small" and "seconds".
+        rows: Of these bodies and others: "garment", "body", "fabric", "outcome", "settled", "too_small" and "seconds".
         bodies: Mesh files by name.
         folder: Returns where a row's run is.
     """
