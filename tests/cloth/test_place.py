@@ -7,12 +7,14 @@ import pytest
 from cloth_scenes import moved, tube
 from numpy.testing import assert_allclose
 
+from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.cloth.placement.place import PlaceConfig, _as_files_have_it, find_placement
 from vto_pipeline.cloth.placement.voxel_fit import BodyCubes, VoxelFit, quarter_turns
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.remeshing.remesh import RemeshConfig, remesh
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.io.meshes import read_mesh
+from vto_pipeline.model.body import Measurements
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -210,3 +212,20 @@ def test_a_garment_on_its_head_is_turned_where_that_fits_far_better():
     lying = TriangleMesh(skirt().vertices @ DOWN.T, skirt().faces)
     found = find_placement(lying, pear(), FINE, Job())
     assert_allclose(found.turn[1], [0.0, -1.0, 0.0], rtol=0, atol=0)
+
+
+@pytest.mark.real_data
+@pytest.mark.skipif(not DATA.exists(), reason="the data folder is absent")
+@pytest.mark.parametrize("name", ["tshirt", "blouse-short", "vest", "tank-male", "dress3"])
+def test_necklines_go_about_the_nape(name):
+    """Which is at 0.865 of the stature (ANSUR II). Hips fill a tight blouse better than the chest, its neck at the
+    waist."""
+    woman = fit_measurements(Measurements({"stature": 1.7, "bust_girth": 0.84, "hip_girth": 0.92}, sex="female")).mesh
+    bodies = [woman, *(read_mesh(DATA / "bodies" / f"mh_{one}weight.ply") for one in ("female_average", "female_max"))]
+    garment = remesh(
+        read_mesh(DATA / "garments" / "berkeley" / name / f"{name}-iso.obj"), RemeshConfig(edge_mm=20), Job()
+    )
+    for body in bodies:
+        found = find_placement(garment, body, PlaceConfig(), Job())
+        top = found.start_positions(garment.vertices)[:, 1].max() - body.vertices[:, 1].min()
+        assert top / np.ptp(body.vertices[:, 1]) == pytest.approx(0.865, abs=0.05)

@@ -38,6 +38,7 @@ _FEW = 1500  # vertices of a garment that is led
 _LED_BY = (0, 3, 6)  # steps of thinning after which the garment is led about the body: the thin one leaves room
 _STILL_WORN = 0.5  # of the body's surface that was in the garment: with less, it is led to another part of the body
 _LARGER = (1.1, 1.2, 1.35, 1.5)  # times: so much it may start larger than it is
+_FAR_FROM_NECK = 0.1  # of the stature: from where the head joins to the top of a neckline, which goes about the nape
 _LED_LARGER = 1.2  # times, to be led: small enough for sleeves to stay near their arms
 
 
@@ -255,6 +256,20 @@ class Thinning:
         there = [piece.misplaced() for piece in pieces_with_limbs(led, self.limbs, thin)]
         return sum(len(one & other) for one, other in zip(here, there, strict=True))
 
-    def limbs_in_the_way(self, garment: TriangleMesh) -> int:
-        """Return how many limbs go through cloth that no opening is there for alone: arms, of what has no sleeves."""
-        return sum(len(piece.in_the_way()) for piece in pieces_with_limbs(garment, self.limbs, self.after(_LINES)))
+    def limbs_out_of_place(self, garment: TriangleMesh) -> int:
+        """Return how many limbs tell that a garment is not worn at this height.
+
+        These are arms that go through the cloth of what has one opening for both, and so no sleeves; and a head whose
+        own opening is far from the neck.
+        """
+        names = [limb.name for limb in self.limbs.limbs]
+        arms = [number for number, name in enumerate(names) if name.endswith("arm")]
+        far = _FAR_FROM_NECK * float(np.ptp(self.after(0).vertices[:, 1]))
+        count = 0
+        for piece in pieces_with_limbs(garment, self.limbs, self.after(_LINES)):
+            if len({piece.meant[arm] for arm in arms}) == 1:
+                count += sum(len(piece.pierced[arm]) > 0 for arm in arms)
+            neck = piece.own_opening(names.index("head")) if "head" in names else None
+            if neck is not None:
+                count += abs(float(neck[:, 1].max()) - self.limbs.limbs[names.index("head")].root[1]) > far
+        return count

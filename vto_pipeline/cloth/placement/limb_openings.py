@@ -58,9 +58,9 @@ class Piece(NamedTuple):
         idle = {limb for limb in self._alone() if self.meant[limb] not in self.through[limb]}
         return idle | set(self.astray())
 
-    def in_the_way(self) -> set[int]:
-        """Return the limbs that go through cloth, and that no opening is there for alone: they are not to be worn."""
-        return {limb for limb, places in enumerate(self.pierced) if len(places) > 0} - self._alone()
+    def own_opening(self, limb: int) -> FloatArray | None:
+        """Return the opening that is there for a limb alone [m], shape (N, 3); None where there is none."""
+        return self.mesh.vertices[self.openings[self.meant[limb]]] if limb in self._alone() else None
 
     def _alone(self) -> set[int]:
         """Return the limbs that have an opening to themselves."""

@@ -48,6 +48,11 @@ class Limb(NamedTuple):
     joins: float
     members: NDArray[np.bool_]
 
+    @property
+    def root(self) -> FloatArray:
+        """Where its axis comes to the body [m], shape (3,)."""
+        return self.axis[self.along <= self.joins][-1]
+
 
 class Limbs:
     """The limbs of a body, +Y up and +Z its front, the highest first.
@@ -100,7 +105,7 @@ class Limbs:
     def parting(self) -> float:
         """Height at which the legs part [m]; minus infinity where no two legs are known."""
         legs = [limb for limb in self.limbs if limb.name.endswith("leg")]
-        tops = [float(limb.axis[limb.along <= limb.joins][-1, 1]) for limb in legs]
+        tops = [float(limb.root[1]) for limb in legs]
         return sum(tops) / len(tops) if tops else -np.inf
 
     def ways_in(self, thin: TriangleMesh) -> list[FloatArray]:

@@ -144,7 +144,7 @@ def find_placement(
         )
     stretch, best = _enlarge_until_body_inside(metres, cubes, best, config)
     if config.place == "auto":
-        best = _where_no_limb_is_in_the_way(
+        best = _where_limbs_are_in_place(
             TriangleMesh(stretch * metres.vertices, metres.faces), cubes, best, config, job
         )
     job.metrics["needs_larger_share"] = stretch - 1.0
@@ -210,19 +210,20 @@ def _as_laid_out(garment: TriangleMesh, body: BodyCubes, config: PlaceConfig, jo
     return Placement(1.0, best.turn, 1.0, best.shift)
 
 
-def _where_no_limb_is_in_the_way(
+def _where_limbs_are_in_place(
     garment: TriangleMesh, body: BodyCubes, best: VoxelPlacement, config: PlaceConfig, job: Job
 ) -> VoxelPlacement:
-    """Return the best place, or the next best height at which fewer limbs are in the way.
+    """Return the best place, or the next best height at which fewer limbs are out of place.
 
-    A trunk may fill a loose skirt better than the hips do, but there its arms go through the cloth.
+    A trunk may fill a loose skirt better than the hips do, but there its arms go through the cloth; and hips a tight
+    blouse better than the chest does, but there its neck is at the waist.
     """
 
     def at_other_heights() -> list[VoxelPlacement]:
         fit = VoxelFit(garment, body, 1e-3 * config.cube_mm, config.cloth_in_body)
         return fit.best_placements(best.turn, _HEIGHTS)
 
-    return _least_pierced(best, at_other_heights, garment, Thinning(body.mesh).limbs_in_the_way, job)
+    return _least_pierced(best, at_other_heights, garment, Thinning(body.mesh).limbs_out_of_place, job)
 
 
 def _least_pierced(
@@ -232,13 +233,13 @@ def _least_pierced(
     astray: Callable[[TriangleMesh], int],
     job: Job,
 ) -> VoxelPlacement:
-    """Return the first place, or the next in which fewer limbs go through cloth.
+    """Return the first place, or the next in which fewer limbs are astray.
 
     Args:
         first: The best place.
         others: Finds further ones, the next best first.
         garment: As large as it starts [m].
-        astray: Counts the limbs that go through cloth where a garment is.
+        astray: Counts the limbs that are not where they are meant to be, with a garment there.
         job: Receives that it went elsewhere.
     """
 
@@ -248,7 +249,7 @@ def _least_pierced(
     best, fewest = first, count(first)
     if fewest == 0:
         return first
-    job.progress(0.0, f"{fewest} limbs go through cloth: other heights are tried")
+    job.progress(0.0, f"{fewest} limbs are astray: other heights are tried")
     for way in others():
         if way.score >= _WORTH_A_TRY * first.score and (found := count(way)) < fewest:
             best, fewest = way, found
@@ -256,7 +257,7 @@ def _least_pierced(
             break
     if best is not first:
         rise = 1e3 * (best.shift[1] - first.shift[1])
-        job.note(f"another height than that which fits best, by {rise:+.0f} mm: fewer limbs go through cloth there")
+        job.note(f"another height than that which fits best, by {rise:+.0f} mm: fewer limbs are astray there")
     return best
 
 
