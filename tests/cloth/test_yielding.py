@@ -5,7 +5,7 @@ import pytest
 from cloth_scenes import ball
 from ipc_judge import self_crosses
 
-from vto_pipeline.avatar.model.pose import named_pose
+from vto_pipeline.avatar.model.pose import named_pose, pose_avatar
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.cloth.collision.body.yielding import YieldingBody, give_way, sunken
 from vto_pipeline.geometry.intersections import self_intersections
@@ -94,3 +94,14 @@ def test_groins_that_turn_inside_out_are_smoothed_until_nothing_passes_through_a
     folds = [person.joint_names.index(f"{side}_{joint}") for side in ("left", "right") for joint in ("hip", "knee")]
     away = np.linalg.norm(person.bind_vertices[:, None] - person.joints[folds], axis=2).min(axis=1)
     assert away[far > 1e-3].max() < 0.3  # about hips and knees, nowhere else
+
+
+@pytest.mark.parametrize(("share", "more"), [(0.5, 1.2), (1.0, 1.15)])
+def test_a_deep_fold_is_smoothed_with_what_lies_about_it(share, more):
+    """Thighs drawn up farther than in a seat; by ipctk. What is inside out there crosses nothing in parts."""
+    seated = named_pose(template(share), "sitting")
+    person = pose_avatar(seated, more * seated.pose, seated.translation)
+    assert len(self_intersections(person.mesh)) > 200
+    moved = sunken(person.mesh, np.arange(len(person.vertices)), ROOM)
+    assert not self_crosses(TriangleMesh(person.vertices + moved, person.faces))
+    assert np.linalg.norm(moved, axis=1).max() < 0.045

@@ -2,7 +2,7 @@
 
 A frame is taken from where the last one ended. If triangles of the cloth then meet the body, the skin of their vertices
 thickens and the frame is tried again; if the cloth overstretches or blows up, it is tried again in half the steps. The
-skin thins out again over the next frames.
+skin thins out again over the next frames, to what the drape needed.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from vto_pipeline.cloth.model.build import ClothModel, ClothState
 from vto_pipeline.cloth.moving.config import FollowConfig
 from vto_pipeline.cloth.moving.frame_audit import stretch_of_edges
 from vto_pipeline.cloth.moving.path_collider import PathCollider
+from vto_pipeline.cloth.moving.skins import draped_skin, thickened
 from vto_pipeline.cloth.simulation import default_skin
 from vto_pipeline.errors import DivergedError
 from vto_pipeline.geometry.intersections import intersecting_faces, self_intersections
@@ -34,9 +35,7 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.motion import BodyPath
 
-_THICKEN = 1e-3  # m an attempt at least,
-_FASTER = 0.15  # and this share of the skin
-_KEPT = 0.9  # share of what the skin is thicker by that is left after a frame
+_THINS_S = 0.5  # s in which the skin loses half of what it is thicker by
 _FINER = 2  # times as many steps where the cloth overstretches
 
 
@@ -121,9 +120,9 @@ class FrameStepper:
         self.natural = laid_edge_lengths(garment.mesh, garment.rest.corners(model.faces))
         self._config = config
         skin = default_skin(model.edge_length) if config.skin_mm is None else 1e-3 * config.skin_mm
-        self._skin = np.full(len(model.mass), skin)
         self.body = YieldingBody(path, skin, beside(path.at(0.0), garment.mesh))
         self._path = self.body.path
+        self._skin = draped_skin(garment.mesh, self.body_at(0.0), skin)
         friction = fabric.friction if config.friction is None else config.friction
         self._collider = PathCollider(self._path, friction, job)
         self._stepper = Stepper(
@@ -161,7 +160,7 @@ class FrameStepper:
         for attempt in range(1, self._config.attempts + 1):
             tried = attempt
             self._set(begin._replace(skin=skin), substeps)
-            before = self._stepper.steps
+            taken = self._stepper.steps
             try:
                 state = self._stepper.run(begin.state, time - begin.state.time)
             except DivergedError as error:
@@ -174,15 +173,17 @@ class FrameStepper:
                 why, substeps = f"an edge has {1.0 + stretch:.1f} times its length at rest", self._finer(substeps)
                 continue
             if best is None or len(crossing) < best[0]:
-                thinner = self._skin + _KEPT * (skin - self._skin)
+                left = 0.5 ** ((time - begin.state.time) / _THINS_S)
+                thinner = self._skin + left * (skin - self._skin)
                 moment = Moment(state, thinner, self._stepper.contact_memory, self._collider.recollection)
-                reached = Reached(crossing, self._stepper.steps - before, attempt)
+                reached = Reached(crossing, self._stepper.steps - taken, attempt)
                 best = len(crossing), moment, reached
             if len(crossing) == 0:
                 break
-            about = np.unique(self._model.faces[crossing[:, 0]])
-            skin = skin.copy()
-            skin[about] += np.maximum(_THICKEN, _FASTER * skin[about])
+            before = skin
+            skin = thickened(before, np.unique(self._model.faces[crossing[:, 0]]), state.positions, body)
+            if np.array_equal(skin, before):  # no room: the next attempt would be this one again
+                break
         if best is None:
             self.now = begin
             return Reached(np.empty((0, 2), np.int32), 0, tried, why)
