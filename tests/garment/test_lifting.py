@@ -69,14 +69,41 @@ def test_a_filling_pressed_into_a_ball_comes_to_lie_as_far_off_as_the_cloth_arou
     assert longest < 0.012  # those of the rim are 3.4 mm: what was pressed in is not torn apart on the way out
 
 
-def test_a_filling_that_is_outside_stays_as_it_is(ball):
-    torn, filled = over_a_ball(0.02, np.radians(20))
+def blown_up(gap, by):
+    """Cloth `gap` off a ball, whose filling of a wide hole rises from it to stand off by more from 4 cm on.
+
+    Returns:
+        The mesh; which vertices were filled; how far from the rim along the cloth, and by how much off it, each is [m].
+    """
+    torn, filled = over_a_ball(gap, np.radians(60))
     new = np.arange(len(filled.vertices)) >= len(torn.vertices)
-    out = filled.vertices.copy()
-    out[new] *= 1.05
-    _, lifted, _, moved, _ = lift_fillings(TriangleMesh(out, filled.faces), new, SurfaceDistance(ball), 0.001)
-    assert_allclose(lifted.vertices, out, rtol=0, atol=0)
+    way = filled.vertices / np.linalg.norm(filled.vertices, axis=1, keepdims=True)
+    from_rim = (np.radians(60) - np.arccos(np.clip(way[:, 1], -1, 1))) * (BALL + gap)
+    rise = np.where(new, by * np.sin(0.5 * np.pi * np.clip(from_rim / 0.04, 0.0, 1.0)) ** 2, 0.0)
+    blown = np.where(new[:, None], way * (BALL + gap + rise)[:, None], filled.vertices)
+    return TriangleMesh(blown, filled.faces), new, from_rim, rise
+
+
+def test_a_filling_that_hangs_free_stays_as_it_is(ball):
+    blown, new, _, _ = blown_up(0.07, 0.05)
+    _, lifted, _, moved, _ = lift_fillings(blown, new, SurfaceDistance(ball), 0.001)
+    assert_allclose(lifted.vertices, blown.vertices, rtol=0, atol=0)
     assert not moved.any()
+
+
+@pytest.mark.parametrize(("gap", "by"), [(0.006, 0.015), (0.012, 0.02)])
+def test_a_filling_that_stands_off_is_drawn_in_where_nothing_near_was_seen(ball, gap, by):
+    """The cloth lies on the ball all round at one distance: as far off is where the mannequin would have it."""
+    blown, new, from_rim, rise = blown_up(gap, by)
+    _, lifted, _, moved, _ = lift_fillings(blown, new, SurfaceDistance(ball), 0.001)
+    off = away(lifted) - gap
+    assert_allclose(off[new & (from_rim > 0.06)], 0.0, rtol=0, atol=0.001)
+    beside = new & (from_rim < 0.01)  # there it goes on as it did
+    assert_allclose(off[beside], rise[beside], rtol=0, atol=0.0007)
+    halfway = new & (np.abs(from_rim - 0.02) < 0.002)
+    assert 0.25 < off[halfway].mean() / rise[halfway].mean() < 0.7
+    assert_allclose(lifted.vertices[~new], blown.vertices[~new], rtol=0, atol=0)
+    assert not moved[~new].any()
 
 
 def test_beside_cloth_that_is_nearer_than_usual_a_filling_may_be_so_too(ball):

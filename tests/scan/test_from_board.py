@@ -261,3 +261,24 @@ def test_a_board_seen_at_a_slant_is_found_where_it_is(tmp_path):
         assert len(ids) > 20  # of 48, some of them behind the tube; read marker by marker, none or two
         error = np.linalg.norm(pixels - project(board_corners(BOARD)[ids], pose, LENS), axis=1)
         assert np.median(error) < 0.3
+
+
+@pytest.mark.parametrize(("corners", "enough"), [(range(16), True), ([0, 1, 2, 8, 9, 10], False)])
+def test_cameras_that_so_few_corners_leave_uncertain_are_refused(plain, monkeypatch, corners, enough):
+    """Six corners of a far board's edge: photos then lie 70 mm from the truth, at 1 m."""
+    shot, poses, _, found = plain
+    monkeypatch.setattr(sfm_module, "map_photos", lambda *args: None)
+    few = [(ids[np.isin(ids, corners)], pixels[np.isin(ids, corners)]) for ids, pixels in found.values()]
+    monkeypatch.setattr(sfm_module, "detect_board", lambda *args: few)
+    job = Job()
+    if enough:
+        cameras, _ = estimate_cameras(shot, SfmConfig(), job)
+        assert centers_off(cameras.world_from_cam[:, :3, 3], poses[:, :3, 3]).max() < 0.02
+        assert 0.5 < job.metrics["camera_uncertainty_px"] < 2.0
+        return
+    with pytest.raises(ScanError, match="the cameras are uncertain") as refused:
+        estimate_cameras(shot, SfmConfig(), job)
+    assert refused.value.hint == sfm_module.ADVICE
+    cameras, _ = estimate_cameras(shot, SfmConfig(max_camera_px=100.0), Job())
+    placed = [k for k, path in enumerate(shot.paths) if path.name in cameras.names]
+    assert centers_off(cameras.world_from_cam[:, :3, 3], poses[placed, :3, 3]).max() > 0.04

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from itertools import product
 
@@ -104,6 +105,35 @@ def test_plain_cloth_is_left_open(full, torn, true_cameras, tmp_path):
     blank = [cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) for path in shots.paths]
     lost = (full.depth > 0) & (torn.depth == 0)
     assert (rematch(blank, torn, RematchConfig(), Job()).depth[lost] > 0).mean() < 0.05
+
+
+@pytest.mark.parametrize(
+    ("added", "rounds", "looks"),
+    [
+        ((1000, 500, 1, 500), 6, 3),  # a look that adds a share of 1 in 10,000 is the last
+        ((1000, 500, 300, 500), 2, 2),
+        ((0, 500), 6, 1),
+        ((900,) * 8, 6, 6),
+    ],
+)
+def test_it_is_looked_again_until_a_look_adds_little(full, grays, monkeypatch, added, rounds, looks):
+    depth = np.zeros_like(full.depth)
+    depth[0, :100, :100] = 0.9
+    start, shown = replace(full, depth=depth), []
+
+    def look(photos, maps, pixel, config):
+        more = maps.depth.copy()
+        unknown = np.flatnonzero(more == 0)[: added[len(shown)]]
+        more.flat[unknown] = 0.9
+        shown.append(len(unknown))
+        return replace(maps, depth=more)
+
+    monkeypatch.setattr(sys.modules[rematch.__module__], "_round", look)
+    job = Job()
+    found = rematch(grays, start, RematchConfig(rounds=rounds), job)
+    assert shown == list(added[:looks])
+    assert (found.depth > 0).sum() == 10_000 + sum(shown)
+    assert job.metrics["rematched_share"] == round(sum(shown) / (10_000 + sum(shown)), 3)
 
 
 def test_same_bits_again_and_on_one_core(torn, grays, monkeypatch):

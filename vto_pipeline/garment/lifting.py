@@ -1,9 +1,12 @@
-"""Fillings of scan holes lifted off the mannequin: cloth was there, and cloth is never inside.
+"""Fillings of scan holes where the mannequin says they can be: never inside it, nor far off where cloth is near.
 
 A smooth filling over a shoulder that was not seen cuts through it. It is let relax, as a thin plate, while the
 mannequin grows into it from within (an obstacle problem; Glowinski 1984). Triangles that are stretched over a bulge cut
 it, and are split. What then still runs through the mannequin is no hole: a limb comes out there, and however finely a
 filling is split, it spans the limb.
+
+A smooth filling under an arm spans the armpit as a web. Slope and curvature of cloth tell little of it a fold's width
+away. There cloth is about as far from the mannequin as around the hole, and a filling that is farther is drawn in.
 """
 
 from __future__ import annotations
@@ -14,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import diags
 from scipy.sparse.linalg import splu
+from scipy.spatial import cKDTree
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.bare_parts import BareParts
@@ -42,6 +46,11 @@ DEEP = 0.025
 """A filling that came so deep inside may not be lifted over what was seen bare [m]."""
 BARE = 0.2
 """A larger share of it over mannequin that was seen bare, and a part of the mannequin comes out there."""
+CONTINUES = 0.02
+"""So far from what was seen, how cloth goes on there says as much of it as the mannequin does: a quarter of a wide fold
+[m]."""
+HANGS = (0.04, 0.06)
+"""Cloth so far off the mannequin begins to hang free, and hangs free: then the mannequin says nothing of it [m]."""
 LEFT_INSIDE = 0.005
 """Lifted triangles cut a curved mannequin by no more [m]."""
 STRETCHED = 4.0
@@ -58,7 +67,7 @@ class Lifted(NamedTuple):
         before: As it was, with the same splits.
         after: Its fillings outside the mannequin.
         filled: Which vertices no sensor saw, shape (V,).
-        moved: Which of them had to be moved, shape (V,).
+        moved: Which of them were too near and had to be moved, shape (V,).
         whole: How many faces there were before splits.
     """
 
@@ -70,7 +79,7 @@ class Lifted(NamedTuple):
 
 
 def lift_fillings(mesh: TriangleMesh, filled: NDArray[np.bool_], distance: SurfaceDistance, least: float) -> Lifted:
-    """Return the mesh with its fillings outside the mannequin.
+    """Return the mesh with its fillings outside the mannequin, and where nothing near was seen, as far off as around.
 
     They end as far off as cloth usually rests on this mannequin, and nearer only beside cloth that is.
 
@@ -82,20 +91,32 @@ def lift_fillings(mesh: TriangleMesh, filled: NDArray[np.bool_], distance: Surfa
     """
     away = distance.signed(mesh.vertices).distance
     usual = max(float(np.quantile(away[~filled], USUAL)), least)
-    if not filled.any() or away[filled].min() >= usual:
-        return Lifted(mesh, mesh, filled, np.zeros(len(filled), dtype=bool), len(mesh.faces))
-    near = filled.copy()
-    for _ in range(RINGS):
-        near[mesh.faces[near[mesh.faces].any(axis=1)]] = True
-    patch, source = submesh(mesh, np.asarray(near[mesh.faces].all(axis=1)))
-    free = filled[source]
+    if not filled.any():
+        return Lifted(mesh, mesh, filled, filled, len(mesh.faces))
+    lifted = Lifted(mesh, mesh, filled, filled & (away < usual), len(mesh.faces))
+    if lifted.moved.any():
+        lifted = _outside(lifted, away, usual, distance, least)
+    return lifted._replace(after=_drawn_in(lifted.after, lifted.filled, distance, usual))
+
+
+def _outside(lifted: Lifted, away: FloatArray, usual: float, distance: SurfaceDistance, least: float) -> Lifted:
+    """Return the mesh with its fillings outside the mannequin, and split where they are stretched.
+
+    Args:
+        lifted: As it was.
+        away: How far off the mannequin its vertices are [m], shape (V,).
+        usual: How far off cloth usually rests on it [m].
+        distance: Signed distances to the mannequin [m].
+        least: Nothing that was filled is nearer than this [m].
+    """
+    mesh = lifted.before
+    patch, source = _with_rings(mesh, lifted.filled)
+    free = lifted.filled[source]
     nearest = np.clip(away[source], least, usual)[:, None]
     nearest = np.maximum(extend_smoothly(patch, nearest, free, order=1)[:, 0], least)
     vertices = mesh.vertices.copy()
     vertices[source] = _relaxed(patch, free, distance, nearest)
-    lifted = Lifted(
-        mesh, TriangleMesh(vertices, mesh.faces, mesh.colors), filled, filled & (away < usual), len(mesh.faces)
-    )
+    lifted = lifted._replace(after=TriangleMesh(vertices, mesh.faces, mesh.colors))
     edge = np.linalg.norm(patch.vertices[np.roll(patch.faces, -1, axis=1)] - patch.vertices[patch.faces], axis=2)
     for _ in range(SPLITS):
         finer = _split(lifted, distance, least, STRETCHED * float(np.median(edge)))
@@ -103,6 +124,14 @@ def lift_fillings(mesh: TriangleMesh, filled: NDArray[np.bool_], distance: Surfa
             break
         lifted = finer
     return lifted
+
+
+def _with_rings(mesh: TriangleMesh, filled: NDArray[np.bool_]) -> tuple[TriangleMesh, IntArray]:
+    """Return the fillings with some rings around them, and which vertices of the mesh these are."""
+    near = filled.copy()
+    for _ in range(RINGS):
+        near[mesh.faces[near[mesh.faces].any(axis=1)]] = True
+    return submesh(mesh, np.asarray(near[mesh.faces].all(axis=1)))
 
 
 def _split(lifted: Lifted, distance: SurfaceDistance, off: float, longest: float) -> Lifted:
@@ -190,6 +219,30 @@ def _relaxed(
         wanted = nearest[free] + min(0.0, lowest * (1.0 - (step + 1) / GROWTH))
         points[free] = outside.pushed(points[free], wanted)
     return points
+
+
+def _drawn_in(mesh: TriangleMesh, filled: NDArray[np.bool_], distance: SurfaceDistance, usual: float) -> TriangleMesh:
+    """Return the mesh with its fillings no farther from the mannequin than what is around, the less was seen near them.
+
+    The error of going on as seen cloth does grows as the square of the distance from it, for its curvature changes.
+
+    Args:
+        mesh: A garment.
+        filled: Which vertices no sensor saw, shape (V,).
+        distance: Signed distances to the mannequin [m].
+        usual: None is drawn nearer than this [m].
+    """
+    patch, source = _with_rings(mesh, filled)
+    free = filled[source]
+    foot = distance.signed(patch.vertices)
+    away = foot.distance
+    around = np.maximum(extend_smoothly(patch, away[:, None], free, order=1)[:, 0], usual)
+    unseen = cKDTree(patch.vertices[~free]).query(patch.vertices)[0] / CONTINUES
+    share = unseen**4 / (1.0 + unseen**4) * np.interp(away, HANGS, (1.0, 0.0))
+    way = np.where(free & (away > around), share * (1.0 - around / np.maximum(away, usual)), 0.0)
+    vertices = mesh.vertices.copy()
+    vertices[source] += way[:, None] * (foot.point - patch.vertices)
+    return TriangleMesh(vertices, mesh.faces, mesh.colors)
 
 
 class KeptOutside:

@@ -20,6 +20,7 @@ from vto_pipeline.model.mesh import PointCloud
 from vto_pipeline.model.settings import Config
 from vto_pipeline.scan.photos.board import detect_board
 from vto_pipeline.scan.photos.matching.adjust import adjust
+from vto_pipeline.scan.photos.matching.certainty import uncertainty_px
 from vto_pipeline.scan.photos.matching.features import FAINT, SURE, FeatureConfig, detect, match
 from vto_pipeline.scan.photos.matching.from_board import map_from_board
 from vto_pipeline.scan.photos.matching.mapping import MIN_PHOTOS, lens_of, map_photos
@@ -36,6 +37,8 @@ ADVICE = (
 
 MOST = 0.75
 """Faint features that place fewer of the photos may place them wrongly: 12 of 24 were 0.8 m off."""
+STEREO_SIDE = 1000
+"""Stereo looks at photos scaled down to this longer side [px]."""
 FEW = 0.8
 """Where a smaller share of the photos could be placed, fainter features are looked for."""
 
@@ -47,6 +50,9 @@ class SfmConfig(Config):
     enough_features: int = Field(1000, ge=50, le=20_000, description="With fewer per photo, fainter ones are used")
     max_error_px: float = Field(2.0, gt=0.1, le=10, description="Largest mean error of a sparse point [px]")
     min_views: int = Field(3, ge=2, le=10, description="Photos that must have seen a sparse point")
+    max_camera_px: float = Field(
+        4.0, gt=0, le=100, description="Most that cameras may be uncertain: one standard deviation at the object [px]"
+    )
 
 
 def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[CameraSet, PointCloud]:
@@ -62,7 +68,7 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
         direction towards the photos that saw them.
 
     Raises:
-        ScanError: fewer than 3 photos could be placed.
+        ScanError: fewer than 3 photos could be placed, or most of them too uncertainly.
     """
     load_colmap(job.seed)
     with tempfile.TemporaryDirectory(dir=job.scratch) as scratch:
@@ -93,6 +99,7 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
         problem = f"{few} ({pairs} pairs match); features per photo: {each}"
         raise ScanError(problem, where=str(photos.paths[0].parent), hint=ADVICE)
     model = adjust(model, photos, job)
+    _check_certain(model, photos, config, job)
     cameras, cloud = _upright(*_values(model, names, config))
     cloud = _without_surroundings(cameras, cloud, job)
     if cameras.unregistered:
@@ -178,6 +185,23 @@ def _is_better(again: _Tried, before: _Tried) -> bool:
     """Return whether to believe faint features: they place more than before, and by the board or most of the photos."""
     believed = again.by_board or again.placed >= MOST * len(again.features)
     return believed and again.placed > before.placed
+
+
+def _check_certain(model: Any, photos: PhotoSet, config: SfmConfig, job: Job) -> None:
+    """Refuse cameras that are too uncertain. Stereo compares windows of 13 pixels: two photos, each of which shows a
+    place 4 pixels from where its camera says, show other cloth in the same window.
+
+    Raises:
+        ScanError: half of them or more are.
+    """
+    longer = max(max(camera.width, camera.height) for camera in model.cameras.values())
+    off = float(np.median(uncertainty_px(model))) / max(1.0, longer / STEREO_SIDE)
+    job.measure(camera_uncertainty_px=round(off, 3))
+    if off > config.max_camera_px:
+        placed = f"{model.num_reg_images()} of {len(photos.paths)} photos are placed by {model.num_points3D()} points"
+        known = f"what they look at is known to {off:.1f} px only (one standard deviation)"
+        problem = f"the cameras are uncertain: {placed}, and {known}; at most {config.max_camera_px:g} px is allowed"
+        raise ScanError(problem, where=str(photos.paths[0].parent), hint=ADVICE)
 
 
 def load_colmap(seed: int) -> None:

@@ -7,4 +7,5 @@ mapping: cameras and points from the pairs
 board_poses, from_board: the same where features are too few, and photos show the board
 ties: photos that too few points tie to the others
 tracks, adjust: many more points followed from photo to photo, and the cameras adjusted to them
+certainty: how far off photos may show what they look at, by what their sightings leave open
 """
