@@ -150,7 +150,7 @@ def _warn_of_crossings(before: TriangleMesh, after: TriangleMesh, job: Job) -> N
         return
     x, y, z = after.vertices[after.faces[pairs[0, 0]]].mean(axis=0)
     job.warn(
-        f"remeshing made {len(pairs)} pairs of triangles cross, near ({x:.2f}, {y:.2f}, {z:.2f}): layers lie closer "
+        f"remeshing made {len(pairs)} pairs of triangles cross, near ({x:.2f}, {y:.2f}, {z:.2f}). Layers lie closer "
         "there than such triangles can tell apart, and may jam; try another edge length (edge_mm)"
     )
 

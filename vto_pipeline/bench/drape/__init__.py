@@ -1,7 +1,8 @@
 """Draping: error against run time, accuracy of its prediction, refinement, rest shapes, and work left out.
 
 `garments`, `sewn` and `transfer` are no part of `vto bench`: they take the files that they are given. The first drapes
-them, the second sews patterns, with `seam_gaps` and `ipc_crossings` as judges, and on the third finer meshes ride.
+them and shows each in a `picture_table`. The second sews patterns, with `seam_gaps` and `ipc_crossings` as judges. On
+the third finer meshes ride.
 """
 
 from __future__ import annotations
