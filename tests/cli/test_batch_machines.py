@@ -10,7 +10,6 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import suppress
-from pathlib import Path
 
 import pytest
 from test_batch_killed import CLIENT, HELD, ORDER, ROW, expected

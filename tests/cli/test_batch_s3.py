@@ -1,4 +1,4 @@
-"""A batch that reads from an S3 store and puts its results there: a server of others that speaks S3, over the network."""
+"""A batch that reads from an S3 store and puts its results there: a server by others that speaks S3."""
 
 from __future__ import annotations
 
@@ -20,8 +20,7 @@ from vto_pipeline.io.stores import copy_here, copy_there, list_files, size_there
 
 for package in ("distributed", "moto", "s3fs"):
     pytest.importorskip(package)
-import boto3
-import botocore.exceptions
+boto3 = pytest.importorskip("boto3")
 
 pytestmark = pytest.mark.filterwarnings("default")  # of dask, and of clients that are closed late
 SERVER = "import sys; from moto.server import main; main(sys.argv[1:])"
@@ -182,5 +181,4 @@ def test_an_upload_that_breaks_off_leaves_nothing(store: Store, tmp_path: Path, 
     with pytest.raises(InputError, match="the line is dead"):
         copy_there(tmp_path / "large.bin", "s3://made/large.bin")
     assert store.made() == {}
-    with pytest.raises(botocore.exceptions.ClientError):
-        store.client.head_object(Bucket="made", Key="large.bin")
+    assert "Uploads" not in store.client.list_multipart_uploads(Bucket="made")

@@ -55,11 +55,8 @@ def test_watching_rows_takes_next_to_nothing_of_the_cores_that_they_want(tmp_pat
     pytest.importorskip("distributed")
     spent = []
     for seconds in (1.0, 1.0 + LONG):
-        names = [f"{letter}{seconds:g}" for letter in "ab"]
-        tasks = [
-            RowTask(name, name, ("sleep", f"{seconds:g}"), f"{tmp_path / name}", f"{tmp_path / name}.log", 1, 600.0, 1e3, 0)
-            for name in names
-        ]
+        command, folder = ("sleep", f"{seconds:g}"), f"{tmp_path}/{seconds:g}"
+        tasks = [RowTask(name, name, command, folder + name, f"{folder}.log", 1, 600.0, 1e3, 0) for name in "ab"]
         began = children_s()
         assert [row.status for row in run_rows(tasks, 2, None, tmp_path / "workers")] == ["done"] * 2
         spent.append(children_s() - began)

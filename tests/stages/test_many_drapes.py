@@ -96,7 +96,8 @@ def test_a_row_whose_drape_is_stored_costs_little(tmp_path, monkeypatch, capfd):
 
     def do(count: int) -> tuple[int, float, str]:
         """Run the first rows of a batch: exit code, processor time of this process [s], and what was said."""
-        rows = [{"name": f"row_{k}", **{f"stages.{name}": value for name, value in SETTINGS.items()}} for k in range(count)]
+        changes = {f"stages.{name}": value for name, value in SETTINGS.items()}
+        rows = [{"name": f"row_{k}", **changes} for k in range(count)]
         Path("order.yaml").write_text(json.dumps({"schema": 1, "run": run, "rows": rows}))
         began = time.process_time()
         code = main(["batch", "order.yaml", "-o", "batch", "--workers", "1"])
