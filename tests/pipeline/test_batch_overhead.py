@@ -23,13 +23,16 @@ from vto_pipeline.stages.entry.batches import finish_stored
 BUSY = 0.03  # share of a core that watching one row may take
 LONG = 20.0  # s
 HOLDS = "import time; held = bytearray(100_000_000); time.sleep(60)"
-PARENT = f"import subprocess, sys, time; time.sleep(1.0); subprocess.run([sys.executable, '-c', {HOLDS!r}])"
+PARENT = f"import subprocess, sys, time; print(flush=True); time.sleep(1.0); subprocess.run([sys.executable, '-c', {HOLDS!r}])"
 
 
 def test_what_a_row_starts_later_counts_too() -> None:
     if not Path("/proc/self/stat").exists():
         pytest.skip("the system does not tell the memory of processes")
-    with subprocess.Popen([sys.executable, "-c", PARENT], start_new_session=True) as process:
+    command = [sys.executable, "-c", PARENT]
+    with subprocess.Popen(command, start_new_session=True, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        process.stdout.readline()  # until it has begun it counts as a copy of this process
         group, beside = _Group(process.pid), _Group(process.pid + 1_000_000)
         seen, began = [], time.monotonic()
         while not seen or (seen[-1] < 100.0 and time.monotonic() - began < 60.0):
