@@ -85,6 +85,18 @@ def test_truth_failures_and_other_scenes_do_not_count(monkeypatch):
     assert found[0]["default"] == "a, steps 1"
 
 
+def test_an_error_below_the_truths_own_is_as_good_as_that_one(monkeypatch):
+    """On a ball, long steps leave the cloth higher, and less stretched than it is in truth: that is no lesser error."""
+    long, usual = row("ours", 6.8, 3.49e-4, steps=0.25), row("ours", 11.6, 4.32e-4, steps=1.0)
+    trade = Trade(("error",), lambda quick: lambda one: one.settings["steps"] == 1.0)
+    (bare,) = of([long, usual], monkeypatch, trade)
+    assert bare["factor"] == pytest.approx(4.32 / 3.49, abs=1e-3)
+    (known,) = of([long, usual, row("reference", 40.0, 4.03e-4, steps=4.0)], monkeypatch, trade)
+    assert known["factor"] == pytest.approx(4.32 / 4.03, abs=1e-3)
+    assert known["verdict"] == "within 10 % of the front: 7 % off"
+    assert known["front"] == bare["front"] == ["ours, steps 0.25"]
+
+
 def test_an_error_of_nothing_at_all_leaves_the_time_to_compare():
     assert distance(3.0, 0.0, [(1.0, 0.0)]) == 3.0
     assert distance(3.0, 1.0, [(1.0, 0.0)]) == 3.0

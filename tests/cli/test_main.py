@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -92,6 +93,28 @@ DROPPING = """\
     time.sleep(60)
 """.strip()
 """Code out of which nothing can be raised, twice, before code that can be interrupted."""
+
+
+PAGE = (Path(__file__).parents[2] / "docs" / "files.md").read_text()
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_shells_complete_as_the_page_says(shell, monkeypatch, capsys):
+    assert f"_VTO_COMPLETE={shell}_source vto" in PAGE
+    if shell == "bash" and not shutil.which("bash"):
+        pytest.skip("no bash, whose version is asked for")
+    monkeypatch.setenv("_VTO_COMPLETE", f"{shell}_source")
+    with pytest.raises(SystemExit, match="0"):
+        main_module.main([])
+    assert f"_VTO_COMPLETE={shell}_complete" in capsys.readouterr().out
+    for typed, wanted in (("vto bat", "batch"), ("vto batch --mem", "--memory"), ("vto batch f --sche", "--scheduler")):
+        last = typed.split()[-1]
+        monkeypatch.setenv("_VTO_COMPLETE", f"{shell}_complete")
+        monkeypatch.setenv("COMP_WORDS", typed)
+        monkeypatch.setenv("COMP_CWORD", last if shell == "fish" else str(len(typed.split()) - 1))
+        with pytest.raises(SystemExit, match="0"):
+            main_module.main([])
+        assert wanted in capsys.readouterr().out
 
 
 LOADED = "from vto_pipeline.scan.photos.sfm import load_colmap; load_colmap(0)"

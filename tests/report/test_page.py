@@ -6,6 +6,7 @@ import json
 import re
 from html.parser import HTMLParser
 
+import jinja2
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -180,6 +181,12 @@ def test_left_out_and_figures_are_told() -> None:
     page = build_page(run_record(), {})
     assert "none in fabric" in page
     assert "0.41 mm" in page
+
+
+def test_templates_are_compiled_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    build_page(run_record(), all_parts())
+    monkeypatch.setattr(jinja2.Environment, "compile", lambda *_, **__: pytest.fail("compiled again"))
+    build_page(run_record(), all_parts())
 
 
 def test_same_input_same_page() -> None:

@@ -22,6 +22,7 @@ PROTOCOLS = ("abfs", "az", "file", "gcs", "gs", "http", "https", "memory", "oss"
 """What an address begins with. fsspec knows more; some of those run code, unpack archives, or open other addresses."""
 
 _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:(//|:)")
+_WITH_FOLDERS = ("sftp",)  # they have to be made there; in an object store that would make a bucket, also one misspelt
 _MOST_FILES = 10_000
 _MOST_BYTES = 50_000_000_000
 _VERSION = ("ETag", "etag", "Content-MD5", "md5Hash", "generation", "LastModified", "Last-Modified", "mtime", "created")
@@ -133,7 +134,8 @@ def copy_there(path: Path, address: str) -> None:
                 with replacing(Path(there)) as beside, beside.open("wb") as sink:
                     shutil.copyfileobj(source, sink)
                 return
-            store.makedirs(there.rpartition("/")[0], exist_ok=True)
+            if set(_WITH_FOLDERS) & set(_protocols(store)):
+                store.makedirs(there.rpartition("/")[0], exist_ok=True)
             with store.transaction, store.open(there, "wb") as sink:
                 while block := source.read(1 << 20):
                     sink.write(block)

@@ -3,6 +3,9 @@
 A point is on the Pareto front if no other is both faster and more exact. How far a point is from it is one number: the
 factor by which both its time and its error would have to shrink until nothing beats it (the multiplicative epsilon
 indicator; Zitzler, Thiele, Laumanns, Fonseca & Grunert da Fonseca 2003).
+
+The truth's own row tells how far it is known, or what the cloth does in truth: at rest it is stretched by its weight.
+An error below that is as good as that one.
 """
 
 from __future__ import annotations
@@ -30,7 +33,7 @@ class Trade:
         errors: Figures, the smaller the better.
         default: Whether the bench is quick -> what tells today's default from other rows.
         scene: Settings that belong to the scene.
-        truth: Methods that are what the errors are taken against.
+        truth: Methods that are what the errors are taken against, and whose errors no other row's can be less than.
     """
 
     errors: Sequence[str]
@@ -67,9 +70,11 @@ def distance(time: float, error: float, points: Iterable[tuple[float, float]]) -
 
 def _fronts(trade: Trade, rows: Sequence[Row], quick: bool) -> Iterator[Entry]:
     is_default = trade.default(quick)
-    for scene, those in _by_scene(trade, rows).items():
+    for scene, every in _by_scene(trade, rows).items():
         for error in trade.errors:
-            points = [(row, float(row.errors[error])) for row in those if _is_point(row, error)]  # type: ignore[arg-type]
+            known = [_value(row, error) for row in every if row.method in trade.truth and _is_point(row, error)]
+            those = [row for row in every if row.method not in trade.truth and _is_point(row, error)]
+            points = [(row, max([_value(row, error), *known])) for row in those]
             if len(points) < 2:
                 continue
             values = [(row.seconds, value) for row, value in points]
@@ -103,8 +108,7 @@ def _verdict(on_front: bool, factor: float) -> str:
 def _by_scene(trade: Trade, rows: Iterable[Row]) -> dict[str, list[Row]]:
     found: dict[str, list[Row]] = {}
     for row in rows:
-        if row.method not in trade.truth:
-            found.setdefault(_words(row.scene, {k: row.settings.get(k) for k in trade.scene}), []).append(row)
+        found.setdefault(_words(row.scene, {k: row.settings.get(k) for k in trade.scene}), []).append(row)
     return found
 
 
@@ -120,6 +124,10 @@ def _words(name: str, settings: Mapping[str, Any]) -> str:
 def _is_point(row: Row, error: str) -> bool:
     value = row.errors.get(error)
     return isinstance(value, float | int) and not isinstance(value, bool) and math.isfinite(value) and row.seconds > 0.0
+
+
+def _value(row: Row, error: str) -> float:
+    return float(row.errors[error])  # type: ignore[arg-type]
 
 
 def _beats(one: tuple[float, float], other: tuple[float, float]) -> bool:

@@ -22,6 +22,12 @@ _COUNT = 1.0  # s between questions for the workers
 _EACH = 3  # rows that a worker has or waits for
 _LEAST_WINDOW = 4  # also before the first worker has come
 _SHARE_OF_MEMORY = 0.8  # of the machine's that rows may take together
+_QUIET = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "10s",
+}
+"""Workers and scheduler look after themselves up to a hundred times a second: a share of the cores that rows want."""
 
 
 def default_workers(memory_mb: float) -> int:
@@ -56,6 +62,7 @@ def run_rows(
             not start.
     """
     try:
+        import dask
         from distributed import Client, LocalCluster, as_completed
     except ImportError:
         raise MissingDependencyError(
@@ -65,6 +72,7 @@ def run_rows(
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # a scheduler that is gone is told row by row
     logging.getLogger("distributed.nanny").setLevel(logging.ERROR)  # and so is a worker
     with ExitStack() as stack:
+        stack.enter_context(dask.config.set(_QUIET))
         try:
             address: Any = scheduler or stack.enter_context(
                 LocalCluster(

@@ -18,6 +18,7 @@ import vto_pipeline
 from vto_pipeline.pipeline.execution.folder import wait_until_free
 
 _LOOK = 0.2  # s between looks at a row's memory
+_LIST = 1.0  # s between looks for its processes: all of the machine are asked, which would take a share of a core
 _SIGTERM_SECONDS = 5.0  # for a row to end by itself
 _PACKAGE = str(Path(vto_pipeline.__file__).parents[1])  # rows run the code of their worker
 
@@ -108,12 +109,12 @@ def _try(task: RowTask, tries: int) -> RowResult:
             env={**os.environ, **environment},
             start_new_session=True,
         )
+        group = _Group(process.pid)
         try:
-            while process.poll() is None:
-                time.sleep(_LOOK)
-                now = _resident_mb(process.pid)
+            while not _has_ended(process, _LOOK):
+                now = group.resident_mb()
                 if now > task.memory_mb:  # a program that is just being started counts as a copy of who starts it
-                    now = min(now, _resident_mb(process.pid))
+                    now = min(now, group.resident_mb())
                 peak = max(peak, now)
                 if peak > task.memory_mb:
                     stopped = "too large"
@@ -143,21 +144,44 @@ def _end(process: subprocess.Popen[bytes]) -> None:
             break
         with suppress(ProcessLookupError):
             os.killpg(process.pid, name)
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(seconds)
+        _has_ended(process, seconds)
     with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)  # what it has left behind
 
 
-def _resident_mb(group: int) -> float:
-    """Return the resident memory of a process group [MB]; 0 where the system does not tell."""
-    page, total = os.sysconf("SC_PAGE_SIZE"), 0
-    for folder in Path("/proc").glob("[0-9]*"):
-        with suppress(OSError, IndexError, ValueError):  # ended meanwhile
-            fields = (folder / "stat").read_text().rpartition(")")[2].split()
-            if int(fields[2]) == group:
-                total += int(fields[21]) * page
-    return total / 1e6
+def _has_ended(process: subprocess.Popen[bytes], seconds: float | None) -> bool:
+    """Wait for a process, at most so long [s]; return whether it has ended."""
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(seconds)
+    return process.returncode is not None
+
+
+class _Group:
+    """The processes of a process group.
+
+    Args:
+        number: Of the group.
+    """
+
+    def __init__(self, number: int) -> None:
+        self._number = number
+        self._listed, self._found = -_LIST, list[Path]()
+
+    def resident_mb(self) -> float:
+        """Return their resident memory [MB]; 0 where the system does not tell."""
+        if time.monotonic() - self._listed >= _LIST:
+            self._found = [folder for folder in Path("/proc").glob("[0-9]*") if self._pages(folder) is not None]
+            self._listed = time.monotonic()
+        pages = sum(self._pages(folder) or 0 for folder in self._found)
+        return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+    def _pages(self, process: Path) -> int | None:
+        """Return how many pages of memory a process holds; None where it is not of the group, or has ended."""
+        with suppress(OSError, IndexError, ValueError):
+            fields = (process / "stat").read_text().rpartition(")")[2].split()
+            if int(fields[2]) == self._number:
+                return int(fields[21])
+        return None
 
 
 def _problem(task: RowTask, status: str, code: int, answer: IO[bytes]) -> str:

@@ -149,7 +149,8 @@ class _Run:
             record.status, record.reason = "failed", str(error.strerror)
             raise
         finally:
-            self.record.save()
+            if record.status != "cached":  # of what takes no time the next record tells, or the last
+                self.record.save()
             self.listener.ended(number, len(self.plan.steps), record)
 
     def _do(self, number: int, step: Step, record: StageRecord) -> None:
