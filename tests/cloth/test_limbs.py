@@ -6,12 +6,14 @@ from cloth_scenes import moved
 from figures import ARM, SHOULDER, arm_end, figure, tunic
 from numpy.testing import assert_allclose
 
+from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.cloth.placement.body_growth import Thinning, _least_faulty, plan_body_growth
 from vto_pipeline.cloth.placement.limb_openings import pieces_with_limbs
 from vto_pipeline.cloth.placement.limbs import Limbs
 from vto_pipeline.errors import IntersectingError
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import boundary_loops
+from vto_pipeline.model.body import Measurements
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -114,3 +116,9 @@ def test_what_is_too_small_for_arms_to_find_its_sleeves_starts_larger():
     growth = plan_body_growth(body, small, job)
     assert growth.fault == (0, 0)
     assert any("20% larger" in warning for warning in job.warnings)
+
+
+@pytest.mark.parametrize(("sex", "waist"), [("female", 0.66), ("male", 0.82), ("male", 1.12)])
+def test_the_waist_of_a_body_is_that_of_its_tape(sex, waist):
+    tape = Measurements({"stature": 1.75, "waist_girth": waist}, sex=sex)
+    assert Limbs(fit_measurements(tape).mesh).waist() == pytest.approx(waist, rel=0.03)

@@ -229,3 +229,20 @@ def test_necklines_go_about_the_nape(name):
         found = find_placement(garment, body, PlaceConfig(), Job())
         top = found.start_positions(garment.vertices)[:, 1].max() - body.vertices[:, 1].min()
         assert top / np.ptp(body.vertices[:, 1]) == pytest.approx(0.865, abs=0.05)
+
+
+@pytest.mark.real_data
+@pytest.mark.skipif(not DATA.exists(), reason="the data folder is absent")
+@pytest.mark.parametrize(
+    ("sex", "stature", "chest", "hip"), [("male", 1.82, 1.18, 1.16), ("female", 1.642, 0.929, 1.099)]
+)
+def test_a_skirt_too_small_for_the_hips_is_not_put_about_the_neck(sex, stature, chest, hip):
+    """Heads fill it better. Waists are at 0.6 of the stature (ANSUR II: omphalion)."""
+    tape = Measurements({"stature": stature, "chest_girth": chest, "hip_girth": hip}, sex=sex)
+    body = fit_measurements(tape).mesh
+    garment = remesh(
+        read_mesh(DATA / "garments" / "berkeley" / "skirt" / "skirt-iso.obj"), RemeshConfig(edge_mm=20), Job()
+    )
+    found = find_placement(garment, body, PlaceConfig(), Job())
+    top = found.start_positions(garment.vertices)[:, 1].max() - body.vertices[:, 1].min()
+    assert top / np.ptp(body.vertices[:, 1]) == pytest.approx(0.6, abs=0.1)

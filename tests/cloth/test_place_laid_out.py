@@ -68,6 +68,16 @@ def test_a_mesh_whose_best_place_has_arms_through_it_goes_to_another_height():
     assert find_placement(loose, figure(1.5), PlaceConfig(), Job()).shift[1] == 0.0
 
 
+def test_what_is_too_narrow_for_the_waist_is_no_skirt_and_stays_about_the_shoulders():
+    """A poncho: arms that hang go through its cloth there, too."""
+    poncho = skirt(1.35)
+    share = (1.35 - poncho.vertices[:, 1:2]) / 0.4
+    wider = (0.1 + 0.35 * share) / RADIUS  # at the top as wide as a neck with room, and less than the waist
+    poncho = TriangleMesh(poncho.vertices * np.hstack([wider, np.ones_like(wider), 0.7 * wider]), poncho.faces)
+    found = find_placement(poncho, figure(BELOW), PlaceConfig(), Job())
+    assert top_and_bottom(found, poncho)[0] > 1.2
+
+
 @pytest.mark.parametrize("top", [2.35, 3.0])
 def test_what_lies_beside_the_body_wherever_the_file_has_it_is_looked_for(top):
     body = figure(BELOW)

@@ -25,6 +25,7 @@ from vto_pipeline.cloth.placement.voxel_fit import close_openings
 from vto_pipeline.errors import GarmentError, InputError, IntersectingError
 from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.geometry.laplace import laplacian
+from vto_pipeline.geometry.remeshing.rims import perimeter
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.garment import Garment, RestShape
@@ -38,7 +39,7 @@ _FEW = 1500  # vertices of a garment that is led
 _LED_BY = (0, 3, 6)  # steps of thinning after which the garment is led about the body: the thin one leaves room
 _STILL_WORN = 0.5  # of the body's surface that was in the garment: with less, it is led to another part of the body
 _LARGER = (1.1, 1.2, 1.35, 1.5)  # times: so much it may start larger than it is
-_FAR_FROM_NECK = 0.1  # of the stature: from where the head joins to the top of a neckline, which goes about the nape
+_OVER, _UNDER = 0.05, 0.1  # of the stature: no opening is so far above where its limb joins, no neckline so far below
 _LED_LARGER = 1.2  # times, to be led: small enough for sleeves to stay near their arms
 
 
@@ -223,6 +224,7 @@ class Thinning:
         self._frames = [body.vertices]
         self._skin = SurfaceDistance(body)
         self.limbs = Limbs(body)
+        self._waist = self.limbs.waist()
 
     def after(self, steps: int) -> TriangleMesh:
         """Return the body after so many steps of the flow."""
@@ -259,17 +261,21 @@ class Thinning:
     def limbs_out_of_place(self, garment: TriangleMesh) -> int:
         """Return how many limbs tell that a garment is not worn at this height.
 
-        These are arms that go through the cloth of what has one opening for both, and so no sleeves; and a head whose
-        own opening is far from the neck.
+        These are arms in the way of a skirt, which has one opening for both, wide enough for the waist: they go through
+        its cloth, or join the body below that opening. And a head whose own opening is far from the neck.
         """
-        names = [limb.name for limb in self.limbs.limbs]
-        arms = [number for number, name in enumerate(names) if name.endswith("arm")]
-        far = _FAR_FROM_NECK * float(np.ptp(self.after(0).vertices[:, 1]))
+        limbs, tall = self.limbs.limbs, float(np.ptp(self.after(0).vertices[:, 1]))
+        arms = [number for number, limb in enumerate(limbs) if limb.name.endswith("arm")]
         count = 0
         for piece in pieces_with_limbs(garment, self.limbs, self.after(_LINES)):
-            if len({piece.meant[arm] for arm in arms}) == 1:
-                count += sum(len(piece.pierced[arm]) > 0 for arm in arms)
-            neck = piece.own_opening(names.index("head")) if "head" in names else None
-            if neck is not None:
-                count += abs(float(neck[:, 1].max()) - self.limbs.limbs[names.index("head")].root[1]) > far
+            for number, limb in enumerate(limbs):
+                if piece.meant[number] < 0:
+                    continue
+                opening = piece.openings[piece.meant[number]]
+                over = (piece.mesh.vertices[opening, 1] - limb.root[1]) / tall
+                if number in arms and len({piece.meant[arm] for arm in arms}) == 1:
+                    in_the_way = len(piece.pierced[number]) > 0 or over.min() > _OVER
+                    count += in_the_way and perimeter(piece.mesh, opening) > self._waist
+                elif limb.name == "head" and piece.meant.count(piece.meant[number]) == 1:
+                    count += over.min() > _OVER or over.max() < -_UNDER
         return count

@@ -58,10 +58,6 @@ class Piece(NamedTuple):
         idle = {limb for limb in self._alone() if self.meant[limb] not in self.through[limb]}
         return idle | set(self.astray())
 
-    def own_opening(self, limb: int) -> FloatArray | None:
-        """Return the opening that is there for a limb alone [m], shape (N, 3); None where there is none."""
-        return self.mesh.vertices[self.openings[self.meant[limb]]] if limb in self._alone() else None
-
     def _alone(self) -> set[int]:
         """Return the limbs that have an opening to themselves."""
         return {limb for limb, opening in enumerate(self.meant) if opening >= 0 and self.meant.count(opening) == 1}

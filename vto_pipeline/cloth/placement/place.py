@@ -29,7 +29,7 @@ _ALIKE = 0.98  # as good, but for where the cubes happen to lie
 _LARGER, _STEPS = 1.2, 4  # a garment may start up to twice as large as it is
 _FALLING = 0.85  # of the best worth yet: larger garments need not be tried
 _DEEP = 0.01  # m
-_HEIGHTS = 6  # tried where limbs go through cloth
+_HEIGHTS, _ALL_HEIGHTS = 6, 24  # tried where limbs are astray: where that takes long to tell, and where it does not
 _WORTH_A_TRY = 0.5  # of the score of the first place: less is beside the body
 _FILE_STATURE = 1.72  # m: the mean of both sexes, which GarmentCode draws for
 _FILE_ORIGINS = (0.0, 1.15)  # m over the floor: GarmentCode has it there, its predecessor where SMPL's template has it
@@ -221,7 +221,7 @@ def _where_limbs_are_in_place(
 
     def at_other_heights() -> list[VoxelPlacement]:
         fit = VoxelFit(garment, body, 1e-3 * config.cube_mm, config.cloth_in_body)
-        return fit.best_placements(best.turn, _HEIGHTS)
+        return fit.best_placements(best.turn, _ALL_HEIGHTS)
 
     return _least_pierced(best, at_other_heights, garment, Thinning(body.mesh).limbs_out_of_place, job)
 
