@@ -177,7 +177,7 @@ def test_quick_rows_name_what_they_measure(monkeypatch):
 
 def test_a_run_that_takes_too_long_is_a_row(tmp_path):
     began = time.perf_counter()
-    row = drape_row(Path("none.obj"), Path("nobody.obj"), tmp_path / "run", [], 0.01)
+    row = drape_row(Path("none.obj"), Path("nobody.obj"), "default", tmp_path, [], 0.01)
     assert row["outcome"] == "unfinished"
     assert 0.01 <= row["seconds"] < time.perf_counter() - began + 0.1  # it is rounded
     assert row["crossings"] is row["settled"] is row["vertices"] is None
@@ -185,14 +185,14 @@ def test_a_run_that_takes_too_long_is_a_row(tmp_path):
 
 def test_a_garment_that_is_refused_is_a_row(tmp_path):
     (tmp_path / "none.obj").write_text("")
-    row = drape_row(tmp_path / "none.obj", tmp_path / "none.obj", tmp_path / "run", [], 600.0)
+    row = drape_row(tmp_path / "none.obj", tmp_path / "none.obj", "default", tmp_path, [], 600.0)
     assert row["outcome"] == "refused"
-    assert "none.obj" in (tmp_path / "run.log").read_text()
+    assert "none.obj" in (tmp_path / "none_on_none.log").read_text()
 
 
 def test_what_a_failed_run_reached_is_in_its_row(tmp_path):
-    (tmp_path / "run" / "out" / "partial").mkdir(parents=True)
+    (tmp_path / "none_on_nobody" / "out" / "partial").mkdir(parents=True)
     audit = '{"body_intersections": 5, "self_intersections": 2, "settled": false, "residual": 3.0, "max_stretch": 8.2}'
-    (tmp_path / "run" / "out" / "partial" / "audit.json").write_text(audit)
-    row = drape_row(Path("none.obj"), Path("nobody.obj"), tmp_path / "run", [], 0.01)
+    (tmp_path / "none_on_nobody" / "out" / "partial" / "audit.json").write_text(audit)
+    row = drape_row(Path("none.obj"), Path("nobody.obj"), "default", tmp_path, [], 0.01)
     assert (row["crossings"], row["settled"], row["residual"], row["stretch"]) == (7, False, 3.0, 8.2)

@@ -71,7 +71,7 @@ class Limbs:
         self._area = laplacian(body)[1]
         self._belt = self._middle_belt(body, _BELT * height)
         self.limbs: list[Limb] = []
-        if len(self._belt) == 0:  # as coarse as a box: nothing stands out
+        if len(self._belt) == 0 or height == 0.0:  # as coarse as a box, or flat: nothing stands out
             return
         away = distance_from(body, self._belt, np.inf)
         away = np.where(np.isfinite(away), away, -1.0)
