@@ -121,4 +121,4 @@ def test_what_is_too_small_for_arms_to_find_its_sleeves_starts_larger():
 @pytest.mark.parametrize(("sex", "waist"), [("female", 0.66), ("male", 0.82), ("male", 1.12)])
 def test_the_waist_of_a_body_is_that_of_its_tape(sex, waist):
     tape = Measurements({"stature": 1.75, "waist_girth": waist}, sex=sex)
-    assert Limbs(fit_measurements(tape).mesh).waist() == pytest.approx(waist, rel=0.03)
+    assert Limbs(fit_measurements(tape).mesh).waist == pytest.approx(waist, rel=0.03)

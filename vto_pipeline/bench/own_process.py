@@ -17,6 +17,12 @@ _LOOK = 0.1
 """Time between two looks at whether it has ended [s]."""
 
 
+def last_error(log: Path) -> str:
+    """Return what a command said last of what stopped it; nothing if it did not."""
+    said = [line for line in log.read_text(errors="replace").splitlines() if line.startswith("error: ")]
+    return said[-1].removeprefix("error: ") if said else ""
+
+
 class Ended(NamedTuple):
     """How a command ended.
 

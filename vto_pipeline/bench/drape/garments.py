@@ -21,7 +21,7 @@ from vto_pipeline.bench.bench import Value
 from vto_pipeline.bench.drape.ipc_crossings import crossings
 from vto_pipeline.bench.drape.picture_table import write_picture_table
 from vto_pipeline.bench.live_rows import LiveRows
-from vto_pipeline.bench.own_process import run_vto
+from vto_pipeline.bench.own_process import last_error, run_vto
 from vto_pipeline.io.documents import read_json
 from vto_pipeline.io.meshes import read_mesh
 
@@ -94,9 +94,8 @@ def drape_row(
         command += ["--set", one]
     log = folder.parent / f"{folder.name}.log"
     ended = run_vto(command, log, limit)
-    said = [line for line in log.read_text(errors="replace").splitlines() if line.startswith("error: ")]
     row |= {"outcome": ended.outcome, "seconds": ended.seconds, "cpu_s": ended.cpu_seconds}
-    return row | {"said": said[-1][7:] if said else ""} | _figures(folder, body)
+    return row | {"said": last_error(log)} | _figures(folder, body)
 
 
 def summary(rows: Sequence[Mapping[str, Value]]) -> list[str]:

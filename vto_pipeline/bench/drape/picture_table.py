@@ -48,13 +48,13 @@ def write_picture_table(
         meshes = [body] if cloth is None else [body, tint(cloth, CLOTH)]
         cell = render_picture(meshes, frame_view("front", [body]), size=(_WIDE, _TALL))
         picture.paste(Image.fromarray(cell), (left, top))
-        word = how_it_ended(row)
+        word = _how_it_ended(row)
         ink.text((left + 4, top + _TALL), f"{row['garment']}"[:24], fill="black")
         ink.text((left + 4, top + _TALL + _LINE - 3), f"{word}, {row['seconds']:.0f} s", fill=_MARKS.get(word, _FAILED))
     picture.save(path, optimize=True)
 
 
-def how_it_ended(row: Mapping[str, Value]) -> str:
+def _how_it_ended(row: Mapping[str, Value]) -> str:
     """Return in a word or three what became of a drape."""
     if row["outcome"] == "done":
         return "at rest" if row["settled"] else "not at rest"

@@ -16,7 +16,7 @@ from vto_pipeline.bench.bench import Value
 from vto_pipeline.bench.drape.ipc_crossings import crossings
 from vto_pipeline.bench.drape.seam_gaps import seam_gaps
 from vto_pipeline.bench.live_rows import LiveRows
-from vto_pipeline.bench.own_process import run_vto
+from vto_pipeline.bench.own_process import last_error, run_vto
 from vto_pipeline.bench.samples.patterns.tape import tape_of
 from vto_pipeline.bench.samples.patterns.wardrobe import PATTERNS
 from vto_pipeline.garment.pattern.figures import seam_figures
@@ -83,9 +83,8 @@ def sewn_row(pattern: Path, body: Path, out: Path, edge_mm: float, limit: float)
         command += ["--set", f"{stage}.edge_mm={edge_mm:g}"]
     log = folder.parent / f"{folder.name}.log"
     ended = run_vto(command, log, limit)
-    said = [line for line in log.read_text(errors="replace").splitlines() if line.startswith("error: ")]
     row: dict[str, Value] = {"pattern": pattern.stem, "body": body.stem, "outcome": ended.outcome}
-    row |= {"seconds": ended.seconds, "cpu_s": ended.cpu_seconds, "said": said[-1][7:] if said else ""}
+    row |= {"seconds": ended.seconds, "cpu_s": ended.cpu_seconds, "said": last_error(log)}
     made = folder / "out" if ended.outcome == "done" else folder / "out" / "partial"
     return row | (_figures(pattern, folder, made, body) if (made / "draped.ply").exists() else {})
 

@@ -224,7 +224,6 @@ class Thinning:
         self._frames = [body.vertices]
         self._skin = SurfaceDistance(body)
         self.limbs = Limbs(body)
-        self._waist = self.limbs.waist()
 
     def after(self, steps: int) -> TriangleMesh:
         """Return the body after so many steps of the flow."""
@@ -275,7 +274,7 @@ class Thinning:
                 over = (piece.mesh.vertices[opening, 1] - limb.root[1]) / tall
                 if number in arms and len({piece.meant[arm] for arm in arms}) == 1:
                     in_the_way = len(piece.pierced[number]) > 0 or over.min() > _OVER
-                    count += in_the_way and perimeter(piece.mesh, opening) > self._waist
+                    count += in_the_way and perimeter(piece.mesh, opening) > self.limbs.waist
                 elif limb.name == "head" and piece.meant.count(piece.meant[number]) == 1:
                     count += over.min() > _OVER or over.max() < -_UNDER
         return count

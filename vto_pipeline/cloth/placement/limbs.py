@@ -9,6 +9,7 @@ runs along that line, and on inside the trunk. No landmark and no template is ne
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -112,8 +113,9 @@ class Limbs:
         tops = [float(limb.root[1]) for limb in legs]
         return sum(tops) / len(tops) if tops else -np.inf
 
+    @cached_property
     def waist(self) -> float:
-        """Return the girth of the trunk where it is thinnest between arms and legs [m]; infinity if unknown."""
+        """Girth of the trunk where it is thinnest between arms and legs [m]; infinity if unknown."""
         arms = [float(limb.root[1]) for limb in self.limbs if limb.name.endswith("arm")]
         if not arms or not np.isfinite(self.parting):
             return np.inf
