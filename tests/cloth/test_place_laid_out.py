@@ -70,12 +70,12 @@ def test_a_mesh_whose_best_place_has_arms_through_it_goes_to_another_height():
 
 def test_what_is_too_narrow_for_the_waist_is_no_skirt_and_stays_about_the_shoulders():
     """A poncho: arms that hang go through its cloth there, too."""
-    poncho = skirt(1.35)
-    share = (1.35 - poncho.vertices[:, 1:2]) / 0.4
-    wider = (0.1 + 0.35 * share) / RADIUS  # at the top as wide as a neck with room, and less than the waist
-    poncho = TriangleMesh(poncho.vertices * np.hstack([wider, np.ones_like(wider), 0.7 * wider]), poncho.faces)
+    poncho = tube(RADIUS, 0.6, 48, 21, base=0.75)
+    share = (1.35 - poncho.vertices[:, 1:2]) / 0.6
+    wider = (0.12 + 0.2 * share) / RADIUS  # at the top as wide as a neck with room, and less than the waist
+    poncho = TriangleMesh(poncho.vertices * np.hstack([wider, np.ones_like(wider), 0.6 * wider]), poncho.faces)
     found = find_placement(poncho, figure(BELOW), PlaceConfig(), Job())
-    assert top_and_bottom(found, poncho)[0] > 1.2
+    assert top_and_bottom(found, poncho)[0] > SHOULDER[1]
 
 
 @pytest.mark.parametrize("top", [2.35, 3.0])

@@ -11,7 +11,14 @@ from vto_pipeline.geometry.remeshing.remesh import edge_lengths
 from vto_pipeline.geometry.remeshing.repair import is_manifold
 from vto_pipeline.geometry.remeshing.rims import perimeter
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import boundary_loops, edge_face_counts, edge_faces, edges, face_components
+from vto_pipeline.geometry.topology import (
+    boundary_loops,
+    edge_face_counts,
+    edge_faces,
+    edges,
+    face_area_vectors,
+    face_components,
+)
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -195,7 +202,7 @@ def folded(gap, width=0.3, arm=0.12, fine=0.008):
     return TriangleMesh(vertices, np.vstack([np.column_stack([a, b, d]), np.column_stack([b, c, d])]).astype(np.int32))
 
 
-@pytest.mark.parametrize(("gap", "edge_mm"), [(0.02, 10.0), (0.02, 20.0), (0.004, 10.0)])
+@pytest.mark.parametrize(("gap", "edge_mm"), [(0.02, 10.0), (0.02, 20.0), (0.003, 12.0)])
 def test_it_warns_exactly_where_layers_that_lay_apart_cross(gap, edge_mm):
     fold, job = folded(gap), Job()
     made = remesh_for_simulation(fold, SimulationMeshConfig(edge_mm=edge_mm), job)
@@ -206,3 +213,11 @@ def test_it_warns_exactly_where_layers_that_lay_apart_cross(gap, edge_mm):
     if crossed:
         assert f"{crossed} pairs" in warned[0]
         assert gap < 0.01  # one edge: layers farther apart are told apart
+
+
+def test_a_way_of_remeshing_that_leaves_nothing_is_no_error():
+    """Layers of 3 mm are taken for the cones over the openings; another way leaves them."""
+    fold = folded(0.003)
+    made = remesh_for_simulation(fold, SimulationMeshConfig(edge_mm=20.0), Job())
+    area, before = (np.linalg.norm(face_area_vectors(mesh), axis=1).sum() for mesh in (made, fold))
+    assert_allclose(area, before, rtol=0.05)
