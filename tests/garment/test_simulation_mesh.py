@@ -16,7 +16,6 @@ from vto_pipeline.geometry.topology import (
     edge_face_counts,
     edge_faces,
     edges,
-    face_area_vectors,
     face_components,
 )
 from vto_pipeline.model.job import Job
@@ -213,11 +212,3 @@ def test_it_warns_exactly_where_layers_that_lay_apart_cross(gap, edge_mm):
     if crossed:
         assert f"{crossed} pairs" in warned[0]
         assert gap < 0.01  # one edge: layers farther apart are told apart
-
-
-def test_a_way_of_remeshing_that_leaves_nothing_is_no_error():
-    """Layers of 3 mm are taken for the cones over the openings; another way leaves them."""
-    fold = folded(0.003)
-    made = remesh_for_simulation(fold, SimulationMeshConfig(edge_mm=20.0), Job())
-    area, before = (np.linalg.norm(face_area_vectors(mesh), axis=1).sum() for mesh in (made, fold))
-    assert_allclose(area, before, rtol=0.05)

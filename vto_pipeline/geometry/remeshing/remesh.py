@@ -69,11 +69,7 @@ def remesh(mesh: TriangleMesh, config: RemeshConfig, job: Job) -> TriangleMesh:
     best: TriangleMesh | None = None
     change, problem = np.inf, ""
     for way in (_slid, _slid_between_corners, _pinned):
-        try:
-            tried = flip_ears(way(coarse, edge, config.iterations))
-        except InputError as error:  # what the remesher made of it is no surface
-            problem = problem or f"remeshing broke the surface: {error.problem}"
-            continue
+        tried = flip_ears(way(coarse, edge, config.iterations))
         broken = _broken(mesh, tried)
         problem = problem or broken
         if not broken and (changed := rim_change(mesh, tried)) < change:
