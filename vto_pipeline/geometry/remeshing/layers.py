@@ -16,7 +16,6 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 _APART = 0.5  # of an edge, at most, between the places that stand for the surface
 _NEAREST = 12  # of them: their faces are held against each other
-_FAR = 1e3  # m²
 
 
 class Layers:
@@ -59,7 +58,5 @@ class Layers:
         face = self._face[near.reshape(len(points), -1)]
         many = np.repeat(points, face.shape[1], axis=0)
         place = np.asarray(trimesh.triangles.closest_point(self._corners[face.ravel()], many)).reshape(*face.shape, 3)
-        away = ((place - points[:, None]) ** 2).sum(axis=2)
-        turned = np.einsum("nki,ni->nk", self._normals[face], normals) < 0.0
-        best = (away + _FAR * turned).argmin(axis=1)
+        best = ((place - points[:, None]) ** 2).sum(axis=2).argmin(axis=1)
         return np.asarray(place[np.arange(len(points)), best])
