@@ -52,12 +52,12 @@ def resample(clip: Clip, frames_per_second: float) -> Clip:
 
 
 def lead_in(motion: AvatarMotion, avatar: Avatar, seconds: float) -> AvatarMotion:
-    """Return a motion that begins in the avatar's own pose, at rest, goes to the first frame, and sets out from there.
+    """Return a motion from the avatar's own pose to the first frame, from rest there to its end, and to rest there.
 
     The motion is turned and moved so that it begins where the avatar stands and faces. Each joint goes the shortest way
     to the first frame and stops there. A curve that arrived at the frame's speed would have to swing back for a run-up,
-    far beyond both poses. So the frames that follow are slowed instead, until the motion is at its speed. Feet slide on
-    the way to the first frame: they are not planted.
+    far beyond both poses. So the frames that follow are slowed instead, until the motion is at its speed, and so are the
+    last. Feet slide on the way to the first frame: they are not planted.
 
     Args:
         motion: Of this avatar.
@@ -72,12 +72,12 @@ def lead_in(motion: AvatarMotion, avatar: Avatar, seconds: float) -> AvatarMotio
     share = (3 * s**2 - 2 * s**3)[:, None, None]
     turned = vector_matrices(share * way) @ start
     moved = avatar.translation + share[:, 0] * (translations[0] - avatar.translation)
-    begun = _from_rest(replace(motion, poses=poses, translations=translations))
+    whole = _from_rest(_backward(_from_rest(_backward(replace(motion, poses=poses, translations=translations)))))
     return replace(
         motion,
-        poses=np.concatenate([matrix_vectors(turned), begun.poses]),
-        translations=np.concatenate([moved, begun.translations]),
-        planted=np.concatenate([np.zeros((count, motion.planted.shape[1]), dtype=bool), begun.planted]),
+        poses=np.concatenate([matrix_vectors(turned), whole.poses]),
+        translations=np.concatenate([moved, whole.translations]),
+        planted=np.concatenate([np.zeros((count, motion.planted.shape[1]), dtype=bool), whole.planted]),
     )
 
 
@@ -103,6 +103,12 @@ def _from_rest(motion: AvatarMotion) -> AvatarMotion:
     )
 
 
+def _backward(motion: AvatarMotion) -> AvatarMotion:
+    return replace(
+        motion, poses=motion.poses[::-1], translations=motion.translations[::-1], planted=motion.planted[::-1]
+    )
+
+
 def brought_to(motion: AvatarMotion, avatar: Avatar) -> tuple[FloatArray, FloatArray]:
     """Return poses and translations, turned about the vertical and moved on the floor to where the avatar stands."""
     root = avatar.joint_names.index("pelvis")
@@ -118,8 +124,7 @@ def brought_to(motion: AvatarMotion, avatar: Avatar) -> tuple[FloatArray, FloatA
 
 
 def hold_last(motion: AvatarMotion, seconds: float) -> AvatarMotion:
-    """Return a motion that comes to rest in its last pose, as it would set out, and holds that for so long [s]."""
-    stopped = _backward(_from_rest(_backward(motion)))
+    """Return a motion whose last pose is held for so long [s]."""
     count = round(seconds / motion.frame_time)
 
     def held(values: NDArray[Any]) -> NDArray[Any]:
@@ -127,13 +132,7 @@ def hold_last(motion: AvatarMotion, seconds: float) -> AvatarMotion:
 
     return replace(
         motion,
-        poses=held(stopped.poses),
-        translations=held(stopped.translations),
-        planted=held(stopped.planted),
-    )
-
-
-def _backward(motion: AvatarMotion) -> AvatarMotion:
-    return replace(
-        motion, poses=motion.poses[::-1], translations=motion.translations[::-1], planted=motion.planted[::-1]
+        poses=held(motion.poses),
+        translations=held(motion.translations),
+        planted=held(motion.planted),
     )
