@@ -1,4 +1,4 @@
-"""The benches of motions: frames that cross, counted by ipctk, where they are known; limbs that are off by known turns."""
+"""The benches of motions: known crossings are counted by ipctk, and limbs are off by known turns."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def posed(avatar: Avatar, poses: list[np.ndarray]) -> AvatarMotion:
 def test_frames_that_cross_body_or_cloth_are_counted(tmp_path):
     avatar = template(0.5)
     navel = avatar.vertices[avatar.landmarks["navel"]]
-    before, within = navel + [0.0, 0.0, 0.1], navel - [0.0, 0.0, 0.08]
+    before, within = navel + np.array([0.0, 0.0, 0.1]), navel - np.array([0.0, 0.0, 0.08])
     frames = [patches(before), patches(navel), patches(before, apart=0.0), patches(before + 0.01), patches(within)]
     cloth = ClothMotion(np.stack(frames), PATCHES, 1 / 30)
     motion = posed(avatar, [avatar.pose] * len(frames))

@@ -54,10 +54,10 @@ def resample(clip: Clip, frames_per_second: float) -> Clip:
 def lead_in(motion: AvatarMotion, avatar: Avatar, seconds: float) -> AvatarMotion:
     """Return a motion from the avatar's own pose to the first frame, from rest there to its end, and to rest there.
 
-    The motion is turned and moved so that it begins where the avatar stands and faces. Each joint goes the shortest way
-    to the first frame and stops there. A curve that arrived at the frame's speed would have to swing back for a run-up,
-    far beyond both poses. So the frames that follow are slowed instead, until the motion is at its speed, and so are the
-    last. Feet slide on the way to the first frame: they are not planted.
+    The motion is turned and moved so that it begins where the avatar stands and faces. Each joint goes the shortest
+    way to the first frame and stops there. A curve that arrived at the frame's speed would have to swing back for a
+    run-up, far beyond both poses. So the next frames are slowed instead, until the motion is at its speed, and so are
+    the last. Feet slide on the way to the first frame: they are not planted.
 
     Args:
         motion: Of this avatar.

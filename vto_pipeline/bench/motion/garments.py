@@ -75,7 +75,8 @@ def motion_row(
     for one in settings:
         command += ["--set", one]
     ended = run_vto(command, out / f"{garment.stem}_{Path(motion).stem}.log", limit)
-    reached = run_figures(folder, body) if ended.outcome in ("done", "failed") else {}  # else its files are of the run before
+    own = ended.outcome in ("done", "failed")  # else its files are of the run before
+    reached = run_figures(folder, body) if own else {}
     return {"garment": garment.stem, "motion": Path(motion).stem, "outcome": ended.outcome, **reached}
 
 

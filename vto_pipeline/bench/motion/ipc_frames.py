@@ -18,8 +18,8 @@ from vto_pipeline.model.motion import AvatarMotion, ClothMotion
 def crossing_frames(cloth: ClothMotion, avatar: Avatar, motion: AvatarMotion) -> tuple[int, int]:
     """Return in how many frames cloth crosses itself or its body: the body with sunken skin, then as it is posed.
 
-    Where parts of a body press on each other its skin sinks in, and cloth is held off that. The posed skin of such parts
-    passes through itself, and through cloth between them.
+    Where parts of a body press on each other its skin sinks in, and cloth is held off that. The posed skin there passes
+    through itself, and through cloth in between.
 
     Args:
         cloth: The frames.
