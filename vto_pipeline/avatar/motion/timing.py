@@ -15,9 +15,7 @@ from vto_pipeline.model.body import Avatar
 from vto_pipeline.model.motion import AvatarMotion, Clip
 from vto_pipeline.numerics.kinematics import (
     continuous_signs,
-    matrix_quaternions,
     matrix_vectors,
-    quaternion_matrices,
     vector_matrices,
 )
 
@@ -84,21 +82,24 @@ def lead_in(motion: AvatarMotion, avatar: Avatar, seconds: float) -> AvatarMotio
 def _from_rest(motion: AvatarMotion) -> AvatarMotion:
     """Return a motion that starts at rest: its speed grows evenly, and all of its poses are passed.
 
-    A point stands still between two frames if it does in both.
+    Between two frames joints turn at even speed, as `path` has it: a spline's feet would drift where one of them begins
+    to stand still. A point stands still there if it does in both frames.
     """
     last = len(motion.poses) - 1
     slowed = 2 * min(round(_SET_OUT_S / 2 / motion.frame_time), last)  # even: it ends on a frame of the motion
     if slowed == 0:
         return motion
     at = np.arange(slowed) ** 2 / (2 * slowed)
-    frames = np.arange(last + 1)
-    turns = CubicSpline(frames, continuous_signs(matrix_quaternions(vector_matrices(motion.poses))))(at)
-    turns /= np.linalg.norm(turns, axis=-1, keepdims=True)
     before, after, rest = np.floor(at).astype(int), np.ceil(at).astype(int), slice(slowed // 2, None)
+    share, turns = (at - before)[:, None, None], vector_matrices(motion.poses)
+    way = matrix_vectors(turns[after] @ np.swapaxes(turns[before], -1, -2))
+    poses = matrix_vectors(vector_matrices(share * way) @ turns[before])
+    places = motion.translations
+    places = places[before] + share[:, 0] * (places[after] - places[before])
     return replace(
         motion,
-        poses=np.concatenate([matrix_vectors(quaternion_matrices(turns)), motion.poses[rest]]),
-        translations=np.concatenate([CubicSpline(frames, motion.translations)(at), motion.translations[rest]]),
+        poses=np.concatenate([poses, motion.poses[rest]]),
+        translations=np.concatenate([places, motion.translations[rest]]),
         planted=np.concatenate([motion.planted[before] & motion.planted[after], motion.planted[rest]]),
     )
 
