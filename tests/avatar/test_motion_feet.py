@@ -15,7 +15,7 @@ from vto_pipeline.avatar.motion.limits import limit_turns
 from vto_pipeline.avatar.motion.plants import find_plants
 from vto_pipeline.avatar.motion.retarget import posed_joints
 from vto_pipeline.avatar.motion.soles import contact_places
-from vto_pipeline.avatar.motion.timing import lead_in, resample
+from vto_pipeline.avatar.motion.timing import hold_last, lead_in, resample
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.errors import InputError
 from vto_pipeline.model.motion import AvatarMotion, Clip
@@ -151,7 +151,7 @@ def test_another_rate_keeps_a_steady_motion(rate, wanted):
         resample(spinning_clip(1 / 9.0, 200), 240.0)
 
 
-def test_a_lead_in_starts_from_the_pose_and_arrives_at_speed():
+def test_a_lead_in_starts_from_the_pose_and_sets_out_from_the_first_frame():
     body = template(0.5)
     names = body.joint_names
     t = np.arange(40) / 30
@@ -160,17 +160,57 @@ def test_a_lead_in_starts_from_the_pose_and_arrives_at_speed():
     poses[:, names.index("left_elbow"), 1] = -0.5 - 1.0 * t
     motion = AvatarMotion(names, poses, np.stack([5 + t, 0 * t, 0 * t], axis=1), np.ones((40, 4), dtype=bool), 1 / 30)
     led = lead_in(motion, body, 0.5)
-    assert len(led.poses) == 55
+    assert len(led.poses) == 15 + 12 + 28 + 12  # at an even gain of speed, 0.4 s bring it as far as else 0.2 s
     np.testing.assert_allclose(led.poses[0], body.pose, rtol=0, atol=1e-9)
     np.testing.assert_allclose(led.translations[0], body.translation, rtol=0, atol=1e-9)
     assert not led.planted[:15].any()
-    elbow = led.poses[:, names.index("left_elbow"), 1]
-    np.testing.assert_allclose(elbow[15:], poses[:, names.index("left_elbow"), 1], rtol=0, atol=1e-9)
-    assert abs(np.diff(elbow, 2)).max() < 0.03  # rad per frame squared; a jump of speed would be 1 rad/s / 30
-    assert elbow[15] - elbow[14] == pytest.approx(-1 / 30, rel=0.2)  # a Hermite curve's last of 15 steps
+    assert led.planted[15:].all()
+    elbow, slow = led.poses[:, names.index("left_elbow"), 1], np.arange(12)
+    np.testing.assert_allclose(elbow[15:27], -0.5 - slow**2 / 24 / 30, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(elbow[27:55], poses[6:34, names.index("left_elbow"), 1], rtol=0, atol=1e-9)
+    assert abs(np.diff(elbow, 2)).max() < 0.014  # rad per frame squared: 6 x 0.5 / 15**2 of the lead-in's cubic
     # the motion goes where the body faces: it went to +x facing 1.2 rad, now it faces +z
     way = led.translations[-1] - led.translations[15]
     np.testing.assert_allclose(way, 39 / 30 * np.array([np.cos(-1.2), 0.0, -np.sin(-1.2)]), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("rate", [10, 30, 240])
+def test_a_motion_that_is_fast_at_both_ends_never_swings_beyond_its_poses(rate):
+    body = template(0.5)
+    knee = body.joint_names.index("right_knee")
+    t = np.arange(rate) / rate
+    poses = np.zeros((rate, len(body.joint_names), 3))
+    poses[:, knee, 0] = 0.4 + 10.0 * t  # rad: a runner's knee
+    still = np.zeros((rate, 4), dtype=bool)
+    along = np.stack([0 * t, 0 * t, 4.0 * t], axis=1)
+    motion = AvatarMotion(body.joint_names, np.minimum(poses, 2.0), along, still, 1 / rate)
+    whole = hold_last(lead_in(motion, body, 1.0), 0.5)
+    assert (whole.poses[-round(rate / 2) :] == whole.poses[-1]).all()
+    bend, gone = whole.poses[:, knee, 0], whole.translations[:, 2]
+    assert bend.min() > -1e-9
+    assert bend.max() < 2.0 + 1e-9
+    assert (np.diff(bend[: rate + 1]) > -1e-9).all()
+    assert (np.diff(gone) > -1e-9).all()
+    pull = np.diff(np.concatenate([[gone[0]] * 2, gone]), 2) * rate**2
+    assert abs(pull).max() < 1.5 * 4.0 / 0.4  # m/s²: from rest to 4 m/s in 0.4 s, and back
+
+
+def test_a_motion_comes_to_rest_as_it_sets_out_and_a_pose_is_only_held():
+    body = template(0.5)
+    count, elbow = 40, body.joint_names.index("left_elbow")
+    poses = np.zeros((count, len(body.joint_names), 3))
+    poses[:, elbow, 1] = -np.arange(count) / 30
+    planted = np.ones((count, 4), dtype=bool)
+    planted[-3, 0] = False
+    motion = AvatarMotion(body.joint_names, poses, np.zeros((count, 3)), planted, 1 / 30)
+    led = lead_in(motion, body, 0.5)
+    bend, lifted = led.poses[15:, elbow, 1], np.flatnonzero(~led.planted[15:, 0])
+    np.testing.assert_allclose(bend[-1:-13:-1], bend[-1] + np.arange(12) ** 2 / 24 / 30, rtol=0, atol=1e-9)
+    assert bend[-1] == pytest.approx(poses[-1, elbow, 1])
+    near = np.arange(12) ** 2 / 24  # frames before the end; slowed, they are 0, 1, 2 ... before it
+    np.testing.assert_array_equal(len(bend) - 1 - lifted[::-1], np.flatnonzero(abs(near - 2) < 1))
+    one = AvatarMotion(body.joint_names, poses[:1], np.zeros((1, 3)), planted[:1], 1 / 30)
+    assert len(hold_last(lead_in(one, body, 0.5), 0.2).poses) == 15 + 1 + 6
 
 
 def test_the_zero_moment_point_of_a_swaying_mass():

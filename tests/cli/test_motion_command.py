@@ -55,7 +55,7 @@ def test_a_motion_is_described_and_carried_over(vto):
     np.testing.assert_allclose(read_motion("out/motion.glb").clip.frame_time, 0.02, rtol=1e-6)  # single precision
     lines = vto("motion", "w.bvh", "--lead-in", "0.4s").out
     assert "BVH, rotations ZXY, places on the root" in lines
-    assert "14 at 25 a second" in lines
+    assert "22 at 25 a second" in lines  # 10 frames of lead-in; 4 of the clip, 3 more as it slows and 5 as it sets out
 
 
 def test_presets_have_names_and_mistakes_have_exit_codes(vto):

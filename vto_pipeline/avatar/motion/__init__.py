@@ -6,7 +6,7 @@ limits, joint_limits.yaml: how far joints turn
 soles, plants: where a foot touches the floor, and when it stands still
 foot_skate, leg_reach: feet that stand still are held there
 arms: arms that are kept off trunk and thighs
-timing: another frame rate; a smooth start from a pose; a last pose that is held
+timing: another frame rate; a smooth start from a pose, and a smooth end; a last pose that is held
 path: the avatar at any time of its motion
 live: an avatar that follows a person frame by frame
 balance: mass of the parts, zero moment point, support

@@ -1,4 +1,4 @@
-"""Another frame rate, and a smooth start from a pose."""
+"""Another frame rate, a smooth start from a pose, and a smooth end."""
 
 from __future__ import annotations
 
@@ -13,9 +13,15 @@ from vto_pipeline.errors import InputError
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Avatar
 from vto_pipeline.model.motion import AvatarMotion, Clip
-from vto_pipeline.numerics.kinematics import continuous_signs, matrix_vectors, vector_matrices
+from vto_pipeline.numerics.kinematics import (
+    continuous_signs,
+    matrix_vectors,
+    vector_matrices,
+)
 
 _MOST_FRAMES = 200_000
+_SET_OUT_S = 0.4
+"""In which a motion that begins at rest reaches its speed, and in which it comes to rest."""
 
 
 def resample(clip: Clip, frames_per_second: float) -> Clip:
@@ -44,10 +50,12 @@ def resample(clip: Clip, frames_per_second: float) -> Clip:
 
 
 def lead_in(motion: AvatarMotion, avatar: Avatar, seconds: float) -> AvatarMotion:
-    """Return a motion that begins in the avatar's own pose, at rest, and reaches the first frame at its speed.
+    """Return a motion from the avatar's own pose to the first frame, from rest there to its end, and to rest there.
 
-    The motion is turned and moved so that it begins where the avatar stands and faces. Each joint follows a cubic
-    Hermite curve in the rotation from its start. Feet slide meanwhile: they are not planted.
+    The motion is turned and moved so that it begins where the avatar stands and faces. Each joint goes the shortest
+    way to the first frame and stops there. A curve that arrived at the frame's speed would have to swing back for a
+    run-up, far beyond both poses. So the next frames are slowed instead, until the motion is at its speed, and so are
+    the last. Feet slide on the way to the first frame: they are not planted.
 
     Args:
         motion: Of this avatar.
@@ -56,20 +64,49 @@ def lead_in(motion: AvatarMotion, avatar: Avatar, seconds: float) -> AvatarMotio
     """
     count = max(1, round(seconds / motion.frame_time))
     poses, translations = brought_to(motion, avatar)
-    second = min(1, len(poses) - 1)
     start = vector_matrices(avatar.pose)
-    first, after = (matrix_vectors(vector_matrices(poses[k]) @ np.swapaxes(start, -1, -2)) for k in (0, second))
-    ways = np.concatenate([first, (translations[0] - avatar.translation)[None]])
-    next_ways = np.concatenate([after, (translations[second] - avatar.translation)[None]])
-    slopes = (next_ways - ways) * count  # per whole lead-in
-    s = (np.arange(count) / count)[:, None, None]
-    path = (3 * s**2 - 2 * s**3) * ways + (s**3 - s**2) * slopes
-    turned = vector_matrices(path[:, :-1]) @ start
+    way = matrix_vectors(vector_matrices(poses[0]) @ np.swapaxes(start, -1, -2))
+    s = np.arange(count) / count
+    share = (3 * s**2 - 2 * s**3)[:, None, None]
+    turned = vector_matrices(share * way) @ start
+    moved = avatar.translation + share[:, 0] * (translations[0] - avatar.translation)
+    whole = _from_rest(_backward(_from_rest(_backward(replace(motion, poses=poses, translations=translations)))))
     return replace(
         motion,
-        poses=np.concatenate([matrix_vectors(turned), poses]),
-        translations=np.concatenate([avatar.translation + path[:, -1], translations]),
-        planted=np.concatenate([np.zeros((count, motion.planted.shape[1]), dtype=bool), motion.planted]),
+        poses=np.concatenate([matrix_vectors(turned), whole.poses]),
+        translations=np.concatenate([moved, whole.translations]),
+        planted=np.concatenate([np.zeros((count, motion.planted.shape[1]), dtype=bool), whole.planted]),
+    )
+
+
+def _from_rest(motion: AvatarMotion) -> AvatarMotion:
+    """Return a motion that starts at rest: its speed grows evenly, and all of its poses are passed.
+
+    Between two frames joints turn at even speed, as `path` has it: a spline's feet would drift where one of them begins
+    to stand still. A point stands still there if it does in both frames.
+    """
+    last = len(motion.poses) - 1
+    slowed = 2 * min(round(_SET_OUT_S / 2 / motion.frame_time), last)  # even: it ends on a frame of the motion
+    if slowed == 0:
+        return motion
+    at = np.arange(slowed) ** 2 / (2 * slowed)
+    before, after, rest = np.floor(at).astype(int), np.ceil(at).astype(int), slice(slowed // 2, None)
+    share, turns = (at - before)[:, None, None], vector_matrices(motion.poses)
+    way = matrix_vectors(turns[after] @ np.swapaxes(turns[before], -1, -2))
+    poses = matrix_vectors(vector_matrices(share * way) @ turns[before])
+    places = motion.translations
+    places = places[before] + share[:, 0] * (places[after] - places[before])
+    return replace(
+        motion,
+        poses=np.concatenate([poses, motion.poses[rest]]),
+        translations=np.concatenate([places, motion.translations[rest]]),
+        planted=np.concatenate([motion.planted[before] & motion.planted[after], motion.planted[rest]]),
+    )
+
+
+def _backward(motion: AvatarMotion) -> AvatarMotion:
+    return replace(
+        motion, poses=motion.poses[::-1], translations=motion.translations[::-1], planted=motion.planted[::-1]
     )
 
 

@@ -1,4 +1,7 @@
-"""`python -m vto_pipeline.bench.motion FILE...` carries motions over to five bodies, and prints how clean they are."""
+"""`python -m vto_pipeline.bench.motion FILE...` carries motions over to five bodies, and prints how clean they are.
+
+Angles between limbs of source and avatar are given as median and largest: feet are held, arms kept off the body.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +11,16 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.motion.figures import crossing_frames
 from vto_pipeline.avatar.motion.retarget import retarget
 from vto_pipeline.avatar.template.template import template
+from vto_pipeline.bench.motion.limb_angles import BONES, limb_angles
 from vto_pipeline.bench.printed_table import print_table
 from vto_pipeline.io.motion.read import read_motion
+from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Avatar, Measurements
 
 _HEADS = (
@@ -28,6 +35,7 @@ _HEADS = (
     "below floor mm",
     "balanced %",
     "limbs through",
+    *(f"{limb} off deg" for limb in BONES),
     "CPU s",
 )
 _LOOKED_AT = 12
@@ -61,6 +69,7 @@ def rows(sources: list[str]) -> Iterator[tuple[str, ...]]:
             seconds = time.process_time() - began
             crossing, looked_at = crossing_frames(motion, body, _LOOKED_AT)
             share = figures.balance.inside_share
+            off = limb_angles(read, body, motion)
             yield (
                 Path(source).stem,
                 name,
@@ -73,8 +82,15 @@ def rows(sources: list[str]) -> Iterator[tuple[str, ...]]:
                 f"{1e3 * figures.below_floor:.1f}",
                 "-" if share is None else f"{100 * share:.0f}",
                 f"{crossing} of {looked_at}",
+                *(_median_and_most(off.get(limb)) for limb in BONES),
                 f"{seconds:.2f}",
             )
+
+
+def _median_and_most(angles: FloatArray | None) -> str:
+    if angles is None:
+        return "-"
+    return f"{np.rad2deg(np.median(angles)):.0f}, {np.rad2deg(angles.max()):.0f}"
 
 
 def main() -> int:

@@ -1,6 +1,7 @@
 """`python -m vto_pipeline.bench.motion.garments` carries garments through motions, each by `vto drape --motion`.
 
 Each run is a process of its own, so that one that fails costs no other; its row is written as soon as it ends.
+Crossings are counted by our own audit, and by ipctk at every frame.
 """
 
 from __future__ import annotations
@@ -12,9 +13,11 @@ from pathlib import Path
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.bench.bench import Value
 from vto_pipeline.bench.live_rows import LiveRows
+from vto_pipeline.bench.motion.ipc_frames import crossing_frames
 from vto_pipeline.bench.own_process import run_vto
-from vto_pipeline.io.bodies.avatars import write_avatar
+from vto_pipeline.io.bodies.avatars import read_avatar, write_avatar
 from vto_pipeline.io.documents import read_json
+from vto_pipeline.io.motion.archive import read_avatar_motion
 from vto_pipeline.io.runs.frame_log import read_cloth_motion
 
 _COLUMNS = (
@@ -26,6 +29,8 @@ _COLUMNS = (
     "crossing_body",
     "most_pairs",
     "crossing_itself",
+    "ipc_crossing",
+    "ipc_crossing_posed",
     "body_in_itself",
     "yields_mm",
     "inside_mm",
@@ -70,21 +75,26 @@ def motion_row(
     for one in settings:
         command += ["--set", one]
     ended = run_vto(command, out / f"{garment.stem}_{Path(motion).stem}.log", limit)
-    reached = _figures(folder) if ended.outcome in ("done", "failed") else {}  # else its files are of the run before
+    own = ended.outcome in ("done", "failed")  # else its files are of the run before
+    reached = run_figures(folder, body) if own else {}
     return {"garment": garment.stem, "motion": Path(motion).stem, "outcome": ended.outcome, **reached}
 
 
-def _figures(folder: Path) -> dict[str, Value]:
+def run_figures(folder: Path, body: Path) -> dict[str, Value]:
     """Return the figures of a run's files, as far as it has got."""
     for made in (folder / "out", folder / "out" / "partial"):
         if (made / "motion_audit.json").exists():
             found = read_json(made / "motion_audit.json")
+            cloth = read_cloth_motion(made / "draped_motion.npz")
+            by_ipc = crossing_frames(cloth, read_avatar(body), read_avatar_motion(folder / "out" / "motion.npz"))
             return {
-                "vertices": read_cloth_motion(made / "draped_motion.npz").frames.shape[1],
+                "vertices": cloth.frames.shape[1],
                 "frames": found["frames"],
                 "crossing_body": found["frames_crossing_body"],
                 "most_pairs": found["most_body_crossings"],
                 "crossing_itself": found["frames_crossing_itself"],
+                "ipc_crossing": by_ipc[0],
+                "ipc_crossing_posed": by_ipc[1],
                 "body_in_itself": found["frames_body_crossing_itself"],
                 "yields_mm": found["body_yields_mm"],
                 "inside_mm": found["penetration_mm"],
