@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +62,7 @@ def wrong_shares(garment: TriangleMesh, observed: NDArray[np.bool_], truth: Tria
     """
     points, _, face = sample_surface(garment, SAMPLES, seed=0)
     wrong = SurfaceDistance(truth).nearest(points).distance > WRONG
-    filled = ~observed[garment.faces].all(axis=1)[face]
+    filled = ~np.asarray(observed[garment.faces].all(axis=1))[face]
     rim = np.zeros(len(points), dtype=bool)
     loops = boundary_loops(garment)
     if loops:
@@ -100,8 +101,9 @@ def photos_that_show(points: FloatArray, normals: FloatArray, scene: TriangleMes
     """
     import open3d as o3d
 
+    core: Any = o3d.core  # its stubs know no NumPy array
     rays = o3d.t.geometry.RaycastingScene()
-    rays.add_triangles(o3d.core.Tensor(np.float32(scene.vertices)), o3d.core.Tensor(np.uint32(scene.faces)))
+    rays.add_triangles(core.Tensor(scene.vertices.astype(np.float32)), core.Tensor(scene.faces.astype(np.uint32)))
     count: IntArray = np.zeros(len(points), np.int32)
     for lens, pose in zip(cameras.intrinsics, cameras.world_from_cam, strict=True):
         eye = pose[:3, 3]
@@ -113,6 +115,6 @@ def photos_that_show(points: FloatArray, normals: FloatArray, scene: TriangleMes
         u, v = lens.fx * local[:, 0] / z + lens.cx, lens.fy * local[:, 1] / z + lens.cy
         inside = ahead & (u >= 0) & (v >= 0) & (u <= lens.width - 1) & (v <= lens.height - 1)
         cast = np.column_stack([np.broadcast_to(eye, way.shape), way / away[:, None]]).astype(np.float32)
-        free = rays.cast_rays(o3d.core.Tensor(cast))["t_hit"].numpy() > away - SKIN
+        free = rays.cast_rays(core.Tensor(cast))["t_hit"].numpy() > away - SKIN
         count += inside & free & ((way * normals).sum(axis=1) < -LEAST_COSINE * away)
     return count
