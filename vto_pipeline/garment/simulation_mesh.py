@@ -31,6 +31,7 @@ from vto_pipeline.model.settings import Config
 _ACROSS = 3.0  # edges that a strap is wide at least: it needs finer triangles than the cloth it holds
 _TRIES = 3  # each with half the edge of the one before
 _LEAST_EDGE_MM = 1.0  # the remesher's
+_CUT_SHORT = 0.15  # of a piece's area: chords take a few per cent, and folds tighter than the edges much more
 _PINHOLE = 3.0  # edges around: what triangles of that size cannot go round, and no limb goes through
 
 
@@ -138,6 +139,11 @@ def _remesh_piece(piece: TriangleMesh, config: SimulationMeshConfig, job: Job) -
         for name in ("hausdorff_mm", "deviation_rms_mm", "opening_change"):
             job.measure(**{name: max(_figure(job, name), _figure(tried, name))})
         _warn_of_crossings(piece, made, job)
+        lost = -_figure(tried, "area_change")
+        if lost > _CUT_SHORT:
+            job.warn(
+                f"remeshing cut {lost:.0%} of a piece's cloth short: it has folds tighter than edges of {wanted:g} mm"
+            )
         return made
     job.warn(f"a piece of {len(piece.faces)} faces could not be remeshed and is used as it is")
     return piece

@@ -1,6 +1,6 @@
 """Remeshing, repair and hole filling.
 
-remesh, isotropic: triangles of one size
+remesh, isotropic: triangles of one size; layers: each vertex back in its own layer
 rims, rim_ears: openings before that and how long they stay, flat triangles at rims after it
 decimate: fewer
 clip: along the line where a value changes sign

@@ -9,8 +9,10 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from vto_pipeline.errors import GarmentError, InputError
+from vto_pipeline.geometry.intersections import self_intersections
 from vto_pipeline.geometry.remeshing.decimate import decimate, faces_at
 from vto_pipeline.geometry.remeshing.isotropic import isotropic
+from vto_pipeline.geometry.remeshing.layers import Layers
 from vto_pipeline.geometry.remeshing.repair import is_manifold
 from vto_pipeline.geometry.remeshing.rim_ears import flip_ears
 from vto_pipeline.geometry.remeshing.rims import SMALL, even_rims, perimeter, rim_change, rim_corners
@@ -22,8 +24,9 @@ from vto_pipeline.geometry.topology import (
     face_area_vectors,
     face_components,
     submesh,
+    vertex_normals,
 )
-from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
@@ -51,8 +54,9 @@ def remesh(mesh: TriangleMesh, config: RemeshConfig, job: Job) -> TriangleMesh:
     The remesher (`isotropic`) pins open boundaries as they are, and as `even_rims` has left the small ones. Each other
     opening is first closed by a cone, its rim marked as a feature along which vertices may slide, and the cones are
     taken away again at the end. Sliding vertices cut corners, round for round, and a cone may pass through the surface.
-    So where an opening has not kept its length, corners are held; and where that will not do, all rims are pinned: at
-    the cost of less even triangles beside them. The way that keeps the openings best counts.
+    So where an opening has not kept its length, or layers cross that did not, corners are held; and where that will not
+    do, all rims are pinned, at the cost of less even triangles beside them, and vertices are put back by `Layers`. Of
+    the ways that make the fewest cross, the one that keeps the openings best counts.
 
     Raises:
         InputError: the mesh is not manifold.
@@ -67,14 +71,16 @@ def remesh(mesh: TriangleMesh, config: RemeshConfig, job: Job) -> TriangleMesh:
         coarse = mesh  # slower, but whole
     job.progress(0.3, "remeshing")
     best: TriangleMesh | None = None
-    change, problem = np.inf, ""
-    for way in (_slid, _slid_between_corners, _pinned):
+    given, (crossing, change), problem = len(self_intersections(mesh)), (np.inf, np.inf), ""
+    for way in (_slid, _slid_between_corners, *([_pinned] if len(_inner(coarse)) else [])):
         tried = flip_ears(way(coarse, edge, config.iterations))
         broken = _broken(mesh, tried)
         problem = problem or broken
-        if not broken and (changed := rim_change(mesh, tried)) < change:
-            best, change = tried, changed
-        if change <= SAME_RIM:
+        if not broken:
+            found = max(len(self_intersections(tried)) - given, 0), rim_change(mesh, tried)
+            if found < (crossing, change):
+                best, (crossing, change) = tried, found
+        if crossing == 0 and change <= SAME_RIM:
             break
     if best is None:
         raise GarmentError(problem, hint="try an edge length well below the narrowest part of the garment")
@@ -99,8 +105,21 @@ def _slid_between_corners(mesh: TriangleMesh, edge: float, rounds: int) -> Trian
 
 
 def _pinned(mesh: TriangleMesh, edge: float, rounds: int) -> TriangleMesh:
-    """Remesh with rims as they are, once they are in even edges."""
-    return isotropic(even_rims(mesh, edge, np.inf), edge, rounds, features=None, project=True)
+    """Remesh with rims as they are, once they are in even edges, and with each vertex put back in its own layer."""
+    fine = even_rims(mesh, edge, np.inf)
+    layers = Layers(fine, edge)
+    for _ in range(rounds):
+        fine = isotropic(fine, edge, 1, features=None, project=False)
+        inner = _inner(fine)
+        vertices = fine.vertices.copy()
+        vertices[inner] = layers.nearest(vertices[inner], vertex_normals(fine)[inner])
+        fine = TriangleMesh(vertices, fine.faces)
+    return fine
+
+
+def _inner(mesh: TriangleMesh) -> IntArray:
+    """Return the vertices that are on no rim."""
+    return np.setdiff1d(mesh.faces, np.concatenate([np.empty(0, np.int32), *boundary_loops(mesh)]))
 
 
 def _with_cones(mesh: TriangleMesh, edge: float, rounds: int, hold_corners: bool) -> TriangleMesh:
@@ -196,4 +215,9 @@ def _measure(before: TriangleMesh, after: TriangleMesh, rim_change: float, job: 
         hausdorff_mm=float(max(there.max(), back.max()) * 1e3),
         deviation_rms_mm=float(np.sqrt(np.mean(there**2)) * 1e3),
         opening_change=rim_change,
+        area_change=_area(after) / _area(before) - 1.0,
     )
+
+
+def _area(mesh: TriangleMesh) -> float:
+    return float(np.linalg.norm(face_area_vectors(mesh), axis=1).sum())
