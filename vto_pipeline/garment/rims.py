@@ -65,11 +65,11 @@ def drop_flaps(shell: TriangleMesh, width: float, shortest: float) -> TriangleMe
 
     Args:
         shell: The cut-out garment.
-        width: [m].
+        width: [m]; with none, nothing is dropped.
         shortest: Shorter loops are holes of the scan [m].
     """
     loops = [loop for loop in boundary_loops(shell) if perimeter(shell, loop) >= shortest]
-    if not loops:
+    if not loops or width == 0.0:
         return shell
     radius = 0.5 * width
     depth = distance_from(shell, np.concatenate(loops), 4.0 * radius)

@@ -10,6 +10,7 @@ import numpy as np
 
 from vto_pipeline.bench.bench import Value
 from vto_pipeline.bench.own_process import run_vto
+from vto_pipeline.bench.scan.blame import blame
 from vto_pipeline.bench.scan.truth import beside_truth, cameras_off
 from vto_pipeline.io.captures.cameras import read_cameras
 from vto_pipeline.io.documents import read_json
@@ -42,7 +43,8 @@ def scan_row(capture: Path, kind: str, folder: Path, settings: Sequence[str], li
     garment = folder / "out" / "garment.ply"
     found: dict[str, Value] = {}
     if ended.code == 0 and garment.is_file():
-        found = beside_truth(read_own_mesh(garment), read_mesh(capture / TRUTH))
+        truth = read_mesh(capture / TRUTH)
+        found = beside_truth(read_own_mesh(garment), truth) | blame(folder, truth, read_mesh(capture / FORM))
     return {
         "capture": capture.name,
         "kind": kind,
