@@ -1,0 +1,125 @@
+"""The fuzzer: damages a sound file again and again, and reads it each time. For the child process.
+
+What a reader may do is read, or refuse. Whatever else it does ends the child, and the bytes stay where they were read.
+"""
+
+from __future__ import annotations
+
+import random
+import signal
+import time
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fuzz_targets import SLOW, TARGETS, sound_file
+
+from vto_pipeline.errors import VtoError
+from vto_pipeline.io.arrays import Arrays
+
+Edit = tuple[int, int, int, bytes]  # what is done, where as a share of the file in 1/65536, over how many bytes, with what
+Reader = Callable[[Path], Any]
+SECONDS_EACH = 20.0  # a reading that takes longer hangs; the slowest takes 0.2 s
+KEPT = "damaged"  # a link to the file that was read last
+WORDS = tuple(
+    b"\x00|\xff|-1|99999999999|nan|1e999|../|&a [*a]|!!python/x |{|\n|\"|7|0|a| |.5|e3|: |,|\xff\xff\xff\xff"
+    b"|\xff\xff\xff\x7f|\x00\x00\x00\x80|\x1f\x8b|PK\x03\x04|%|\xe2\x80\xae".split(b"|")
+)
+
+
+def some_edits(rng: random.Random) -> list[Edit]:
+    """Draw one to four edits; every second time a word puts bytes in that mean something in some format."""
+
+    def one() -> Edit:
+        payload = rng.choice(WORDS) if rng.random() < 0.5 else rng.randbytes(rng.randint(1, 8))
+        return rng.choice((0, 0, 0, 1, 2, 3)), rng.randrange(65536), rng.randint(1, 64), payload
+
+    return [one() for _ in range(rng.randint(1, 4))]
+
+
+def edited(data: bytes, edits: list[Edit]) -> bytes:
+    """Return the bytes overwritten, with something put in, taken out, or cut off; a third of all edits in the head."""
+    for kind, share, length, payload in edits:
+        reach = min(len(data), 400) if share % 3 == 0 else len(data)
+        at = share * reach // 65536
+        if kind == 0:
+            data = data[:at] + payload + data[at + len(payload) :]
+        elif kind == 1:
+            data = data[:at] + payload + data[at:]
+        elif kind == 2:
+            data = data[:at] + data[at + length :]
+        elif length > 48:
+            data = data[:at]
+        else:
+            data = data[:at] + data[at : at + length] * 2 + data[at + length :]
+    return data
+
+
+def refuses(read: Reader, path: Path, data: bytes) -> bool:
+    """Read these bytes; whatever is raised that is no refusal comes through, and a hang ends the process."""
+    path.write_bytes(data)
+    signal.setitimer(signal.ITIMER_REAL, SECONDS_EACH)
+    try:
+        read(path)
+    except VtoError:
+        return True
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+    return False
+
+
+def fails(read: Reader, path: Path, data: bytes) -> bool:
+    """Whether these bytes make the reader raise what is no refusal."""
+    try:
+        refuses(read, path, data)
+    except BaseException:
+        return True
+    return False
+
+
+def fuzz_reader(path: Path, read: Reader, count: int, seed: int, folder: str) -> Arrays:
+    """Read damaged copies of a sound file.
+
+    Returns:
+        executions, refused: how many there were; seconds: how long they took [s].
+
+    Raises:
+        BaseException: what the reader raised that is no refusal; the file then holds the fewest of the edits that do it.
+    """
+    kept = Path(folder, KEPT)
+    kept.unlink(missing_ok=True)
+    kept.symlink_to(path)
+    rng = random.Random(seed)
+    sound = path.read_bytes()
+    read(path)
+    refused, began = 0, time.perf_counter()
+    for _ in range(count):
+        edits = some_edits(rng)
+        try:
+            refused += refuses(read, path, edited(sound, edits))
+        except BaseException:
+            for edit in list(edits):
+                fewer = [other for other in edits if other is not edit]
+                if fails(read, path, edited(sound, fewer)):
+                    edits = fewer
+            path.write_bytes(edited(sound, edits))
+            raise
+    seconds = time.perf_counter() - began
+    return {"executions": np.array(count), "refused": np.array(refused), "seconds": np.array(seconds)}
+
+
+def fuzz(target: str, count: int, seed: int, folder: str) -> Arrays:
+    """In the child: fuzz one reader, a slow one a tenth as often. What it read last outlives the child in the folder."""
+    warnings.simplefilter("ignore")
+    place = Path(folder, target)
+    place.mkdir()
+    path, read = sound_file(target, place)
+    return fuzz_reader(path, read, count // 10 if target in SLOW else count, seed, folder)
+
+
+def fuzz_all(count: int, seed: int, folder: str) -> Arrays:
+    """In the child: fuzz every reader in turn."""
+    said = [fuzz(target, count, seed, folder) for target in TARGETS]
+    return {key: np.sum([one[key] for one in said]) for key in said[0]}
