@@ -15,6 +15,7 @@ import numpy as np
 from fuzz_captures import CAPTURES, sound_capture
 from io_shapes import write_all_formats
 from motion_targets import MOTIONS, write_smpl
+from own_targets import OWN, sound_own
 from pattern_targets import PATTERNS
 from test_fabric_sheets import FAST, KES_CSV
 from test_fabric_u3m import raw_data
@@ -66,8 +67,9 @@ TARGETS = [
     "trajectory",
     "motion_smpl",
     *CAPTURES,
+    *OWN,
 ]
-SLOW = frozenset({"laz", "pattern_dxf_ours"})  # 20 ms a reading, where others take 0.3
+SLOW = frozenset({"laz", "heic", "pattern_dxf_ours"})  # 20 ms a reading, where others take 0.3
 
 
 def _order_beside(table: Path) -> Path:
@@ -84,6 +86,8 @@ def sound_file(target: str, folder: Path) -> tuple[Path, Callable[[Path], Any]]:
         return folder / name, read
     if target in CAPTURES:
         return sound_capture(target, folder)
+    if target in OWN:
+        return sound_own(target, folder)
     if target in ("arrays", "arrays_packed"):
         arrays = {"vertices": np.eye(3), "faces": np.arange(3)}
         write_arrays(folder / "a.npz", arrays, compress=target == "arrays_packed")

@@ -19,12 +19,14 @@ from fuzz_targets import SLOW, TARGETS, sound_file
 from vto_pipeline.errors import VtoError
 from vto_pipeline.io.arrays import Arrays
 
-Edit = tuple[int, int, int, bytes]  # what is done, where as a share of the file in 1/65536, over how many bytes, with what
+Edit = tuple[
+    int, int, int, bytes
+]  # what is done, where as a share of the file in 1/65536, over how many bytes, with what
 Reader = Callable[[Path], Any]
 SECONDS_EACH = 20.0  # a reading that takes longer hangs; the slowest takes 0.2 s
 KEPT = "damaged"  # a link to the file that was read last
 WORDS = tuple(
-    b"\x00|\xff|-1|99999999999|nan|1e999|../|&a [*a]|!!python/x |{|\n|\"|7|0|a| |.5|e3|: |,|\xff\xff\xff\xff"
+    b'\x00|\xff|-1|99999999999|nan|1e999|../|&a [*a]|!!python/x |{|\n|"|7|0|a| |.5|e3|: |,|\xff\xff\xff\xff'
     b"|\xff\xff\xff\x7f|\x00\x00\x00\x80|\x1f\x8b|PK\x03\x04|%|\xe2\x80\xae".split(b"|")
 )
 

@@ -19,7 +19,7 @@ import pytest
 from fuzz_targets import SLOW, TARGETS, sound_file
 from fuzzing import KEPT, fuzz, fuzz_all, fuzz_reader
 
-from vto_pipeline.errors import FormatError, InputError, VtoError
+from vto_pipeline.errors import InputError, VtoError
 from vto_pipeline.io.arrays import Arrays
 from vto_pipeline.io.sandbox import run_limited
 

@@ -113,6 +113,8 @@ def decode_all(names: str) -> Arrays:
     sizes, modes, exif = [], [], []
     for name in names.split("\n"):
         with open_image(Path(name)) as image:
+            _verify(image, Path(name))
+        with open_image(Path(name)) as image:
             exif.append(read_exif(image))  # first: Pillow closes a TIFF once it is loaded
             _load(image, Path(name))
             sizes.append(image.size)
@@ -148,6 +150,14 @@ def open_image(path: Path) -> Image.Image:
         image.close()
         raise FormatError("a TIFF that EXIF marks as rotated", where=str(path), hint="save it upright")
     return image
+
+
+def _verify(image: Image.Image, path: Path) -> None:
+    """Compare the checksums of a PNG, which decoding does not look at; other pictures have none."""
+    try:
+        image.verify()
+    except BROKEN as e:
+        raise FormatError(f"the picture is damaged: {e}", where=str(path)) from None
 
 
 def _load(image: Image.Image, path: Path) -> None:
