@@ -19,9 +19,9 @@ from fuzz_targets import SLOW, TARGETS, sound_file
 from vto_pipeline.errors import VtoError
 from vto_pipeline.io.arrays import Arrays
 
-Edit = tuple[
-    int, int, int, bytes
-]  # what is done, where as a share of the file in 1/65536, over how many bytes, with what
+Edit = tuple[int, int, int, bytes]
+"""What is done, where as a share of the file in 1/65536, over how many bytes, with what."""
+
 Reader = Callable[[Path], Any]
 SECONDS_EACH = 20.0  # a reading that takes longer hangs; the slowest takes 0.2 s
 KEPT = "damaged"  # a link to the file that was read last
@@ -88,7 +88,7 @@ def fuzz_reader(path: Path, read: Reader, count: int, seed: int, folder: str) ->
         executions, refused: how many there were; seconds: how long they took [s].
 
     Raises:
-        BaseException: what the reader raised that is no refusal; the file then holds the fewest of the edits that do it.
+        BaseException: what the reader raised that is no refusal; the file then holds the fewest edits that do it.
     """
     kept = Path(folder, KEPT)
     kept.unlink(missing_ok=True)
@@ -113,7 +113,7 @@ def fuzz_reader(path: Path, read: Reader, count: int, seed: int, folder: str) ->
 
 
 def fuzz(target: str, count: int, seed: int, folder: str) -> Arrays:
-    """In the child: fuzz one reader, a slow one a tenth as often. What it read last outlives the child in the folder."""
+    """In the child: fuzz one reader, a slow one a tenth as often. What it read last stays in the folder."""
     warnings.simplefilter("ignore")
     place = Path(folder, target)
     place.mkdir()

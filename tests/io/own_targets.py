@@ -128,9 +128,8 @@ def sound_own(target: str, folder: Path) -> tuple[Path, Reader]:
     if kind.name == "garment_photos":
         for name in ("a.png", "b.png"):
             Image.fromarray(noise(3, 4)).save(folder / name)
-        photos = PhotoSet(
-            (folder / "a.png", folder / "b.png"), (None, None), CharucoBoard(7, 5, 0.03, 0.02, "DICT_4X4_250")
-        )
+        board = CharucoBoard(7, 5, 0.03, 0.02, "DICT_4X4_250")
+        photos = PhotoSet((folder / "a.png", folder / "b.png"), (None, None), board)
         kind.write(folder / kind.filename, photos)
         return folder / kind.filename, read_photo_archive.__wrapped__
     kind.write(folder / kind.filename, (VALUES | MORE)[kind.name])
