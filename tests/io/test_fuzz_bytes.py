@@ -16,16 +16,17 @@ from typing import Any
 import fuzzing
 import numpy as np
 import pytest
-from fuzz_targets import SLOW, TARGETS, sound_file
-from fuzzing import KEPT, fuzz, fuzz_all, fuzz_reader
+from fuzz_targets import ROOMS, sound_file
+from fuzzing import KEPT, fuzz_reader, fuzz_room
 
 from vto_pipeline.errors import InputError, VtoError
 from vto_pipeline.io.arrays import Arrays
 from vto_pipeline.io.sandbox import run_limited
 
 SEEDS = sorted((Path(__file__).parent / "fuzz_seeds").glob("*-*"))
-QUICK, LONG = 30, int(os.environ.get("VTO_FUZZ", "2000"))  # executions for each reader, a tenth for slow ones
-SECONDS_EACH = 0.1  # s of one execution on a busy machine
+QUICK, LONG = 30, int(os.environ.get("VTO_FUZZ", "2000"))  # executions for each reader, fewer for slow ones
+SECONDS_EACH = 1.0  # s for one execution of every reader of a room, on a busy machine
+KEYS = ("executions", "refused", "seconds")
 MEMORY = Path("/dev/shm")  # a file written there takes 0.01 ms, on a disk 0.3 ms
 log = logging.getLogger(__name__)
 
@@ -37,14 +38,6 @@ def folder() -> Iterator[Path]:
         yield Path(name)
 
 
-@pytest.fixture(scope="module")
-def executions() -> Iterator[list[int]]:
-    """How many there were for each reader; their sum is told at the end."""
-    counts: list[int] = []
-    yield counts
-    log.info("%d executions over %d readers", sum(counts), len(counts))
-
-
 def fuzzed(function: Callable[..., Arrays], *args: str | int, folder: Path, kept: Path, seconds: float) -> Arrays:
     """Fuzz in a child; fails with the bytes of a finding, which belong into fuzz_seeds/TARGET-WHAT."""
     try:
@@ -54,22 +47,24 @@ def fuzzed(function: Callable[..., Arrays], *args: str | int, folder: Path, kept
         pytest.fail(f"{error.problem}: {(folder / KEPT).resolve().relative_to(folder.resolve())}, kept as {kept}")
 
 
-def test_every_reader_quickly(folder: Path, tmp_path: Path) -> None:
-    said = fuzzed(fuzz_all, QUICK, 1, folder=folder, kept=tmp_path / "finding", seconds=600.0)
-    assert said["executions"] == QUICK * (len(TARGETS) - len(SLOW)) + QUICK // 10 * len(SLOW)
-    assert 0.5 * said["executions"] < said["refused"] < said["executions"]  # it does damage, and not only damage
+@pytest.mark.parametrize("room", ROOMS)
+def test_every_reader_quickly(room: str, folder: Path, tmp_path: Path) -> None:
+    said = fuzzed(fuzz_room, room, QUICK, 1, folder=folder, kept=tmp_path / "finding", seconds=600.0)
+    assert 0.5 * said["executions"].sum() < said["refused"].sum() < said["executions"].sum()  # and not only damage
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("target", TARGETS)
-def test_every_reader_at_length(target: str, folder: Path, tmp_path: Path, executions: list[int]) -> None:
-    """`VTO_FUZZ=10200 pytest -m slow tests/io/test_fuzz_bytes.py --log-cli-level=INFO`: a million executions."""
-    limit = 60.0 + SECONDS_EACH * LONG
-    said = fuzzed(fuzz, target, LONG, LONG, folder=folder, kept=tmp_path / "finding", seconds=limit)
-    count, share = int(said["executions"]), float(said["refused"] / said["executions"])
-    log.info("%-20s %8d  %7.3f ms each  %5.1f %% refused", target, count, 1e3 * said["seconds"] / count, 100 * share)
-    executions.append(count)
-    assert 0.2 < share <= 1.0
+def test_every_reader_at_length(folder: Path, tmp_path: Path) -> None:
+    """`VTO_FUZZ=12000 pytest -m slow tests/io/test_fuzz_bytes.py --log-cli-level=INFO`: a million executions."""
+    total, limit = 0, 600.0 + SECONDS_EACH * LONG
+    for room, targets in ROOMS.items():
+        said = fuzzed(fuzz_room, room, LONG, LONG, folder=folder, kept=tmp_path / "finding", seconds=limit)
+        for target, count, refused, seconds in zip(targets, *(said[key].tolist() for key in KEYS), strict=True):
+            share = 100 * refused / count
+            log.info("%-24s %7d  %7.3f ms each  %5.1f %% refused", target, count, 1e3 * seconds / count, share)
+        assert (said["refused"] > 0.2 * said["executions"]).all()
+        total += said["executions"].sum()
+    log.info("%d executions over %d readers", total, sum(map(len, ROOMS.values())))
 
 
 def read_seeds() -> Arrays:
