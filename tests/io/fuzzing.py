@@ -1,6 +1,7 @@
 """The fuzzer: damages a sound file again and again, and reads it each time. For the child process.
 
-What a reader may do is read, or refuse. Whatever else it does ends the child, and the bytes stay where they were read.
+What a reader may do is read, or refuse. The bytes that make it raise anything else are kept. Where it ends the process,
+or hangs, the bytes stay where they were read.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import random
 import signal
 import time
+import traceback
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -24,7 +26,7 @@ Edit = tuple[int, int, int, bytes]
 
 Reader = Callable[[Path], Any]
 SECONDS_EACH = 20.0  # a reading that takes longer hangs; the slowest takes 0.2 s
-KEPT = "damaged"  # a link to the file that was read last
+LAST, FOUND = "last", "found"  # a link to the file that was read last; a folder
 WORDS = tuple(
     b'\x00|\xff|-1|99999999999|nan|1e999|../|&a [*a]|!!python/x |{|\n|"|7|0|a| |.5|e3|: |,|\xff\xff\xff\xff'
     b"|\xff\xff\xff\x7f|\x00\x00\x00\x80|\x1f\x8b|PK\x03\x04|%|\xe2\x80\xae".split(b"|")
@@ -81,18 +83,24 @@ def fails(read: Reader, path: Path, data: bytes) -> bool:
     return False
 
 
+def keep(error: BaseException, data: bytes, path: Path, folder: str) -> None:
+    """Keep the bytes of a finding, one for each place that raises."""
+    at = traceback.extract_tb(error.__traceback__)[-1]
+    target = path.relative_to(folder).parts[0]
+    kept = Path(folder, FOUND, f"{target}-{type(error).__name__}-{Path(at.filename).stem}-{at.lineno}")
+    kept.parent.mkdir(exist_ok=True)
+    kept.write_bytes(data)
+
+
 def fuzz_reader(path: Path, read: Reader, count: int, seed: int, folder: str) -> Arrays:
-    """Read damaged copies of a sound file.
+    """Read damaged copies of a sound file. What is raised that is no refusal is kept, with the fewest edits that do it.
 
     Returns:
         executions, refused: how many there were; seconds: how long they took [s].
-
-    Raises:
-        BaseException: what the reader raised that is no refusal; the file then holds the fewest edits that do it.
     """
-    kept = Path(folder, KEPT)
-    kept.unlink(missing_ok=True)
-    kept.symlink_to(path)
+    last = Path(folder, LAST)
+    last.unlink(missing_ok=True)
+    last.symlink_to(path)
     rng = random.Random(seed)
     sound = path.read_bytes()
     read(path)
@@ -101,13 +109,12 @@ def fuzz_reader(path: Path, read: Reader, count: int, seed: int, folder: str) ->
         edits = some_edits(rng)
         try:
             refused += refuses(read, path, edited(sound, edits))
-        except BaseException:
+        except BaseException as error:
             for edit in list(edits):
                 fewer = [other for other in edits if other is not edit]
                 if fails(read, path, edited(sound, fewer)):
                     edits = fewer
-            path.write_bytes(edited(sound, edits))
-            raise
+            keep(error, edited(sound, edits), path, folder)
     seconds = time.perf_counter() - began
     return {"executions": np.array(count), "refused": np.array(refused), "seconds": np.array(seconds)}
 

@@ -62,6 +62,15 @@ def test_a_header_that_promises_more_than_there_is_is_refused_before_memory_is_t
         read_arrays(tmp_path / "a.npz")
 
 
+def test_a_shape_changed_in_the_header_is_found_by_the_checksum_or_the_size(tmp_path: Path) -> None:
+    write_arrays(tmp_path / "a.npz", {"x": np.arange(6.0).reshape(2, 3)})
+    data = (tmp_path / "a.npz").read_bytes()
+    for shape in (b"(1, 3)", b"(3, 2)", b"(2, 2)", b"(-2,3)"):
+        (tmp_path / "b.npz").write_bytes(data.replace(b"(2, 3)", shape))
+        with pytest.raises(FormatError, match="not an archive of plain arrays"):
+            read_arrays(tmp_path / "b.npz")
+
+
 @pytest.mark.parametrize("data", [b"", b"text", b"\x93NUMPY\x03\x00", b"\x93NUMPY\x01\x00\x05\x00{'a':"])
 def test_what_is_no_array_is_refused_if_it_is_called_one(tmp_path: Path, data: bytes) -> None:
     write_arrays(tmp_path / "a.npz", ARRAYS)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 import os
+import shutil
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -17,7 +18,7 @@ import fuzzing
 import numpy as np
 import pytest
 from fuzz_targets import ROOMS, sound_file
-from fuzzing import KEPT, fuzz_reader, fuzz_room
+from fuzzing import FOUND, LAST, fuzz_reader, fuzz_room
 
 from vto_pipeline.errors import InputError, VtoError
 from vto_pipeline.io.arrays import Arrays
@@ -39,32 +40,38 @@ def folder() -> Iterator[Path]:
 
 
 def fuzzed(function: Callable[..., Arrays], *args: str | int, folder: Path, kept: Path, seconds: float) -> Arrays:
-    """Fuzz in a child; fails with the bytes of a finding, which belong into fuzz_seeds/TARGET-WHAT."""
+    """Fuzz in a child; fails with the bytes of all findings in a folder. They belong into fuzz_seeds/TARGET-WHAT."""
     try:
-        return run_limited(function, *args, str(folder), seconds=seconds)
+        said, problem = run_limited(function, *args, str(folder), seconds=seconds), ""
     except InputError as error:
-        kept.write_bytes((folder / KEPT).read_bytes())
-        pytest.fail(f"{error.problem}: {(folder / KEPT).resolve().relative_to(folder.resolve())}, kept as {kept}")
+        target = (folder / LAST).resolve().relative_to(folder.resolve()).parts[0]
+        said, problem = {}, f"{target}: {error.problem}"
+        kept.mkdir()
+        (kept / f"{target}-end").write_bytes((folder / LAST).read_bytes())
+    if (folder / FOUND).exists():
+        shutil.copytree(folder / FOUND, kept, dirs_exist_ok=True)
+    if kept.exists():
+        pytest.fail(f"{problem or 'refused without a word'}: {sorted(path.name for path in kept.iterdir())} in {kept}")
+    return said
 
 
 @pytest.mark.parametrize("room", ROOMS)
 def test_every_reader_quickly(room: str, folder: Path, tmp_path: Path) -> None:
-    said = fuzzed(fuzz_room, room, QUICK, 1, folder=folder, kept=tmp_path / "finding", seconds=600.0)
+    said = fuzzed(fuzz_room, room, QUICK, 1, folder=folder, kept=tmp_path / "found", seconds=600.0)
     assert 0.5 * said["executions"].sum() < said["refused"].sum() < said["executions"].sum()  # and not only damage
 
 
 @pytest.mark.slow
-def test_every_reader_at_length(folder: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("room", ROOMS)
+def test_every_reader_at_length(room: str, folder: Path, tmp_path: Path) -> None:
     """`VTO_FUZZ=12000 pytest -m slow tests/io/test_fuzz_bytes.py --log-cli-level=INFO`: a million executions."""
-    total, limit = 0, 600.0 + SECONDS_EACH * LONG
-    for room, targets in ROOMS.items():
-        said = fuzzed(fuzz_room, room, LONG, LONG, folder=folder, kept=tmp_path / "finding", seconds=limit)
-        for target, count, refused, seconds in zip(targets, *(said[key].tolist() for key in KEYS), strict=True):
-            share = 100 * refused / count
-            log.info("%-24s %7d  %7.3f ms each  %5.1f %% refused", target, count, 1e3 * seconds / count, share)
-        assert (said["refused"] > 0.2 * said["executions"]).all()
-        total += said["executions"].sum()
-    log.info("%d executions over %d readers", total, sum(map(len, ROOMS.values())))
+    limit = 600.0 + SECONDS_EACH * LONG
+    said = fuzzed(fuzz_room, room, LONG, LONG, folder=folder, kept=tmp_path / "found", seconds=limit)
+    for target, count, refused, seconds in zip(ROOMS[room], *(said[key].tolist() for key in KEYS), strict=True):
+        share = 100 * refused / count
+        log.info("%-24s %7d  %7.3f ms each  %5.1f %% refused", target, count, 1e3 * seconds / count, share)
+    log.info("%s: %d executions in %.0f s", room, said["executions"].sum(), said["seconds"].sum())
+    assert (said["refused"] > 0.2 * said["executions"]).all()
 
 
 def read_seeds() -> Arrays:
@@ -110,10 +117,11 @@ def fuzz_a_bad_reader(way: str, folder: str) -> Arrays:
 
 @pytest.mark.parametrize("way", WAYS)
 def test_the_bytes_are_kept_whatever_a_reader_does_wrong(way: str, folder: Path, tmp_path: Path) -> None:
-    kept = tmp_path / "finding"
+    kept = tmp_path / "found"
     with pytest.raises(pytest.fail.Exception, match=WAYS[way][1]):
         fuzzed(fuzz_a_bad_reader, way, folder=folder, kept=kept, seconds=60.0)
-    found = kept.read_bytes()
+    (finding,) = kept.iterdir()
+    found = finding.read_bytes()
     assert b"nan" in found
     if way == "raises":  # then there was time to find which of the edits did it
         assert same_bytes(found, SOUND) + same_bytes(found[::-1], SOUND[::-1]) >= len(SOUND) - len(b"nan")
