@@ -138,7 +138,10 @@ def open_gltf(path: Path) -> GltfDocument:
     asset = parsed.get("asset") if isinstance(parsed, dict) else None
     if not isinstance(asset, dict) or not str(asset.get("version", "")).startswith("2"):
         raise FormatError("not glTF 2.0: asset.version is missing or different", where=str(path))
-    for name in parsed.get("extensionsRequired", []):
+    required = parsed.get("extensionsRequired", [])
+    if not isinstance(required, list):
+        raise FormatError("extensionsRequired is not a list", where=str(path))
+    for name in required:
         if not str(name).startswith(_READ):
             hint = "export without it, or compressed by Draco"
             raise FormatError(f"the extension {name} is not supported", where=str(path), hint=hint)
