@@ -76,9 +76,9 @@ def write_zip(path: Path, name: str, data: bytes, kind: int = zipfile.ZIP_STORED
 @pytest.mark.parametrize(
     ("name", "data", "kind", "says"),
     [
-        ("../a.png", b"x", zipfile.ZIP_STORED, "'../a.png' is no picture"),
-        ("a.py", b"x", zipfile.ZIP_STORED, "'a.py' is no picture"),
-        ("x" * 300 + ".png", b"x", zipfile.ZIP_STORED, "is no name of a file"),
+        ("../a.png", b"x", zipfile.ZIP_STORED, "'../a.png' is not a picture"),
+        ("a.py", b"x", zipfile.ZIP_STORED, "'a.py' is not a picture"),
+        ("x" * 300 + ".png", b"x", zipfile.ZIP_STORED, "is not a name for a file"),
         ("a.png", bytes(1_000_000), zipfile.ZIP_DEFLATED, "'a.png' is not stored as it is"),
         ("board.json", b"[1]", zipfile.ZIP_STORED, "board.json: no board"),
         ("board.json", b"\xff", zipfile.ZIP_STORED, "board.json: no board"),

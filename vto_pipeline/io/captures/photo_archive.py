@@ -56,11 +56,11 @@ def _members(path: Path) -> Iterator[tuple[str, bytes]]:
             for entry in archive.infolist():
                 name = entry.filename
                 if name != _BOARD and (Path(name).suffix.lower() not in SUFFIXES or Path(name).name != name):
-                    raise ValueError(f"{name!r} is no picture")
+                    raise ValueError(f"{name!r} is not a picture")
                 if entry.compress_type != zipfile.ZIP_STORED or entry.file_size > path.stat().st_size:
                     raise ValueError(f"{name!r} is not stored as it is")
                 if not name.isprintable() or len(name.encode()) > _NAME_BYTES:
-                    raise ValueError(f"{name!r} is no name of a file")
+                    raise ValueError(f"{name!r} is not a name for a file")
                 yield name, archive.read(entry)
     except BROKEN_ZIP as e:
         raise FormatError(f"not an archive of photos: {e}", where=str(path)) from None
