@@ -74,12 +74,13 @@ def write_video(path: Path, codec: str) -> None:
     writer.release()
 
 
-def in_a_fork(read: Reader) -> Reader:
-    """Read in a process of its own, as the library ends it where memory is short; that is refused in earnest."""
+def in_a_fork(read: Reader, dies_of: int) -> Reader:
+    """Read in a process of its own, as the library may end it by one signal, which in earnest is refused."""
 
     def forked(path: Path) -> None:
         answer, tell = os.pipe()
         if not (child := os.fork()):
+            signal.alarm(10)  # s; timers stay with the parent
             code = REFUSED
             try:
                 read(path)
@@ -94,7 +95,7 @@ def in_a_fork(read: Reader) -> Reader:
         code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
         said = os.read(answer, 1000).decode()
         os.close(answer)
-        if code in (REFUSED, -signal.SIGABRT):
+        if code in (REFUSED, -dies_of):
             raise FormatError("refused")
         if code != 0:
             raise RuntimeError(said or f"it ended with {code}")
@@ -144,5 +145,6 @@ def sound_capture(target: str, folder: Path) -> tuple[Path, Reader]:
         write_video(folder / name, codec)
         return folder / name, read_video
     if target == "heic":
-        return Path(shutil.copy(SAMPLE, folder / "a.heic")), lambda path: encode_jpeg(str(path))
-    return write_others(folder)["a.laz"], in_a_fork(read_one)
+        found = Path(shutil.copy(SAMPLE, folder / "a.heic"))
+        return found, in_a_fork(lambda path: encode_jpeg(str(path)), signal.SIGSEGV)  # pi-heif, of broken metadata
+    return write_others(folder)["a.laz"], in_a_fork(read_one, signal.SIGABRT)  # lazrs, where memory is short

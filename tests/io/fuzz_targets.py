@@ -7,25 +7,21 @@ raise is seen.
 from __future__ import annotations
 
 import json
-import tempfile
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from fuzz_captures import CAPTURES, sound_capture
-from hypothesis import HealthCheck, Phase, given, settings
-from hypothesis import strategies as st
 from io_shapes import write_all_formats
 from motion_targets import MOTIONS, write_smpl
+from own_targets import OWN, sound_own
 from pattern_targets import PATTERNS
 from test_fabric_sheets import FAST, KES_CSV
 from test_fabric_u3m import raw_data
 from test_fuzz_readers import MESHES, OTHERS, read_one, write_others
 
-from vto_pipeline.errors import VtoError
-from vto_pipeline.io.arrays import Arrays, read_arrays, write_arrays
+from vto_pipeline.io.arrays import read_arrays, write_arrays
 from vto_pipeline.io.bodies.measurements import read_measurements
 from vto_pipeline.io.captures.cameras import read_trajectory
 from vto_pipeline.io.documents import load_yaml, read_json
@@ -62,48 +58,20 @@ TEXTS: dict[str, tuple[str, str, Callable[[Path], Any]]] = {
     **MOTIONS,
     "table": ("t.csv", "name,seed,stages.add.offset\na,1,2\nb,2,\n", lambda path: read_order(_order_beside(path))),
 }
-TARGETS = [
-    *MESHES,
-    *(name for name in OTHERS if name != "a.laz"),
-    *TEXTS,
-    "arrays",
-    "arrays_packed",
-    "trajectory",
-    "motion_smpl",
-    *CAPTURES,
-]
-WORDS = (
-    b"\x00",
-    b"\xff",
-    b"-1",
-    b"99999999999",
-    b"nan",
-    b"1e999",
-    b"../",
-    b"&a [*a]",
-    b"!!python/x ",
-    b"{",
-    b"\n",
-    b'"',
-)
-WORDS = (
-    *WORDS,
-    b"7",
-    b"0",
-    b"a",
-    b" ",
-    b".5",
-    b"e3",
-    b": ",
-    b",",
-    b"\xff\xff\xff\xff",
-    b"\xff\xff\xff\x7f",
-    b"\x00\x00\x00\x80",
-    b"\x1f\x8b",
-    b"PK\x03\x04",
-    b"%",
-    b"\xe2\x80\xae",
-)
+ROOMS: dict[str, list[str]] = {
+    "shapes": [*MESHES, *(name for name in OTHERS if name != "a.laz")],
+    "texts": [*TEXTS, "arrays", "arrays_packed", "trajectory", "motion_smpl"],
+    "captures": CAPTURES,
+    "runs": OWN,
+}
+"""Targets that one child reads, one after the other."""
+SLOW = {
+    **dict.fromkeys(("laz", "heic", "pattern_dxf_ours"), 20),  # 20 ms a reading, where most take 0.2 ms
+    **dict.fromkeys(("stl_ascii", "pattern_dxf", "motion_yaml", "table", "frames_poses", "frames_depth"), 4),
+    **dict.fromkeys(("tum_color", "makehuman_rig", "makehuman_weights", "makehuman_target", "library_target"), 4),
+    **dict.fromkeys(("video_mp4", "video_avi", "obj_places", "obj_material", "obj_picture"), 4),  # 0.6 to 4 ms
+}
+"""How many times fewer executions a target gets than others."""
 
 
 def _order_beside(table: Path) -> Path:
@@ -120,6 +88,8 @@ def sound_file(target: str, folder: Path) -> tuple[Path, Callable[[Path], Any]]:
         return folder / name, read
     if target in CAPTURES:
         return sound_capture(target, folder)
+    if target in OWN:
+        return sound_own(target, folder)
     if target in ("arrays", "arrays_packed"):
         arrays = {"vertices": np.eye(3), "faces": np.arange(3)}
         write_arrays(folder / "a.npz", arrays, compress=target == "arrays_packed")
@@ -130,77 +100,3 @@ def sound_file(target: str, folder: Path) -> tuple[Path, Callable[[Path], Any]]:
         (folder / "a.json").write_text(json.dumps({"world_from_cam": [np.eye(4).tolist()] * 2}))
         return folder / "a.json", read_trajectory
     return (write_all_formats(folder) if target in MESHES else write_others(folder))[target], read_one
-
-
-def edits() -> st.SearchStrategy[list[tuple[int, int, int, bytes]]]:
-    """Edits of bytes: what is done, where as a share of the file in 1/65536, over how many bytes, with what."""
-    payload = st.one_of(st.sampled_from(WORDS), st.binary(min_size=1, max_size=8))
-    return st.lists(
-        st.tuples(st.sampled_from((0, 0, 0, 1, 2, 3)), st.integers(0, 65535), st.integers(1, 64), payload),
-        min_size=1,
-        max_size=4,
-    )
-
-
-def edited(data: bytes, changes: list[tuple[int, int, int, bytes]]) -> bytes:
-    """Return the bytes overwritten, with something put in, taken out, or cut off; a third of all edits in the head."""
-    for kind, share, length, payload in changes:
-        reach = min(len(data), 400) if share % 3 == 0 else len(data)
-        at = share * reach // 65536
-        if kind == 0:
-            data = data[:at] + payload + data[at + len(payload) :]
-        elif kind == 1:
-            data = data[:at] + payload + data[at:]
-        elif kind == 2:
-            data = data[:at] + data[at + length :]
-        elif length > 48:
-            data = data[:at]
-        else:
-            data = data[:at] + data[at : at + length] * 2 + data[at + length :]
-    return data
-
-
-def fuzz(target: str, count: int, seed: int) -> Arrays:
-    """In the child: read damaged copies of a target's sound file.
-
-    Returns:
-        executions, refused: how many there were; finding: the bytes that made the reader raise what is not refusal.
-    """
-    warnings.simplefilter("ignore")
-    done = {"executions": 0, "refused": 0}
-    finding: list[bytes] = []
-    with tempfile.TemporaryDirectory() as name:
-        path, read = sound_file(target, Path(name))
-        data = path.read_bytes()
-        read(path)
-
-        @settings(
-            max_examples=count,
-            database=None,
-            deadline=None,
-            suppress_health_check=list(HealthCheck),
-            phases=[Phase.generate, Phase.shrink],
-        )
-        @given(edits())
-        def try_one(changes: list[tuple[int, int, int, bytes]]) -> None:
-            damaged = edited(data, changes)
-            path.write_bytes(damaged)
-            done["executions"] += 1
-            try:
-                read(path)
-            except VtoError:
-                done["refused"] += 1
-            except Exception:
-                finding[:] = [damaged]  # the last that is left is the smallest
-                raise
-
-        from hypothesis import seed as seeded
-
-        problem = ""
-        try:
-            seeded(seed)(try_one)()
-        except Exception as error:
-            problem = f"{type(error).__name__}: {error}"
-    found = np.frombuffer(finding[0] if finding else b"", np.uint8)
-    said = np.frombuffer(problem.encode()[:2000], np.uint8)
-    return {**{key: np.array(value) for key, value in done.items()}, "finding": found, "problem": said}

@@ -67,6 +67,7 @@ CASES = {
     "header_unknown.ply": (ascii_ply().replace(b"property float x", b"property quad x"), "'property quad x'"),
     "index_out_of_range.obj": (OBJ + b"f 1 2 4\n", "face 0 has the vertices 0, 1, 3"),
     "index_zero.obj": (OBJ + b"f 0 1 2\n", "counted from 1"),
+    "corner_without_vertex.obj": (OBJ + b"f 1/1 2/1 /1 3/1\n", "'/1' is not a number"),
     "index_back_too_far.obj": (OBJ + b"f -1 -2 -4\n", "counted from 1"),
     "nan.obj": (OBJ.replace(b"1.5", b"nan") + b"f 1 2 3\n", "vertex 2 is (0, nan, 0)"),
     "cut_in_a_face.obj": (OBJ + b"f 1 2 3\nf 1 2", "a face with 2 corners"),

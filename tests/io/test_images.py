@@ -142,6 +142,21 @@ def test_one_broken_photo_is_named_before_any_work(tmp_path: Path) -> None:
     assert caught.value.where.endswith("b.jpg")
 
 
+def test_one_changed_byte_of_a_png_is_found(tmp_path: Path) -> None:
+    """Its pixels would still be decoded, to others; a PNG has checksums, which zlib computes, too."""
+    write_photo(tmp_path / "a.png")
+    data = bytearray((tmp_path / "a.png").read_bytes())
+    check_images([tmp_path / "a.png"])
+    at = data.index(b"IDAT") + 4
+    length = int.from_bytes(data[at - 8 : at - 4], "big")
+    data[at + length // 2] ^= 1
+    assert zlib.crc32(data[at - 4 : at + length]) != int.from_bytes(data[at + length : at + length + 4], "big")
+    (tmp_path / "a.png").write_bytes(data)
+    with pytest.raises(FormatError, match="damaged") as caught:
+        check_images([tmp_path / "a.png"])
+    assert caught.value.where.endswith("a.png")
+
+
 def test_a_folder_without_photos_and_a_bad_board_are_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="0 photo\\(s\\)"):
         read_photos(tmp_path)

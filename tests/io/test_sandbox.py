@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -51,6 +52,11 @@ def test_a_refusal_keeps_its_class_and_fields() -> None:
 def test_a_segmentation_fault_is_a_format_error() -> None:
     with pytest.raises(FormatError, match="the reader crashed \\(signal 11\\)"):
         run_limited(ctypes.string_at, 0, where="x.ply")
+
+
+def test_a_success_without_an_answer_is_a_format_error() -> None:
+    with pytest.raises(FormatError, match="the reader failed: exit code 0"):
+        run_limited(os._exit, 0)
 
 
 def test_too_much_memory_is_a_format_error() -> None:

@@ -84,3 +84,9 @@ def test_a_flat_curve_stays_within_its_tolerance(curve, tolerance):
     assert cKDTree(on).query(fine)[0].max() <= tolerance * 1.001 + spacing
     if curve[0] != "polyline" and len(flat) > 3:  # and is not much finer than asked
         assert len(flat) < 12.0 / np.sqrt(tolerance)
+
+
+@pytest.mark.parametrize("bulge", [1e-300, 1e-12, -1e-6, 1e-3, 1e6])
+def test_an_arc_that_is_all_but_straight_or_all_but_a_circle_is_cut_into_finitely_many(bulge):
+    flat = flatten("arc", np.array([[0.0, 0.0], [1.0, 0.0]]), bulge, 1e-4)
+    assert np.ptp(flat[:, 1]) == pytest.approx(0.5 * abs(bulge), rel=1e-3, abs=1e-4)  # the middle stands off by that

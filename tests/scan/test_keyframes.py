@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
+import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from vto_pipeline.errors import ScanError
+from vto_pipeline.errors import FormatError, ScanError
 from vto_pipeline.io.captures.photo_archive import read_photo_archive, write_photo_archive
 from vto_pipeline.model.frames import CharucoBoard, PhotoSet, Video
 from vto_pipeline.model.job import Job
@@ -63,3 +65,25 @@ def test_frames_come_back_from_their_archive(tmp_path: Path) -> None:
     back = read_photo_archive(tmp_path / "a.zip")
     assert back.board == board
     assert [path.read_bytes() for path in back.paths] == [path.read_bytes() for path in paths]
+
+
+def write_zip(path: Path, name: str, data: bytes, kind: int = zipfile.ZIP_STORED) -> Path:
+    with zipfile.ZipFile(path, "w", kind) as archive:
+        archive.writestr(name, data)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "kind", "says"),
+    [
+        ("../a.png", b"x", zipfile.ZIP_STORED, "'../a.png' is not a picture"),
+        ("a.py", b"x", zipfile.ZIP_STORED, "'a.py' is not a picture"),
+        ("x" * 300 + ".png", b"x", zipfile.ZIP_STORED, "is not a name for a file"),
+        ("a.png", bytes(1_000_000), zipfile.ZIP_DEFLATED, "'a.png' is not stored as it is"),
+        ("board.json", b"[1]", zipfile.ZIP_STORED, "board.json: no board"),
+        ("board.json", b"\xff", zipfile.ZIP_STORED, "board.json: no board"),
+    ],
+)
+def test_an_archive_of_other_things_is_refused(tmp_path: Path, name: str, data: bytes, kind: int, says: str) -> None:
+    with pytest.raises(FormatError, match=re.escape(says)):
+        read_photo_archive(write_zip(tmp_path / "a.zip", name, data, kind))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import zipfile
 import zlib
 from collections.abc import Collection, Mapping
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -21,11 +23,14 @@ _LIMIT_BYTES = 4_000_000_000
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the oldest date a zip can hold; a real one would change the bytes
 
 
-_BROKEN = (
+BROKEN_ZIP = (
     *(zipfile.BadZipFile, zlib.error, ValueError, EOFError, KeyError, OSError),
     RuntimeError,  # encrypted
 )
-"""What `zipfile` and NumPy raise on damaged bytes."""
+"""What `zipfile` raises on damaged bytes."""
+
+_ENDING = ".npy"
+_HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
 
 def write_arrays(path: Path, arrays: Mapping[str, Any], *, compress: bool = False) -> None:
@@ -59,17 +64,37 @@ def read_arrays(path: Path, required: Collection[str] = (), only: Collection[str
     path = check_file(Path(path), {".npz"}, _LIMIT_BYTES)
     try:
         with zipfile.ZipFile(path) as archive:
-            entries = archive.infolist()
-        promised = sum(entry.file_size for entry in entries)
+            members = archive.infolist()
+        promised = sum(entry.file_size for entry in members)
         if promised > _LIMIT_BYTES:
             raise FormatError(f"unpacks to {promised} bytes; the limit is {_LIMIT_BYTES}", where=str(path))
-        if not {entry.compress_type for entry in entries} <= {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}:
+        if not {entry.compress_type for entry in members} <= {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}:
             raise FormatError("packed by another method than deflate", where=str(path))
-        with np.load(path, allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in stored.files if only is None or name in only}
-    except _BROKEN as e:
+        with zipfile.ZipFile(path) as archive:
+            entries = {entry.filename[: -len(_ENDING)]: entry for entry in members if entry.filename.endswith(_ENDING)}
+            arrays = {name: _array(archive, e) for name, e in entries.items() if only is None or name in only}
+    except (*BROKEN_ZIP, SyntaxError, TokenError) as e:
         raise FormatError(f"not an archive of plain arrays: {e}", where=str(path)) from None
     missing = sorted(set(required) - set(arrays))
     if missing:
         raise FormatError(f"arrays missing: {', '.join(missing)}; found {', '.join(sorted(arrays))}", where=str(path))
     return arrays
+
+
+def _array(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> NDArray[Any]:
+    """Read one array, after what its header promises was held against its size.
+
+    Raises:
+        ValueError: no plain array of the size that is promised; SyntaxError, TokenError: in its header.
+    """
+    with archive.open(entry) as stream:
+        version = npy.read_magic(stream)
+        if version not in _HEADERS:
+            raise ValueError(f"{entry.filename} has version {version}")
+        shape, _, dtype = _HEADERS[version](stream)
+        promised = stream.tell() + math.prod(shape) * dtype.itemsize
+        if promised != entry.file_size and not dtype.hasobject:  # fewer would end before the checksum is compared
+            raise ValueError(f"{entry.filename} promises shape {shape} and has {entry.file_size} bytes")
+    with archive.open(entry) as stream:
+        array: NDArray[Any] = npy.read_array(stream, allow_pickle=False)
+    return array

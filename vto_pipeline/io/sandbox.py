@@ -80,8 +80,9 @@ def run_limited(
                 code = -signal.SIGXCPU
             stderr.seek(0)
             last_words = stderr.read(1_000_000).decode(errors="replace").strip().splitlines()
-        if code == 0:
-            return read_arrays(Path(folder) / "answer.npz")
+        answer = Path(folder) / "answer.npz"
+        if code == 0 and answer.exists():  # a library may end the process, and call it a success
+            return read_arrays(answer)
         if code == _REFUSED:
             refusal = json.loads((Path(folder) / "refusal.json").read_text(encoding="utf-8"))
             kind = FormatError if refusal["format"] else InputError

@@ -25,9 +25,12 @@ def freeze(name: str, values: Any, shape: tuple[int | None, ...], dtype: Any, *,
         finite: Whether NaN and infinity are refused.
 
     Raises:
-        InputError: wrong shape, or a value that is not finite.
+        InputError: no numbers, wrong shape, or a value that is not finite.
     """
-    array = np.ascontiguousarray(values, dtype=dtype)
+    try:
+        array = np.ascontiguousarray(values, dtype=dtype)
+    except (OverflowError, TypeError, ValueError) as e:
+        raise InputError(f"{name}: {e}") from None
     if array is values and array.flags.writeable:  # the caller keeps the right to write into their own
         array = array.copy()
     if array.ndim != len(shape) or any(n is not None and n != m for n, m in zip(shape, array.shape, strict=True)):

@@ -15,6 +15,7 @@ CurveKind = Literal["polyline", "bezier", "arc"]
 
 _CLOSED_M = 1e-7  # between the end of an edge and the start of the next: readers join at less than a tenth of this
 _POINTS: dict[str, tuple[int, float]] = {"polyline": (2, np.inf), "bezier": (3, 4), "arc": (2, 2)}
+_REACH_M = 1e4  # farther out nothing is drawn; a curve of that size would be cut into pieces without end
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,8 @@ class Edge:
         low, high = _POINTS[self.kind]
         if not low <= len(self.points) <= high:
             raise InputError(f"an edge of kind {self.kind} with {len(self.points)} points; expected {low} to {high}")
+        if np.abs(self.points).max() > _REACH_M:
+            raise InputError(f"an edge at {np.abs(self.points).max():.3g} m; the limit is {_REACH_M:g} m")
         if not np.ptp(self.points, axis=0).any():
             x, y = self.points[0]
             raise InputError(f"an edge without length at ({x:.4f}, {y:.4f}) m")

@@ -75,7 +75,7 @@ def flatten(kind: str, points: Floats, bulge: float, tolerance: float) -> Floats
         return points
     if kind == "arc":
         _, start, angle = _circle(points, bulge)
-        step = 2.0 * np.arccos(max(1.0 - tolerance / np.hypot(*start), 0.0))
+        step = 4.0 * np.arcsin(np.sqrt(0.5 * min(tolerance / np.hypot(*start), 1.0)))  # 2 arccos(1 - x)
         count = int(np.ceil(abs(angle) / step))
     else:  # the second difference of the control points bounds how far a chord is off
         degree = len(points) - 1

@@ -24,7 +24,7 @@ from vto_pipeline.bench.live_rows import LiveRows
 from vto_pipeline.bench.scan.drawn import draw, draw_vertex_colors, sample
 from vto_pipeline.bench.scan.likeness import likeness, seam_steps
 from vto_pipeline.geometry.rigid import transform_cameras, transform_mesh
-from vto_pipeline.io.captures.cameras import read_cameras, read_matrix
+from vto_pipeline.io.captures.cameras import read_cameras, read_placement
 from vto_pipeline.io.captures.images import read_image
 from vto_pipeline.io.captures.photos import read_photos
 from vto_pipeline.io.captures.undistort import undistorted
@@ -80,7 +80,7 @@ def read_capture(run: Path) -> Capture:
     out = run / "out"
     cameras, surface = read_cameras(out / "cameras.json"), read_own_mesh(out / "surface.ply")
     if (out / "garment_placement.json").is_file():
-        placement = read_matrix(out / "garment_placement.json", "mannequin_from_surface").reshape(4, 4)
+        placement = read_placement(out / "garment_placement.json")
         cameras, surface = transform_cameras(cameras, placement), transform_mesh(surface, placement)
     given = read_json(run / "run.json")["given"]
     photos = read_photos(Path(given["garment_photos"]["path"]))

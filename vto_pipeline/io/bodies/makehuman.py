@@ -45,7 +45,7 @@ def parse_makehuman(name: str) -> Arrays:
     folder = Path(name)
     base = check_file(folder / BASE, {".obj"}, _LIMIT_BYTES)
     points = parse_obj(str(base))["vertices"] * LENGTH_M["dm"]
-    groups = parse_groups(base)
+    groups = parse_groups(base, len(points))
     faces = groups.get(_BODY_GROUP)
     if faces is None:
         raise FormatError(f"no group {_BODY_GROUP!r}; found {', '.join(list(groups)[:8])}", where=str(base))
@@ -60,11 +60,15 @@ def parse_makehuman(name: str) -> Arrays:
     return arrays
 
 
-def parse_groups(path: Path) -> dict[str, NDArray[np.int64]]:
+def parse_groups(path: Path, count: int) -> dict[str, NDArray[np.int64]]:
     """Return the triangles of each group of an OBJ file, shape (F, 3).
 
+    Args:
+        path: The file.
+        count: Its vertices.
+
     Raises:
-        FormatError: a corner is no number.
+        FormatError: a corner is none of its vertices.
     """
     found: dict[str, list[tuple[int, int, int]]] = {}
     group = ""
@@ -76,7 +80,9 @@ def parse_groups(path: Path) -> dict[str, NDArray[np.int64]]:
             try:
                 corner = [int(word.split("/", 1)[0]) - 1 for word in words[1:]]
             except ValueError:
-                raise FormatError(f"not vertex numbers: {words[1:]}", where=f"{path}, line {number}") from None
+                corner = [-1]
+            if not all(0 <= k < count for k in corner):
+                raise FormatError(f"not numbers 1..{count}: {words[1:]}"[:200], where=f"{path}, line {number}")
             triangles = ((corner[0], corner[k], corner[k + 1]) for k in range(1, len(corner) - 1))
             found.setdefault(group, []).extend(triangles)
     return {name: np.array(faces, dtype=np.int64).reshape(-1, 3) for name, faces in found.items()}

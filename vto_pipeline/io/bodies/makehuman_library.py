@@ -82,7 +82,7 @@ def parse_library(name: str) -> Arrays:
     base = check_file(folder / _BASE, {".obj"}, _LIMIT_BYTES)
     metres = LENGTH_M["dm"]
     vertices = parse_obj(str(base))["vertices"] * metres
-    groups = parse_groups(base)
+    groups = parse_groups(base, len(vertices))
     missing = [group for group in _SURFACES.values() if group not in groups]
     if missing:
         raise FormatError(f"no group {missing[0]!r}; found {', '.join(list(groups)[:8])}", where=str(base))

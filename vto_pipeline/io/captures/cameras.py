@@ -82,22 +82,30 @@ def read_trajectory(path: Path) -> FloatArray:
     Raises:
         FormatError: not what `write_trajectory` wrote.
     """
-    poses = read_matrix(path, "world_from_cam")
-    if poses.size % 16:
-        raise FormatError(f"poses have shape {poses.shape}; expected (N, 4, 4)", where=str(path))
-    return poses.reshape(-1, 4, 4)
+    return _transforms(path, "world_from_cam")
 
 
-def read_matrix(path: Path, key: str) -> FloatArray:
-    """Read one numeric array of a JSON object.
+def read_placement(path: Path) -> FloatArray:
+    """Read mannequin_from_surface, shape (4, 4).
 
     Raises:
-        FormatError: there is none.
+        FormatError: there is none, or of another shape.
     """
+    found = _transforms(path, "mannequin_from_surface")
+    if len(found) != 1:
+        raise FormatError(f"{len(found)} transforms; expected one", where=str(path))
+    return found[0]
+
+
+def _transforms(path: Path, key: str) -> FloatArray:
+    """Transforms (N, 4, 4) of a JSON object."""
     try:
-        return np.array(read_json(path)[key], dtype=np.float64)
-    except (KeyError, TypeError, ValueError) as e:
+        found = np.array(read_json(path)[key], dtype=np.float64)
+    except (KeyError, OverflowError, TypeError, ValueError) as e:
         raise FormatError(f"no array of numbers under {key!r}: {e}", where=str(path)) from None
+    if not found.size or found.size % 16:
+        raise FormatError(f"{key} has shape {found.shape}; expected (N, 4, 4)", where=str(path))
+    return found.reshape(-1, 4, 4)
 
 
 def pack_cameras(cameras: CameraSet) -> dict[str, Any]:
@@ -112,15 +120,21 @@ def pack_cameras(cameras: CameraSet) -> dict[str, Any]:
 
 
 def unpack_cameras(arrays: dict[str, Any]) -> CameraSet:
-    """Unpack cameras from the arrays of `pack_cameras`."""
-    intrinsics = tuple(Intrinsics(int(w), int(h), *map(float, rest)) for w, h, *rest in arrays["intrinsics"])
-    return CameraSet(
-        names=tuple(map(str, arrays["names"])),
-        intrinsics=intrinsics,
-        world_from_cam=arrays["world_from_cam"],
-        metric=bool(arrays["metric"]),
-        unregistered=tuple(map(str, arrays["unregistered"])),
-    )
+    """Unpack cameras from the arrays of `pack_cameras`.
+
+    Raises:
+        FormatError: an array is missing or of another shape.
+    """
+    try:
+        return CameraSet(
+            names=tuple(map(str, arrays["names"])),
+            intrinsics=tuple(Intrinsics(int(w), int(h), *map(float, rest)) for w, h, *rest in arrays["intrinsics"]),
+            world_from_cam=arrays["world_from_cam"],
+            metric=bool(arrays["metric"]),
+            unregistered=tuple(map(str, arrays["unregistered"])),
+        )
+    except (KeyError, OverflowError, TypeError, ValueError) as e:
+        raise FormatError(f"not a list of cameras: {e!r}") from None
 
 
 def _record(cameras: CameraSet) -> dict[str, Any]:
@@ -141,5 +155,5 @@ def _cameras(record: Any, path: Path) -> CameraSet:
             metric=bool(record["metric"]),
             unregistered=tuple(map(str, record["unregistered"])),
         )
-    except (KeyError, TypeError, ValueError) as e:
+    except (KeyError, OverflowError, TypeError, ValueError) as e:
         raise FormatError(f"not a list of cameras: {e!r}", where=str(path)) from None

@@ -11,9 +11,9 @@ bytes pass through this decoder within the limits, and finds a picture that is c
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +49,7 @@ def read_image(path: Path) -> ByteArray:
         InputError: no such file; FormatError: too many pixels, or broken.
     """
     with open_image(check_file(Path(path), SUFFIXES, _FILE_BYTES)) as image:
-        _load(image, path)
+        _whole(image.load, path)
         return np.array(image.convert("RGB"))
 
 
@@ -63,7 +63,7 @@ def read_gray16(path: Path) -> NDArray[np.uint16]:
         InputError: no such file; FormatError: other depth or channels, too many pixels, or broken.
     """
     with open_image(check_file(Path(path), SUFFIXES, _FILE_BYTES)) as image:
-        _load(image, path)
+        _whole(image.load, path)
         if not image.mode.startswith("I;16"):
             problem = f"the picture has pixel mode {image.mode}; expected one 16-bit channel"
             hint = "saving depth as a colour or 8-bit picture loses its values"
@@ -113,8 +113,10 @@ def decode_all(names: str) -> Arrays:
     sizes, modes, exif = [], [], []
     for name in names.split("\n"):
         with open_image(Path(name)) as image:
+            _whole(image.verify, Path(name))  # decoding does not look at checksums
+        with open_image(Path(name)) as image:
             exif.append(read_exif(image))  # first: Pillow closes a TIFF once it is loaded
-            _load(image, Path(name))
+            _whole(image.load, Path(name))
             sizes.append(image.size)
             modes.append(image.mode)
     return {
@@ -150,10 +152,10 @@ def open_image(path: Path) -> Image.Image:
     return image
 
 
-def _load(image: Image.Image, path: Path) -> None:
-    """Decode the pixels."""
+def _whole(step: Callable[[], Any], path: Path) -> None:
+    """Take a step in which Pillow finds whether a picture is whole: compare a PNG's checksums, or decode."""
     try:
-        image.load()
+        step()
     except BROKEN as e:
         raise FormatError(f"the picture is damaged or truncated: {e}", where=str(path)) from None
 

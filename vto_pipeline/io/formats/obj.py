@@ -124,7 +124,7 @@ def _polygons(
     groups = []
     for n in np.unique(sides):
         chosen = np.flatnonzero(sides == n)
-        named = [" ".join(corner.split("/", 1)[0] for corner in corners[i]) for i in chosen]
+        named = [" ".join(corner.split("/", 1)[0] or corner for corner in corners[i]) for i in chosen]
         numbers = parse_numbers(named, [at[i] for i in chosen], path).reshape(-1, n)
         backward = numbers < 0
         indices = np.where(backward, numbers + seen[chosen, None], numbers - 1)

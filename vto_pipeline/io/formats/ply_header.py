@@ -78,7 +78,7 @@ def read_header(data: bytes, path: Path) -> Header:
         match words:
             case ["format", kind, _] if kind in _ORDERS:
                 order = _ORDERS[kind]
-            case ["element", name, count] if count.isdigit() and len(count) < 16:
+            case ["element", name, count] if count.isdecimal() and len(count) < 16:
                 tables.append((name, int(count), []))
             case ["property", "list", length, kind, name] if tables and length in _TYPES and kind in _TYPES:
                 tables[-1][2].append(Property(name, _TYPES[kind], _TYPES[length]))

@@ -30,7 +30,7 @@ def parse_pts(name: str) -> Arrays:
     numbered = [(line.strip(), i) for i, line in enumerate(read_lines(path), start=1) if line.strip()]
     heads = [line for line, _ in numbered if " " not in line and "\t" not in line]
     points = [(line, i) for line, i in numbered if " " in line or "\t" in line]
-    if not heads or not all(head.isdigit() for head in heads) or numbered[0][0] != heads[0]:
+    if not heads or not all(head.isdecimal() for head in heads) or numbered[0][0] != heads[0]:
         raise FormatError("a PTS file begins with the number of its points", where=str(path))
     promised = sum(map(int, heads))
     if promised != len(points) or not points:

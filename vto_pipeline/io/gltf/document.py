@@ -135,9 +135,13 @@ def open_gltf(path: Path) -> GltfDocument:
         parsed = json.loads(text.decode("utf-8-sig"))
     except (ValueError, RecursionError) as e:
         raise FormatError(f"not glTF: {e}", where=str(path)) from None
-    if not isinstance(parsed, dict) or not str((parsed.get("asset") or {}).get("version", "")).startswith("2"):
+    asset = parsed.get("asset") if isinstance(parsed, dict) else None
+    if not isinstance(asset, dict) or not str(asset.get("version", "")).startswith("2"):
         raise FormatError("not glTF 2.0: asset.version is missing or different", where=str(path))
-    for name in parsed.get("extensionsRequired", []):
+    required = parsed.get("extensionsRequired", [])
+    if not isinstance(required, list):
+        raise FormatError("extensionsRequired is not a list", where=str(path))
+    for name in required:
         if not str(name).startswith(_READ):
             hint = "export without it, or compressed by Draco"
             raise FormatError(f"the extension {name} is not supported", where=str(path), hint=hint)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from vto_pipeline.errors import InputError
+from vto_pipeline.errors import FormatError, InputError
 from vto_pipeline.io import clouds, meshes
 from vto_pipeline.io.bodies import avatars
 from vto_pipeline.io.bodies import measurements as bodies
@@ -71,7 +71,10 @@ def _write_page(path: Path, page: str) -> None:
 
 
 def _read_page(path: Path) -> str:
-    return check_file(Path(path), {".html"}, _PAGE_BYTES).read_text(encoding="utf-8")
+    try:
+        return check_file(Path(path), {".html"}, _PAGE_BYTES).read_text(encoding="utf-8")
+    except UnicodeDecodeError as e:
+        raise FormatError(f"not a page: {e}", where=str(path)) from None
 
 
 def _write_avatar_mesh(path: Path, avatar: Avatar | LifelikeBody) -> None:
@@ -211,7 +214,7 @@ ARTIFACTS: tuple[ArtifactKind, ...] = (
         "garment_placement",
         "garment_placement.json",
         "mannequin_from_surface, a 4x4 transform",
-        lambda path: cameras.read_matrix(path, "mannequin_from_surface").reshape(4, 4),
+        cameras.read_placement,
         lambda path, value: write_json(path, {"mannequin_from_surface": value}),
     ),
     ArtifactKind(

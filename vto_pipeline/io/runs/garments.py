@@ -75,7 +75,7 @@ def read_openings(path: Path) -> tuple[Opening, ...]:
             )
             for record in read_json(path)["openings"]
         )
-    except (KeyError, TypeError, ValueError) as e:
+    except (KeyError, OverflowError, TypeError, ValueError) as e:
         raise FormatError(f"not a list of openings: {e!r}", where=str(path)) from None
 
 

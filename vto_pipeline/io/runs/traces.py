@@ -35,14 +35,15 @@ def read_trace(path: Path) -> tuple[TraceRow, ...]:
     Raises:
         InputError: no such file; FormatError: other columns.
     """
-    with check_file(Path(path), {".csv"}, _LIMIT_BYTES).open(encoding="utf-8", newline="") as stream:
-        header, *rows = csv.reader(stream)
+    path = check_file(Path(path), {".csv"}, _LIMIT_BYTES)
     try:
+        with path.open(encoding="utf-8", newline="") as stream:
+            header, *rows = csv.reader(stream)
         if tuple(header) not in (_COLUMNS, (*_COLUMNS, *_TRUE)):
             raise ValueError(f"columns {header}")
         return tuple(
             TraceRow(float(s), int(n), float(e), float(r), int(k), int(c), *(float(x) if x else None for x in true))
             for s, n, e, r, k, c, *true in rows
         )
-    except ValueError as e:
+    except (OverflowError, TypeError, ValueError, csv.Error) as e:
         raise FormatError(f"not a trace: {e}", where=str(path)) from None

@@ -38,7 +38,7 @@ def thread_count() -> int:
     """Cores this process may use, or fewer where NUMBA_NUM_THREADS says so."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     limit = os.environ.get("NUMBA_NUM_THREADS", "")
-    return min(cores, int(limit)) if limit.isdigit() else cores
+    return min(cores, int(limit)) if limit.isdecimal() else cores
 
 
 def machine() -> dict[str, object]:

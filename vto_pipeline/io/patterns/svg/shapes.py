@@ -156,6 +156,8 @@ def _edges(segment: Any, scale: float) -> list[Edge]:
     if isinstance(segment, svgelements.Move) or segment.start is None or segment.end is None:
         return []
     if isinstance(segment, svgelements.Arc):
+        if not np.isfinite([segment.rx, segment.ry, segment.sweep]).all():
+            raise FormatError("an arc whose radii or angle are not finite")
         if abs(segment.rx - segment.ry) <= _ROUND * segment.rx and 0.0 < abs(segment.sweep) < 2.0 * np.pi - 1e-6:
             ends = _points([segment.start, segment.end], scale)
             bulge = -float(np.tan(segment.sweep / 4.0))  # y is up here
