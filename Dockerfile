@@ -1,6 +1,6 @@
 # The command `vto` with all that it needs: make image, then
 # docker run --rm -v "$PWD:/work" vto-pipeline run configs/demo.yaml -o runs/demo
-FROM python:3.11-slim
+FROM python:3.11-slim-bookworm
 
 RUN apt-get update && apt-get install -y --no-install-recommends \
         libegl1 libgl1 libgomp1 libidn2-0 libudev1 libusb-1.0-0 libx11-6 \

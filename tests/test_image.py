@@ -22,7 +22,7 @@ def test_it_installs_the_libraries_that_a_bare_machine_needs() -> None:
 
 
 def test_its_python_is_new_enough() -> None:
-    version = re.fullmatch(r"python:(\d+)\.(\d+)-slim", instructions("FROM")[0])
+    version = re.fullmatch(r"python:(\d+)\.(\d+)-slim-bookworm", instructions("FROM")[0])
     assert version is not None
     assert tuple(map(int, version.groups())) >= OLDEST
 

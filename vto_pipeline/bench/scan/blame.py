@@ -15,7 +15,7 @@ from vto_pipeline.geometry.rigid import transform_cameras
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import boundary_loops, concatenate
-from vto_pipeline.io.captures.cameras import read_cameras, read_matrix
+from vto_pipeline.io.captures.cameras import read_cameras, read_placement
 from vto_pipeline.io.meshes import read_own_mesh
 from vto_pipeline.io.runs.garments import read_observed
 from vto_pipeline.model.arrays import FloatArray, IntArray
@@ -47,7 +47,7 @@ def blame(run: Path, truth: TriangleMesh, form: TriangleMesh) -> dict[str, Value
     found = dict(wrong_shares(garment, read_observed(out / "observed.npz"), truth))
     cameras, placement = out / "cameras.json", out / "garment_placement.json"
     if cameras.is_file() and placement.is_file():
-        moved = transform_cameras(read_cameras(cameras), read_matrix(placement, "mannequin_from_surface").reshape(4, 4))
+        moved = transform_cameras(read_cameras(cameras), read_placement(placement))
         found |= missing_shares(garment, truth, form, moved)
     return found
 
