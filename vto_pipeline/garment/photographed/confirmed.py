@@ -1,0 +1,90 @@
+"""Fillings in the places where photos show them; what no photo confirms follows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vto_pipeline.garment.lifting import KeptOutside
+from vto_pipeline.geometry.intersections import meeting_vertices, self_intersections
+from vto_pipeline.geometry.laplace import extend_smoothly
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+
+LookAgain = Callable[[TriangleMesh, NDArray[np.bool_]], tuple[FloatArray, NDArray[np.bool_]]]
+"""Of a garment and which of its vertices (V,) were filled: their places (V, 3), and which of these photos confirm."""
+
+
+def confirm_fillings(
+    mesh: TriangleMesh,
+    observed: NDArray[np.bool_],
+    look: LookAgain,
+    distance: SurfaceDistance | None,
+    least: float,
+    job: Job,
+) -> tuple[TriangleMesh, NDArray[np.bool_]]:
+    """Move what was filled to where photos show it; the rest of each filling follows harmonically.
+
+    Nothing comes nearer to the mannequin than it may, or than it was. What would make the surface cross itself goes
+    back, with more around it each time.
+
+    Args:
+        mesh: A garment, its holes filled.
+        observed: Which of its vertices a sensor saw, shape (V,): they stay.
+        look: Looks for the others in the photos.
+        distance: Signed distances to the mannequin [m], or None.
+        least: Nothing that was filled may be nearer to it [m].
+        job: Receives how many vertices were confirmed, how far they moved, and the seconds.
+
+    Returns:
+        The garment; which of its vertices are observed or confirmed, shape (V,).
+    """
+    start = perf_counter()
+    places, found = look(mesh, ~observed)
+    way, held, found = places - mesh.vertices, observed | found, found & ~observed
+    way[~found] = 0.0
+    crossing = self_intersections(mesh)
+    rings = 1
+    while True:
+        moved = TriangleMesh(_followed(mesh, way, held, distance, least), mesh.faces, mesh.colors)
+        back = meeting_vertices(_more(self_intersections(moved), crossing), mesh.faces, len(observed)) & ~observed
+        if not back.any():
+            break
+        for _ in range(rings):
+            back[mesh.faces[back[mesh.faces].any(axis=1)]] = True
+        way[back], held, found = 0.0, held | back, found & ~back
+        rings *= 2
+    found &= np.linalg.norm(moved.vertices - mesh.vertices - way, axis=1) <= least
+    far = 1e3 * np.linalg.norm(way[found], axis=1) if found.any() else np.zeros(1)
+    job.measure(
+        filled_vertices=int((~observed).sum()),
+        confirmed_vertices=int(found.sum()),
+        confirmed_moved_median_mm=round(float(np.median(far)), 3),
+        confirmed_moved_p95_mm=round(float(np.percentile(far, 95)), 3),
+        confirmed_s=round(perf_counter() - start, 1),
+    )
+    return moved, observed | found
+
+
+def _followed(
+    mesh: TriangleMesh, way: FloatArray, held: NDArray[np.bool_], distance: SurfaceDistance | None, least: float
+) -> FloatArray:
+    """Places of all vertices once those held went their way and the others followed, outside the mannequin (V, 3)."""
+    way = extend_smoothly(mesh, way, ~held, order=1)
+    moves = np.any(way != 0.0, axis=1)
+    places = mesh.vertices + way
+    if distance is not None and moves.any():
+        outside = KeptOutside(distance, mesh.vertices[moves])
+        places[moves] = outside.pushed(places[moves], np.minimum(outside.least, least))
+    return places
+
+
+def _more(pairs: IntArray, before: IntArray) -> IntArray:
+    """Pairs of faces that were not among those before, shape (K, 2)."""
+    known = set(map(tuple, before.tolist()))
+    return pairs[np.array([tuple(pair) not in known for pair in pairs.tolist()], dtype=bool)]
