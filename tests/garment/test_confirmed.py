@@ -157,7 +157,7 @@ def test_confirmed_cloth_counts_as_seen():
     job = Job()
     garment, openings, observed = close_scan_holes(torn, arm(), strict, job, look=to_the_tube)
     assert observed.all()
-    assert job.metrics["unobserved_share"] < 0.001
+    assert job.metrics["unobserved_share"] < 0.002  # ears between three corners that were seen
     assert_allclose(np.linalg.norm(garment.vertices * [1, 0, 1], axis=1), RADIUS, atol=2e-4)
     assert len(openings) == 2
     assert [one.perimeter for one in openings] == [one.perimeter for one in list_openings(garment)]

@@ -77,18 +77,28 @@ def test_plain_cloth_stays_where_it_was_filled(wrong, given, true_cameras, tmp_p
     shots = photos(plain, tmp_path, true_cameras.world_from_cam, true_cameras.intrinsics[0], board=False)
     mesh, filled = wrong
     places, found = look_at_fillings(mesh, filled, None, shots, *given[1:], Job())
-    assert found[filled].mean() < 0.02
+    assert found[filled].mean() < 0.05
     assert_array_equal(places[~found], mesh.vertices[~found])
 
 
-def test_what_something_hides_is_not_looked_for(wrong, given):
-    """A wall 60 mm before the filling: the photos show the wall, whatever they show."""
-    mesh, filled = wrong
-    middle = mesh.vertices[filled].mean(axis=0) + np.array([0.0, 0.0, 0.06])
-    corners = middle + np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * [0.9, 0.9, 0.0]
-    wall = TriangleMesh(corners, np.array([[0, 1, 2], [0, 2, 3]]))
-    _, found = look_at_fillings(mesh, filled, wall, *given, Job())
+def test_what_something_hides_is_not_looked_for(wrong, given, tube):
+    """A wider and taller tube all round: whatever the photos show, it is not what was filled."""
+    middle = np.array([0.0, 0.3, 0.0])
+    wall = TriangleMesh((tube.vertices - middle) * [1.4, 6.0, 1.4] + middle, tube.faces)
+    places, found = look_at_fillings(*wrong, wall, *given, Job())
     assert not found.any()
+    assert_array_equal(places, wrong[0].vertices)
+
+
+def test_beside_a_rim_nothing_is_looked_for(tube, given):
+    top = tube.vertices[:, 1].max()
+    filled = (tube.vertices[:, 1] > 0.42) & (tube.vertices[:, 2] > 0.02)
+    mesh = TriangleMesh(tube.vertices - 0.004 * filled[:, None] * vertex_normals(tube), tube.faces)
+    _, found = look_at_fillings(mesh, filled, None, *given, Job())
+    beside = tube.vertices[:, 1] > top - 4.5 * PIXEL
+    assert (filled & beside).sum() > 100
+    assert not found[beside].any()
+    assert found[filled & (tube.vertices[:, 1] < top - 10 * PIXEL)].mean() > 0.5
 
 
 def test_nothing_filled_nothing_looked_at(wrong, given):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import count
 from time import perf_counter
 
 import numpy as np
@@ -15,6 +16,9 @@ from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
+
+GROWTH = (0, 0, 0, 1, 1, 2, 4, 8, 16, 32)
+"""Rings round what crosses that are doubted with it, look after look."""
 
 LookAgain = Callable[[TriangleMesh, NDArray[np.bool_]], tuple[FloatArray, NDArray[np.bool_]]]
 """Of a garment and which of its vertices (V,) were filled: their places (V, 3), and which of these photos confirm."""
@@ -30,8 +34,8 @@ def confirm_fillings(
 ) -> tuple[TriangleMesh, NDArray[np.bool_]]:
     """Move what was filled to where photos show it; the rest of each filling follows harmonically.
 
-    Nothing comes nearer to the mannequin than it may, or than it was. What would make the surface cross itself goes
-    back, with more around it each time.
+    Nothing comes nearer to the mannequin than it may, or than it was. What would make the surface cross itself is not
+    taken as confirmed and follows, too, with more around it each time: in the end its filling stays as it was.
 
     Args:
         mesh: A garment, its holes filled.
@@ -46,19 +50,16 @@ def confirm_fillings(
     """
     start = perf_counter()
     places, found = look(mesh, ~observed)
-    way, held, found = places - mesh.vertices, observed | found, found & ~observed
-    way[~found] = 0.0
+    way, found = places - mesh.vertices, found & ~observed
     crossing = self_intersections(mesh)
-    rings = 1
-    while True:
-        moved = TriangleMesh(_followed(mesh, way, held, distance, least), mesh.faces, mesh.colors)
-        back = meeting_vertices(_more(self_intersections(moved), crossing), mesh.faces, len(observed)) & ~observed
-        if not back.any():
+    for number in count():
+        moved = TriangleMesh(_followed(mesh, way, observed, found, distance, least), mesh.faces, mesh.colors)
+        doubted = meeting_vertices(_more(self_intersections(moved), crossing), mesh.faces, len(found))
+        if not doubted.any():
             break
-        for _ in range(rings):
-            back[mesh.faces[back[mesh.faces].any(axis=1)]] = True
-        way[back], held, found = 0.0, held | back, found & ~back
-        rings *= 2
+        for _ in range(GROWTH[min(number, len(GROWTH) - 1)]):
+            doubted[mesh.faces[doubted[mesh.faces].any(axis=1)]] = True
+        found &= ~doubted
     found &= np.linalg.norm(moved.vertices - mesh.vertices - way, axis=1) <= least
     far = 1e3 * np.linalg.norm(way[found], axis=1) if found.any() else np.zeros(1)
     job.measure(
@@ -72,10 +73,15 @@ def confirm_fillings(
 
 
 def _followed(
-    mesh: TriangleMesh, way: FloatArray, held: NDArray[np.bool_], distance: SurfaceDistance | None, least: float
+    mesh: TriangleMesh,
+    way: FloatArray,
+    observed: NDArray[np.bool_],
+    found: NDArray[np.bool_],
+    distance: SurfaceDistance | None,
+    least: float,
 ) -> FloatArray:
-    """Places of all vertices once those held went their way and the others followed, outside the mannequin (V, 3)."""
-    way = extend_smoothly(mesh, way, ~held, order=1)
+    """Places of all vertices (V, 3) once those found went their way and the rest followed, outside the mannequin."""
+    way = extend_smoothly(mesh, np.where(found[:, None], way, 0.0), ~(observed | found), order=1)
     moves = np.any(way != 0.0, axis=1)
     places = mesh.vertices + way
     if distance is not None and moves.any():

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from vto_pipeline.geometry.topology import boundary_loops
 from vto_pipeline.io.captures.undistort import undistorted
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.camera import CameraSet
@@ -31,7 +32,8 @@ def look_at_fillings(
     """Find where photos show cloth that was filled.
 
     Stereo loses cloth whose place nothing near tells, though several photos show it. A filling that a mannequin guides
-    is a nearer guess than a surface closed through confirmed depth.
+    is a nearer guess than a surface closed through confirmed depth. Beside a rim a patch shows what is behind, too:
+    nothing is looked for there.
 
     Args:
         surface: The garment with its fillings, in the frame of the cameras.
@@ -57,7 +59,8 @@ def look_at_fillings(
         job.note(f"no look at what was filled: it takes {needed / 1e9:.1f} GB of memory; {free / 1e9:.1f} GB are left")
         return surface.vertices, nobody
     pixel = pixel_on_surface(depth_only(maps))
-    lacking = np.flatnonzero(filled)
+    config = RematchConfig()
+    lacking = np.flatnonzero(filled & ~_beside_rims(surface, config.radius_px * pixel))
     if len(lacking) > MOST_PATCHES and not filled.all():
         away, _ = cKDTree(surface.vertices[~filled]).query(surface.vertices[lacking])
         lacking = lacking[np.sort(np.argsort(away, kind="stable")[:MOST_PATCHES])]
@@ -66,7 +69,6 @@ def look_at_fillings(
     side = max(max(lens.width, lens.height) for lens in maps.intrinsics)
     views = stereo_views(photos, cameras, cloud, visibility(cameras, cloud), side, Job(seed=job.seed))
     grays = grey_photos((undistorted(view.gray, view.camera) for view in views), maps)
-    config = RematchConfig()
     look = look_along(
         surface,
         lacking.astype(np.int32),
@@ -80,3 +82,12 @@ def look_at_fillings(
     found = nobody.copy()
     found[lacking[look.sure]] = True
     return np.where(found[:, None], look.mesh.vertices, surface.vertices), found
+
+
+def _beside_rims(surface: TriangleMesh, distance: float) -> NDArray[np.bool_]:
+    """Which vertices are no farther from a border than this [m], shape (V,)."""
+    loops = boundary_loops(surface)
+    if not loops:
+        return np.zeros(len(surface.vertices), dtype=bool)
+    away, _ = cKDTree(surface.vertices[np.concatenate(loops)]).query(surface.vertices)
+    return np.asarray(away <= distance)
