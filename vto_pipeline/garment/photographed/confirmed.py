@@ -17,8 +17,8 @@ from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
-GROWTH = (0, 0, 0, 1, 1, 2, 4, 8, 16, 32)
-"""Rings round what crosses that are doubted with it, look after look."""
+ALONE = 4
+"""So often only what crosses is doubted; then rings of faces around it, too, twice as many each time."""
 
 LookAgain = Callable[[TriangleMesh, NDArray[np.bool_]], tuple[FloatArray, NDArray[np.bool_]]]
 """Of a garment and which of its vertices (V,) were filled: their places (V, 3), and which of these photos confirm."""
@@ -57,7 +57,7 @@ def confirm_fillings(
         doubted = meeting_vertices(_more(self_intersections(moved), crossing), mesh.faces, len(found))
         if not doubted.any():
             break
-        for _ in range(GROWTH[min(number, len(GROWTH) - 1)]):
+        for _ in range(2 ** (number - ALONE) if number >= ALONE else 0):
             doubted[mesh.faces[doubted[mesh.faces].any(axis=1)]] = True
         found &= ~doubted
     found &= np.linalg.norm(moved.vertices - mesh.vertices - way, axis=1) <= least

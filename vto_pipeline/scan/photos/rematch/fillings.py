@@ -18,6 +18,9 @@ from vto_pipeline.scan.photos.neighbours import visibility
 from vto_pipeline.scan.photos.rematch.look import MOST_PATCHES, RematchConfig, grey_photos, look_along, look_bytes
 from vto_pipeline.scan.photos.views import stereo_views
 
+VIEWS = 5
+"""Photos of a place that are compared: two more cost a third again, and bring nothing."""
+
 
 def look_at_fillings(
     surface: TriangleMesh,
@@ -59,7 +62,7 @@ def look_at_fillings(
         job.note(f"no look at what was filled: it takes {needed / 1e9:.1f} GB of memory; {free / 1e9:.1f} GB are left")
         return surface.vertices, nobody
     pixel = pixel_on_surface(depth_only(maps))
-    config = RematchConfig()
+    config = RematchConfig(views=VIEWS)
     lacking = np.flatnonzero(filled & ~_beside_rims(surface, config.radius_px * pixel))
     if len(lacking) > MOST_PATCHES and not filled.all():
         away, _ = cKDTree(surface.vertices[~filled]).query(surface.vertices[lacking])
