@@ -18,8 +18,9 @@ from vto_pipeline.model.camera import CameraSet
 from vto_pipeline.model.frames import DepthMaps
 from vto_pipeline.model.job import Job
 from vto_pipeline.scan.photos.rematch.guess import guess_surface
+from vto_pipeline.scan.photos.rematch.look import RematchConfig
 from vto_pipeline.scan.photos.rematch.patches import best_mean, correlations
-from vto_pipeline.scan.photos.rematch.rematch import RematchConfig, rematch
+from vto_pipeline.scan.photos.rematch.rematch import rematch
 from vto_pipeline.scan.photos.rematch.smooth_choice import MOST_COST, STEP_COST, peak, smooth_choice
 
 PIXEL = 0.0019

@@ -12,6 +12,7 @@ from vto_pipeline.garment.bare_parts import BareParts
 from vto_pipeline.garment.lifting import check_lifted, lift_fillings
 from vto_pipeline.garment.loop_evidence import LoopShape, encloses, measure_loops
 from vto_pipeline.garment.notches import close_notches
+from vto_pipeline.garment.photographed.confirmed import LookAgain, confirm_fillings
 from vto_pipeline.garment.photographed.covered import covered_loops
 from vto_pipeline.garment.photographed.parted import refuse_parted
 from vto_pipeline.garment.photographed.sightings import look_at_mannequin
@@ -50,6 +51,7 @@ class OpeningsConfig(Config):
     flap_edges: float = Field(4.0, ge=0, le=50, description="Parts that hang on by less are dropped [edge lengths]")
     fair_mm: float = Field(40.0, ge=0, le=200, description="Zigzags shorter than this are smoothed out of rims [mm]")
     reach_mm: float = Field(60.0, ge=0, le=300, description="How far inside an opening the mannequin may end [mm]")
+    look_again: bool = Field(True, description="Look in the photos for what was filled; it moves to where they show it")
     clearance_mm: float = Field(1.0, ge=0, le=20, description="Least distance of fillings from the mannequin [mm]")
     least_perimeter_mm: float = Field(
         LEAST_PERIMETER_MM, ge=0, le=5000, description="Smaller loops are never openings [mm]"
@@ -64,6 +66,7 @@ def close_scan_holes(
     job: Job,
     bare: BareParts | None = None,
     photos: PosedPhotos | None = None,
+    look: LookAgain | None = None,
 ) -> tuple[TriangleMesh, list[Opening], NDArray[np.bool_]]:
     """Fill the scan holes and keep the garment's own openings.
 
@@ -77,6 +80,7 @@ def close_scan_holes(
         job: Receives counts and perimeters.
         bare: What was seen of the bare mannequin, if it is known.
         photos: Of the garment on the mannequin, in its frame: what they show is held beside the result.
+        look: Looks in the photos for what was filled; what they confirm counts as observed.
 
     Returns:
         The garment in one piece; its openings, highest first; which of its vertices were observed, shape (V,).
@@ -119,9 +123,15 @@ def close_scan_holes(
     final = fair_rims(filled, config.fair_mm * 1e-3)
     if face_components(final)[0] != 1:
         raise GarmentError(f"the garment fell apart into {face_components(final)[0]} pieces")
+    scanned = np.arange(len(final.faces)) < len(clean.faces)
+    if look is not None and config.look_again and not observed.all():
+        job.progress(0.6, "looking again at what was filled")
+        before = observed
+        final, observed = confirm_fillings(final, before, look, distance, config.clearance_mm * 1e-3, job)
+        scanned |= observed[final.faces].all(axis=1) & ~before[final.faces].all(axis=1)
     found = list_openings(final)
     check_wearable(final, found)
-    seen = _area(final, slice(len(clean.faces))) / _area(final)
+    seen = _area(final, scanned) / _area(final)
     job.measure(
         openings=len(found),
         filled_holes=len(shapes) - count,

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vto_pipeline.cloth.rest_shape.from_hanging import RestShapeConfig, rest_shape
 from vto_pipeline.garment.align import AlignConfig, PosedPhotos, align_to_mannequin
@@ -14,6 +15,7 @@ from vto_pipeline.garment.bare_parts import BareParts
 from vto_pipeline.garment.openings import OpeningsConfig, close_scan_holes, list_openings
 from vto_pipeline.garment.pattern.embed import in_shape
 from vto_pipeline.garment.pattern.sew import SewConfig, sew
+from vto_pipeline.garment.photographed.confirmed import LookAgain
 from vto_pipeline.garment.simulation_mesh import SimulationMeshConfig, remesh_for_simulation
 from vto_pipeline.garment.subtract import SubtractConfig, extract_garment, label_garment
 from vto_pipeline.garment.wearable import check_wearable
@@ -21,13 +23,19 @@ from vto_pipeline.geometry.metres import need_metres
 from vto_pipeline.geometry.remeshing.repair import RepairConfig, repair
 from vto_pipeline.geometry.rigid import transform_cameras, transform_mesh
 from vto_pipeline.geometry.topology import concatenate
+from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.garment import SurfaceLabels
 from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.pipeline.stage import Stage
+from vto_pipeline.scan.photos.rematch.fillings import look_at_fillings
 from vto_pipeline.scan.texture.project import TextureConfig, texture_surface
 
 Inputs = Mapping[str, Any]
 Outputs = Mapping[str, Any]
+
+LOOK = ("garment_photos", "garment_cameras", "garment_points", "garment_depth_maps")
+"""What the look at what was filled needs."""
 
 
 def _align(inputs: Inputs, settings: AlignConfig, job: Job) -> Outputs:
@@ -60,8 +68,36 @@ def _openings(inputs: Inputs, settings: OpeningsConfig, job: Job) -> Outputs:
         if "garment_photos" in inputs and "garment_cameras" in inputs:
             cameras = transform_cameras(inputs["garment_cameras"], placement)
             photos = PosedPhotos(inputs["garment_photos"].paths, cameras)
-    garment, openings, observed = close_scan_holes(inputs["garment_shell"], mannequin, settings, job, bare, photos)
+    look = _look_at_fillings(inputs, settings, job)
+    shell = inputs["garment_shell"]
+    garment, openings, observed = close_scan_holes(shell, mannequin, settings, job, bare, photos, look)
     return {"garment": garment, "openings": openings, "observed": observed}
+
+
+def _look_at_fillings(inputs: Inputs, settings: OpeningsConfig, job: Job) -> LookAgain | None:
+    """Return what looks in the photos for what was filled, in the frame of the garment; None without photos."""
+    if not settings.look_again:
+        return None
+    if any(name not in inputs for name in LOOK):
+        job.leave_out("a look at what was filled", "the scan has no photos with depth")
+        return None
+    photos, cameras, points, maps = (inputs[name] for name in LOOK)
+    garment_from_scan = inputs.get("garment_placement", np.eye(4))
+    scan_from_garment = np.linalg.inv(garment_from_scan)
+    mannequin = inputs.get("mannequin_surface") if "garment_placement" in inputs else None
+    besides = None if mannequin is None else transform_mesh(mannequin, scan_from_garment)
+
+    def look(garment: TriangleMesh, filled: NDArray[np.bool_]) -> tuple[FloatArray, NDArray[np.bool_]]:
+        surface = transform_mesh(garment, scan_from_garment)
+        places, found = look_at_fillings(surface, filled, besides, photos, cameras, points, maps, job)
+        return transform_mesh(replace(surface, vertices=places), garment_from_scan).vertices, found
+
+    return look
+
+
+def _idle_look(settings: OpeningsConfig) -> tuple[str, ...]:
+    """Inputs of the look at what was filled, when it is left out."""
+    return () if settings.look_again else LOOK[2:]
 
 
 def _texture(inputs: Inputs, settings: TextureConfig, job: Job) -> Outputs:
@@ -138,9 +174,9 @@ STAGES: tuple[Stage, ...] = (
             "garment_surface",
             "garment_placement",
             "labels",
-            "garment_photos",
-            "garment_cameras",
+            *LOOK,
         ),
+        idle=_idle_look,
         makes=("garment", "openings", "observed"),
         run=_openings,
         settings=OpeningsConfig,

@@ -27,7 +27,8 @@ from vto_pipeline.scan.photos.disparity import MatchConfig, match_pair
 from vto_pipeline.scan.photos.neighbours import choose_pairs, visibility
 from vto_pipeline.scan.photos.rectify import StereoView, rectify
 from vto_pipeline.scan.photos.region import object_region
-from vto_pipeline.scan.photos.rematch.rematch import RematchConfig, look_bytes, rematch
+from vto_pipeline.scan.photos.rematch.look import RematchConfig, look_bytes
+from vto_pipeline.scan.photos.rematch.rematch import rematch
 from vto_pipeline.scan.photos.views import stereo_views
 
 PAIR_BYTES = 250

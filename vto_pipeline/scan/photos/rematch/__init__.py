@@ -3,5 +3,6 @@
 guess: a closed surface through the confirmed depths, and which of it no depth map shows
 patches: how well photos agree on small patches along their normals
 smooth_choice: one offset for each patch, near its neighbours'
-rematch: the whole, back into depth maps
+look: one look along a guess; rematch: look after look, back into depth maps
+fillings: a look at cloth that was filled
 """

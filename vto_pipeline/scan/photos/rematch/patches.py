@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from vto_pipeline.scan.photos.rematch.smooth_choice import peak
+
 LEAST_CONTRAST = 1.5
 """Standard deviation of a patch without texture [grey levels]: noise."""
 
@@ -84,6 +86,32 @@ def best_mean(values, held):  # type: ignore[no-untyped-def]  # typed by Numba
     for k in range(len(ordered) - held, len(ordered)):
         total += ordered[k]
     return total / held
+
+
+@njit(cache=True, nogil=True)
+def mismatch(found, held):  # type: ignore[no-untyped-def]  # typed by Numba
+    """One less the mean correlation of the best `held` photos (P, O); one where there are fewer."""
+    costs = np.ones(found.shape[:2], np.float32)
+    for p in range(costs.shape[0]):
+        for o in range(costs.shape[1]):
+            costs[p, o] -= max(best_mean(found[p, o], held), 0.0)
+    return costs
+
+
+@njit(cache=True, nogil=True)
+def own_places(found, least):  # type: ignore[no-untyped-def]  # typed by Numba
+    """Label at which each photo alone correlates best (P, M); NaN where it correlates less than `least`."""
+    patches, labels, photos = found.shape
+    places = np.full((patches, photos), np.nan)
+    for p in range(patches):
+        for m in range(photos):
+            best, at = least, -1
+            for o in range(labels):
+                if found[p, o, m] >= best:
+                    best, at = found[p, o, m], o
+            if at > 0 and at < labels - 1:  # at an end, it may be better beyond
+                places[p, m] = peak(found[p, :, m], at)
+    return places
 
 
 @njit(cache=True, nogil=True)
