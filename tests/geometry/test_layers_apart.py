@@ -72,6 +72,7 @@ def test_in_a_double_wall_the_nearest_of_all_faces_that_face_alike_is_found():
 
 
 @pytest.mark.real_data
+@pytest.mark.skipif(not GARMENTS.exists(), reason="the garments are not part of the repository")
 @pytest.mark.parametrize("name", ["shirt", "blouse-short"])
 @pytest.mark.parametrize("edge_mm", [20.0, 17.0, 15.0, 12.0, 10.0])
 def test_collars_do_not_cross_themselves_once_they_are_remeshed(name, edge_mm):
