@@ -169,6 +169,7 @@ def test_points_without_a_reading_are_dropped_and_told(tmp_path: Path) -> None:
         ("f.pcd", b"FIELDS x y z\nSIZE 3 4 4\nTYPE F F F\nPOINTS 1\nDATA ascii\n1 2 3\n", "cannot parse the header"),
         ("a.pts", b"2\n1 2 3\n", "2 points promised, 1 lines follow"),
         ("b.pts", b"1 2 3\n4 5 6\n", "begins with the number of its points"),
+        ("d.pts", "²\n1 2 3\n4 5 6\n".encode(), "begins with the number of its points"),
         ("c.pts", b"1\n1 2 3 0 256 0 0\n", "a colour is not in 0 to 255"),
         ("a.las", b"LASF" + bytes(50), "no LASF at its begin"),
         ("b.las", b"LASF" + bytes(300), "LAS version 0.0"),
