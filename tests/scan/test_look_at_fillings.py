@@ -153,6 +153,12 @@ def test_without_photos_it_is_left_out_with_the_reason(given):
     job = Job()
     assert _look_at_fillings({"garment_photos": given[0]}, OpeningsConfig(), job) is None
     assert job.left_out == [("a look at what was filled", "the scan has no photos with depth")]
-    quiet = Job()
-    assert _look_at_fillings({}, OpeningsConfig(look_again=False), quiet) is None
-    assert quiet.left_out == []
+
+
+def test_who_does_not_want_it_gets_none_and_no_word(given):
+    inputs = dict(zip(("garment_photos", "garment_cameras", "garment_points", "garment_depth_maps"), given, strict=True))
+    job = Job()
+    assert _look_at_fillings(inputs, OpeningsConfig(), job) is not None
+    assert _look_at_fillings(inputs, OpeningsConfig(look_again=False), job) is None
+    assert _look_at_fillings({}, OpeningsConfig(look_again=False), job) is None
+    assert job.left_out == []

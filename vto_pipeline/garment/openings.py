@@ -124,7 +124,7 @@ def close_scan_holes(
     if face_components(final)[0] != 1:
         raise GarmentError(f"the garment fell apart into {face_components(final)[0]} pieces")
     scanned = np.arange(len(final.faces)) < len(clean.faces)
-    if look is not None and config.look_again and not observed.all():
+    if look is not None and not observed.all():
         job.progress(0.6, "looking again at what was filled")
         before = observed
         final, observed = confirm_fillings(final, before, look, distance, config.clearance_mm * 1e-3, job)

@@ -1,8 +1,9 @@
 """Fill holes so that the filling continues the slope and curvature around it.
 
-Liepa 2003, "Filling holes in meshes": triangulate, refine to the density of the rim, fair. The fairing solves the
-biharmonic equation on the filling with the rings of faces around it held; once more with the lengths and angles that
-the filling then has, for those before were of its flat triangulation.
+Liepa 2003, "Filling holes in meshes": triangulate, refine to the density of the rim, fair. A rim much finer than the
+mesh is refined to half the mesh's density. The fairing solves the biharmonic equation on the filling with the rings of
+faces around it held; once more with the lengths and angles that the filling then has, for those before were of its flat
+triangulation.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.geometry.laplace import extend_smoothly
 from vto_pipeline.geometry.remeshing.refine import refine
+from vto_pipeline.geometry.remeshing.remesh import edge_lengths
 from vto_pipeline.geometry.remeshing.repair import is_manifold
 from vto_pipeline.geometry.remeshing.triangulate import triangulate_loop
 from vto_pipeline.geometry.topology import edges, face_area_vectors, face_normals, half_edges, submesh
@@ -27,6 +29,8 @@ FAIRINGS = 2
 """The second takes 40 % of the error over a cap of a sphere away, a third 3 %."""
 MOST_FACES = 100_000
 """A hole of more triangles of its rim's edge length is filled with longer edges inside."""
+FINEST = 0.5
+"""Edges wanted inside are no shorter than this share of the mesh's median: thinning leaves rims as fine as they were."""
 
 
 @dataclass(frozen=True)
@@ -84,11 +88,12 @@ def _sew_in(mesh: TriangleMesh, rims: list[Rim]) -> TriangleMesh:
     """Return mesh and flat fillings as one, the fillings' vertices and faces last."""
     rim_edges = _edges_among(mesh, np.concatenate([rim.loop for rim in rims]))
     vertices, faces, count = [mesh.vertices], [mesh.faces], len(mesh.vertices)
+    finest = FINEST * float(np.median(edge_lengths(mesh)))
     for rim in rims:
         points = mesh.vertices[rim.loop]
         taken = _taken_chords(rim.loop, rim_edges)
         patch = TriangleMesh(points, triangulate_loop(points, rim.normals, taken))
-        patch = refine(patch, _edge_inside(patch), taken)
+        patch = refine(patch, max(_edge_inside(patch), finest), taken)
         new = patch.vertices[len(points) :]
         faces.append(np.concatenate([rim.loop, count + np.arange(len(new))]).astype(np.int32)[patch.faces])
         vertices.append(new)
