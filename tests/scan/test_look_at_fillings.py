@@ -156,7 +156,9 @@ def test_without_photos_it_is_left_out_with_the_reason(given):
 
 
 def test_who_does_not_want_it_gets_none_and_no_word(given):
-    inputs = dict(zip(("garment_photos", "garment_cameras", "garment_points", "garment_depth_maps"), given, strict=True))
+    inputs = dict(
+        zip(("garment_photos", "garment_cameras", "garment_points", "garment_depth_maps"), given, strict=True)
+    )
     job = Job()
     assert _look_at_fillings(inputs, OpeningsConfig(), job) is not None
     assert _look_at_fillings(inputs, OpeningsConfig(look_again=False), job) is None

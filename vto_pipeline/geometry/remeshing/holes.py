@@ -30,7 +30,7 @@ FAIRINGS = 2
 MOST_FACES = 100_000
 """A hole of more triangles of its rim's edge length is filled with longer edges inside."""
 FINEST = 0.5
-"""Edges wanted inside are no shorter than this share of the mesh's median: thinning leaves rims as fine as they were."""
+"""Edges inside are no shorter than this share of the mesh's median: thinning leaves rims as fine as they were."""
 
 
 @dataclass(frozen=True)
