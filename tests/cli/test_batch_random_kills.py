@@ -1,4 +1,4 @@
-"""Kills at random of every part of a batch while its rows are at work: what comes of it in the end has the same bits."""
+"""Kills at random of every part of a batch while its rows are at work: what comes of it has the same bits."""
 
 from __future__ import annotations
 
