@@ -39,9 +39,10 @@ def at_work(machines: list[subprocess.Popen[bytes]]) -> list[psutil.Process]:
 
 
 def contents(batch: str) -> dict[str, bytes]:
-    """All files that rows made but their pages, which tell what came from the cache."""
-    files = sorted(path for path in Path(batch).glob("rows/*/out/*") if path.is_file() and path.name != "page.json")
-    return {str(path.relative_to(batch)): path.read_bytes() for path in files}
+    """All files that rows made but those that tell how long it took, or what came from the cache."""
+    files = sorted(path for path in Path(batch).glob("rows/*/out/*") if path.is_file())
+    timed = ("page.json", "trace.csv")
+    return {str(path.relative_to(batch)): path.read_bytes() for path in files if path.name not in timed}
 
 
 def strike(start: Callable[..., subprocess.Popen[str]], new_cluster: Callable[[], Cluster], pause: float) -> None:
