@@ -2,7 +2,7 @@
 
 Processor time tells where the wall time went that more workers did not save. If the same rows cost more of it, their
 processes slow each other down: that is the machine. `busy` is the processor time in units of the wall time of all
-workers: beyond 1 it is the batch's own process, which then shares the workers' cores, and below 1 somebody waited.
+workers: beyond 1 it is the batch's own process, which then shares the workers' cores, and below 1 a worker waited.
 """
 
 from __future__ import annotations
