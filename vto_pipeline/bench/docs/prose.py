@@ -74,8 +74,10 @@ def _shown_constants(template: str) -> Iterator[tuple[int, Any]]:
     """Yield line and value of what is shown, or kept to be shown, and stands in the template: not what asks for it."""
     from jinja2 import Environment, nodes
 
-    for statement in Environment().parse(template).find_all((nodes.Output, nodes.Assign)):
-        waiting = [statement.node] if isinstance(statement, nodes.Assign) else list(statement.nodes)
+    tree = Environment().parse(template)
+    roots: list[nodes.Node] = [one.node for one in tree.find_all(nodes.Assign)]
+    for root in [*roots, *(node for shown in tree.find_all(nodes.Output) for node in shown.nodes)]:
+        waiting = [root]
         while waiting:
             node = waiting.pop()
             if isinstance(node, nodes.Const) and re.search(r"\d", str(node.value)):
