@@ -163,6 +163,23 @@ def test_a_figure_typed_by_hand_is_found():
     ]
 
 
+@pytest.mark.parametrize(
+    ("typed", "found"),
+    [
+        ("{{ 0.17 }} mm", ["0.17"]),
+        ("\n{{ '0.17 mm' }}", ["0.17 mm"]),
+        ("{% set median = '0.17' %}{{ median }} mm", ["0.17"]),
+        ("{% if demo %}{{ 3 * 0.2 }}{% endif %}", ["0.2", "3"]),
+        ("{{ '%.2f mm' | format(0.17) }}", ["%.2f mm", "0.17"]),
+        ("```\nvto run a.yaml  # takes 12 s\nsleep 3 s\n```", ["12 s"]),
+        ("{{ figure('toy', 'seconds', edges=40) }} s, {{ rows('toy')[0].figure('share', scale=100) }} %", []),
+        ("{{ chosen('2 mm') }}{% for edges in (20, 40) %}{{ edges }}{% endfor %}{{ one.name or 'none' }}", []),
+    ],
+)
+def test_figures_hidden_in_a_template_are_found(typed, found):
+    assert sorted(fault.problem.split(": ")[1] for fault in typed_figures(typed)) == sorted(found)
+
+
 def test_long_sentences_are_found_where_they_begin():
     words = " ".join(["word"] * LONGEST)
     skipped = f"| {words} {words} |\n\n```\n{words} {words}\n```\n\n"

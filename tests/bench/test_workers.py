@@ -39,6 +39,9 @@ def test_rows_results_and_seconds_are_counted(tmp_path, tapes):
         assert (found["rows"], found["done"], found["failed"]) == (3, 3, 0)
         assert "fit_measurements 2" in found["made"]  # the third customer is the first once more
     assert one["share_of_first"] == 1.0
+    for found in (one, two):  # two avatars and the start of each of three rows, in children of children
+        assert 3.0 < found["cpu_seconds"] < found["workers"] * 4 * found["seconds"]
+        assert found["busy"] == pytest.approx(found["cpu_seconds"] / found["workers"] / found["seconds"], rel=1e-12)
     assert two["share_of_first"] == pytest.approx(two["seconds"] / one["seconds"], rel=1e-12)
     with pytest.raises(ComputationError, match="was run before"):
         next(rows(order([], [], tapes), [1], tmp_path / "out"))

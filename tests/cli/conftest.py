@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
+from batch_processes import client, cluster, gate, new_cluster  # noqa: F401  # fixtures
 from toy_tables import CALLS, TOY
 
 from vto_pipeline.cli.main import main

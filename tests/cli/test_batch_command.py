@@ -53,7 +53,7 @@ def test_a_file_that_is_missing_is_missing_in_the_folder_of_the_batch(ordered, t
 
 @pytest.mark.filterwarnings("default")  # of dask and its worker processes
 def test_a_batch_does_what_can_be_done_and_only_the_rest_again(ordered, tmp_path: Path) -> None:
-    said = ordered("batch", "order.yaml", "-o", "november", "--workers", "2", "--memory", "2.5")
+    said = ordered("batch", "order.yaml", "-o", "november", "--workers", "2", "--memory", "2.5GB")
     assert said.code == 6, said.err
     budgets = [json.loads(path.read_text())["memory_budget_mb"] for path in Path("november/rows").glob("*/run.json")]
     assert budgets == [2500.0] * 3  # so that stages which can, fit themselves into the limit

@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 import json
-import logging
-import os
 import random
-import shutil
 import signal
-import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -19,7 +14,6 @@ import pytest
 
 from vto_pipeline.cli.main import main
 from vto_pipeline.pipeline.batch.cluster import run_rows
-from vto_pipeline.pipeline.batch.ledger import LEDGER, read_ledger
 from vto_pipeline.pipeline.batch.row import RowTask
 from vto_pipeline.pipeline.execution import folder as folder_module
 from vto_pipeline.pipeline.execution.folder import locked_run_folder
@@ -27,137 +21,12 @@ from vto_pipeline.pipeline.execution.folder import locked_run_folder
 pytest.importorskip("distributed")
 import distributed
 import psutil  # distributed brings it along
-
-TESTS = str(Path(__file__).parents[1])
-ROW = (
-    f"import sys; sys.path.insert(0, {TESTS!r}); from toy_tables import TOY; "
-    "from vto_pipeline.stages.entry import planning; planning.catalogue = lambda: TOY; "
-    "from vto_pipeline.cli.main import main; sys.exit(main())"
-)
-CLIENT = (
-    "from vto_pipeline.cli.commands import batch; import sys; batch.PROGRAM = (sys.executable, '-c', {row!r}); " + ROW
-)
-HELD = (
-    "import sys, time; from pathlib import Path; "
-    "any(time.sleep(0.05) for _ in iter(lambda: Path({gate!r}).exists() and 'row_1' not in str(sys.argv), False)); "
-)
-"""All rows but the first wait for as long as there is a gate, so that no test depends on how fast they are."""
-ORDER = """\
-schema: 1
-run:
-  schema: 1
-  given: {{left: {{number: left.txt}}, right: {{number: right.txt}}}}
-  want: [squared, page]
-every: {{stages.add.offset: {offsets}}}
-"""
-PATIENCE = 120.0  # s, for a machine that is busy with other things
-
-
-@pytest.fixture
-def gate(tmp_path) -> Path:
-    """Where a file holds all rows but the first."""
-    return tmp_path / "gate"
-
-
-@pytest.fixture
-def client(tmp_path, gate, monkeypatch) -> Callable[..., subprocess.Popen[str]]:
-    """Start `vto batch` on the toy tables, with a row for each offset from 1."""
-    monkeypatch.chdir(tmp_path)
-    Path("left.txt").write_text("3")
-    Path("right.txt").write_text("4")
-
-    def start(rows: int, *arguments: str) -> subprocess.Popen[str]:
-        Path("order.yaml").write_text(ORDER.format(offsets=list(range(1, rows + 1))))
-        row = HELD.format(gate=str(gate)) + ROW
-        command = [sys.executable, "-c", CLIENT.format(row=row), "batch", "order.yaml", "-o", "out", *arguments]
-        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-
-    return start
-
-
-Cluster = tuple[str, list[subprocess.Popen[bytes]]]
-
-
-@pytest.fixture
-def new_cluster(tmp_path) -> Iterator[Callable[[], Cluster]]:
-    """Start a scheduler and two workers, each in a folder of its own, as on two machines: address and processes."""
-    module, started = [sys.executable, "-m"], list[subprocess.Popen[bytes]]()
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-
-    def start(*arguments: str, cwd: Path) -> subprocess.Popen[bytes]:
-        started.append(subprocess.Popen([*module, *arguments, "--no-dashboard"], cwd=cwd, **quiet))
-        return started[-1]
-
-    def new() -> Cluster:
-        for process in started[:-3]:  # those before the last cluster; what is left of that may still be at work
-            process.kill()
-        base = tmp_path / f"cluster{len(started)}"
-        (base / "one").mkdir(parents=True)
-        (base / "other").mkdir()
-        file = str(base / "scheduler.json")
-        processes = [start("distributed.cli.dask_scheduler", "--port", "0", "--scheduler-file", file, cwd=base)]
-        options = ["distributed.cli.dask_worker", "--scheduler-file", file, "--nthreads", "1"]
-        processes += [start(*options, cwd=base / name) for name in ("one", "other")]
-        wait(lambda: Path(file).is_file() and Path(file).read_text().endswith("}"))
-        return json.loads(Path(file).read_text())["address"], processes
-
-    yield new
-    for process in reversed(started):
-        process.terminate()
-    for process in reversed(started):
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(PATIENCE / 4)
-        process.kill()
-        process.wait(PATIENCE)
-
-
-@pytest.fixture
-def cluster(new_cluster) -> Cluster:
-    """One of them."""
-    return new_cluster()
-
-
-def wait(ready: Callable[[], object]) -> None:
-    """Wait until something is so."""
-    began = time.monotonic()
-    while not ready():
-        assert time.monotonic() - began < PATIENCE
-        time.sleep(0.05)
-
-
-def done() -> list[str]:
-    rows = read_ledger(Path("out"))["rows"] if Path("out", LEDGER).is_file() else []
-    return [row["name"] for row in rows if row["status"] == "done"]
+from batch_processes import PATIENCE, done, expected, squares, wait, workers
 
 
 def results() -> dict[Path, int]:
     """The finished results, by the number that a folder keeps for life."""
     return {path.parent: path.parent.stat().st_ino for path in Path("out/cache").glob("*/*/manifest.json")}
-
-
-def squares(rows: int) -> list[str]:
-    digits = len(str(rows))  # names are padded, so that they sort
-    names = [f"row_{offset:0{digits}d}" for offset in range(1, rows + 1)]
-    return [Path(f"out/rows/{name}/out/squared.txt").read_text() for name in names]
-
-
-def expected(rows: int) -> list[str]:
-    return [str((2 * 3 + 2 * 4 + offset) ** 2) for offset in range(1, rows + 1)]
-
-
-def workers(process: subprocess.Popen[str]) -> list[psutil.Process]:
-    with suppress(psutil.NoSuchProcess):
-        return [child for child in psutil.Process(process.pid).children() if "spawn_main" in " ".join(child.cmdline())]
-    return []
-
-
-def at_work(machines: list[subprocess.Popen[bytes]]) -> list[psutil.Process]:
-    """The workers on some machines that run a row."""
-    found = []
-    for worker in [one for machine in machines for one in workers(machine)]:
-        with suppress(psutil.NoSuchProcess):
-            found += [worker] if worker.children() else []
-    return found
 
 
 @pytest.mark.parametrize(("rows", "kills"), [(4, 2), pytest.param(9, 40, marks=pytest.mark.slow)])
@@ -183,68 +52,6 @@ def test_kills_of_workers_and_clients_lose_nothing(client, rows, kills):
         assert batch.returncode in (-signal.SIGKILL, 6), said
     assert killed
     assert squares(rows) == expected(rows)
-
-
-def contents(batch: str) -> dict[str, bytes]:
-    """All files that rows made but their pages, which tell what came from the cache."""
-    files = sorted(path for path in Path(batch).glob("rows/*/out/*") if path.name != "page.json")
-    return {str(path.relative_to(batch)): path.read_bytes() for path in files}
-
-
-@pytest.mark.slow
-def test_random_kills_of_every_part_change_no_bit(client, new_cluster):
-    """The same command at once after each end, whatever is still at work; VTO_KILLS=65 is 50, 10 and 5 in 21 rows.
-
-    All strike while rows are at work. Where all rows are done before all kills, another batch begins.
-    """
-    kills = int(os.environ.get("VTO_KILLS", "13"))
-    rows, chance = max(6, kills // 3), random.Random(11)
-    count = {"client": max(1, 10 * kills // 65), "scheduler": max(1, 5 * kills // 65)}
-    plan = ["client"] * count["client"] + ["scheduler"] * count["scheduler"]
-    plan += ["worker"] * (kills - len(plan))
-    chance.shuffle(plan)
-    victims, began, batches = iter(plan), time.monotonic(), 0
-    next_victim, left = next(victims, None), kills
-    address, processes = new_cluster()
-    while True:
-        batch = client(rows, "--scheduler", address)
-        batches += 1
-        while batch.poll() is None:
-            time.sleep(chance.uniform(0.0, 2.0))
-            if any(machine.poll() is not None for machine in processes[1:]):  # a worker killed while it starts takes
-                processes[0].kill()  # its machine along: begin with new ones
-                batch.wait(PATIENCE)
-                address, processes = new_cluster()
-            busy = at_work(processes[1:])
-            if next_victim is None or not busy:
-                continue
-            with suppress(psutil.NoSuchProcess):
-                if next_victim == "worker":
-                    chance.choice(busy).kill()
-                else:
-                    (batch if next_victim == "client" else processes[0]).kill()
-                if next_victim == "scheduler":
-                    batch.wait(PATIENCE)
-                    address, processes = new_cluster()
-                next_victim = next(victims, None)
-                left -= 1
-        said = batch.communicate()[0]
-        logging.info("ended with %d, %d rows done; %d kills left", batch.returncode, len(done()), left)
-        refused = batch.returncode == 2 and "no scheduler answers" in said  # it died while it was called
-        assert refused or batch.returncode in (0, 6, -signal.SIGKILL), said
-        assert "Traceback" not in said
-        if batch.returncode == 0 and next_victim is None:
-            break
-        if batch.returncode == 0:
-            assert squares(rows) == expected(rows)
-            shutil.rmtree("out")
-    assert squares(rows) == expected(rows)
-    whole = client(rows, "-o", "whole", "--workers", "2")
-    said = whole.communicate()[0]
-    assert whole.returncode == 0, said
-    assert contents("out") == contents("whole")
-    seconds = time.monotonic() - began
-    logging.info("%d rows, %d kills (%s), the command %d times, %.0f s", rows, len(plan), count, batches, seconds)
 
 
 def test_a_scheduler_that_dies_while_a_result_is_on_its_way_is_told(cluster, tmp_path, monkeypatch):

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 
 import pytest
-from test_batch_killed import CLIENT, HELD, ORDER, ROW, expected
+from batch_processes import CLIENT, HELD, ORDER, ROW, expected
 
 pytest.importorskip("distributed")
 

@@ -40,6 +40,7 @@ def test_there_are_many_of_every_command():
     )
 
 
+@pytest.mark.bad_file
 @pytest.mark.parametrize("name", CASES)
 def test_it_is_refused_in_words(name, inputs, monkeypatch, capfd):
     monkeypatch.chdir(inputs)

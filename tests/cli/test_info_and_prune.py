@@ -9,6 +9,7 @@ import pytest
 import trimesh
 
 from vto_pipeline.cli.describe import DESCRIPTIONS
+from vto_pipeline.pipeline.batch.ledger import Ledger
 
 
 def test_a_mesh_is_described_in_metres(vto):
@@ -44,6 +45,12 @@ def test_a_run_is_described_by_its_record(vto):
     assert "stages: 7 ran" in said.out
     assert vto("run", "toy.yaml", "--set", "add.fail=true").code == 4
     assert "FAILED in add" in vto("info", "runs/toy").out
+
+
+def test_a_batch_is_described_by_its_rows(vto, tmp_path):
+    Ledger(tmp_path / "november", ["a", "b"]).save()
+    assert vto("info", "november").out == vto("status", "november").out
+    assert vto("info", "november", "--json").data["counts"] == {"waiting": 2}
 
 
 def test_prune_keeps_what_the_latest_run_used(vto):

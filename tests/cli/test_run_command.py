@@ -158,6 +158,8 @@ def test_plan_knows_what_is_stored_and_what_the_rest_took(vto):
     assert added == pytest.approx(max(took["add"], 1e-3))  # clocks tell milliseconds apart: none is forecast shorter
     lines = vto("plan", "toy.yaml", "-o", "elsewhere").out
     assert "their time is not known" in lines
+    Path("toy.yaml").write_text(Path("toy.yaml").read_text().replace(", label, page", ""))
+    assert "nothing to run: all results are stored" in vto("plan", "toy.yaml").out
     assert not CALLS
 
 

@@ -92,6 +92,17 @@ def test_pieces_that_share_only_a_vertex_are_two():
     assert topology.face_components(mesh)[0] == 2
 
 
+def test_areas_are_those_of_boxes_and_they_follow_the_scale():
+    vertices = np.array([[x, y, z] for x in (0.0, 2.0) for y in (0.0, 3.0) for z in (0.0, 5.0)])
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    box = TriangleMesh(vertices, [face for a, b, c, d in sides for face in ((a, b, c), (a, c, d))])
+    assert topology.surface_area(box) == 2.0 * (2 * 3 + 3 * 5 + 2 * 5)
+    assert sorted(topology.face_areas(box)) == sorted(4 * [3.0] + 4 * [7.5] + 4 * [5.0])
+    turn = np.linalg.qr(np.random.default_rng(4).normal(size=(3, 3)))[0]
+    turned = TriangleMesh(0.7 * box.vertices @ turn, box.faces)
+    assert_allclose(topology.surface_area(turned), 0.49 * 62.0, rtol=1e-14)  # rounding
+
+
 def test_two_balls_as_one_mesh_are_two_pieces_with_their_areas():
     small, large = shapes.sphere(4), shapes.sphere(4)
     large = TriangleMesh(3.0 * large.vertices, large.faces)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import shlex
 import shutil
 import subprocess
@@ -256,11 +257,15 @@ def test_the_ledger_knows_what_is_done(tmp_path: Path) -> None:
     again = Ledger(tmp_path, ["a", "b", "c"])
     assert [again.is_done(name, "k") for name in ("a", "b", "c")] == [True, False, False]
     assert not again.is_done("a", "another")
-    assert again.expected_seconds("a") == 2.5
-    assert again.expected_seconds("c") == float("inf")
-    assert read_ledger(tmp_path)["counts"] == {"done": 1, "waiting": 1}
+    assert [again.expected_seconds("a", key, None) for key in ("k", "another")] == [2.5, 2.5]
+    assert [again.expected_seconds("a", key, 9.0) for key in ("k", "another")] == [2.5, 9.0]  # as early as before
+    assert again.expected_seconds("a", "k", 1.0) == 1.0
+    assert (again.expected_seconds("c", "k", None), again.expected_seconds("c", "k", 3.0)) == (math.inf, 3.0)
+    again.enter(RowResult("b", "k", "lost", -9, 0.0, 0.0, 1), "")
+    assert again.expected_seconds("b", "k", None) == math.inf  # 0 s would make it the last to begin
+    assert read_ledger(tmp_path)["counts"] == {"done": 1, "lost": 1, "waiting": 1}
     shutil.rmtree(tmp_path / "rows" / "a")  # by hand
-    assert read_ledger(tmp_path)["counts"] == {"waiting": 2}
+    assert read_ledger(tmp_path)["counts"] == {"lost": 1, "waiting": 2}
     assert not Ledger(tmp_path, ["a"]).is_done("a", "k")
     assert (tmp_path / "batch.csv").read_text().splitlines()[1] == "a,done,0,,2.5,90.0,1,fits,,,"
     (tmp_path / LEDGER).write_text('{"rows": [{}]}')

@@ -17,7 +17,7 @@ from vto_pipeline.report.batch.page import build_batch_page
 PROBLEMS = {
     "b": ("failed", 4, "200 pairs of triangles of garment and body still cross, near (-0.17, 1.18)"),
     "c": ("failed", 4, "31 pairs of triangles of garment and body still cross, near (0.2, 1.3)"),
-    "d": ("refused", 3, "no such file: d.ply"),
+    "d": ("refused", 3, "vertex 0 is (nan, 0, 0): 1 of 3 vertices are not finite (/orders/d.ply)"),
     "e": ("too large", -15, "it needs more than 6000 MB of memory"),
 }
 
@@ -39,9 +39,12 @@ def entered(tmp_path: Path) -> Path:
 def test_failures_that_differ_in_numbers_only_are_of_one_kind(entered: Path) -> None:
     found = read_ledger(entered)["failures"]
     assert [(one["count"], one["rows"]) for one in found] == [(2, ["b", "c"]), (1, ["e"]), (1, ["d"])]
-    assert found[0]["kind"] == "exit 4: # pairs of triangles of garment"
-    assert found[2]["kind"] == "exit 3: no such file"
+    assert found[0]["kind"] == "exit 4: # pairs of triangles of garment and body"
+    assert found[2]["kind"] == "exit 3: vertex # is: # of # vertices"
     assert failure_kind({"status": "done", "problem": ""}) == ""
+    unknown = {"status": "refused", "exit_code": 2, "problem": "unknown fabric 'silk': allowed: denim, wool"}
+    assert failure_kind(unknown) == "exit 2: unknown fabric: allowed: denim, wool"
+    assert failure_kind({"status": "lost", "exit_code": -9, "problem": ""}) == "exit -9: lost"
 
 
 def test_every_format_has_the_same_fields(entered: Path) -> None:

@@ -65,6 +65,8 @@ def plan_lines(request: Request, plan: Plan, expected: Mapping[str, Expected], v
 def _total(expected: Mapping[str, Expected]) -> str:
     """Return how long the rest takes, as far as that is known, in words."""
     rest = [one for one in expected.values() if not one.stored]
+    if not rest:
+        return "nothing to run: all results are stored"
     known = [one.seconds for one in rest if one.seconds is not None]
     unknown = len(rest) - len(known)
     if not known:

@@ -16,7 +16,7 @@ from vto_pipeline.garment.robust_icp import MannequinAlignment, robust_icp, scal
 from vto_pipeline.garment.scale_search import scaled_starts
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import face_area_vectors, face_normals
+from vto_pipeline.geometry.topology import face_normals, surface_area
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.camera import CameraSet
 from vto_pipeline.model.job import Job
@@ -267,7 +267,7 @@ def _uncertainty(placed: MannequinAlignment, surface: TriangleMesh, samples: int
     lever = 0.5 * placed.scale * float(np.ptp(surface.vertices, axis=0).max())
     turns, shifts = [1.0 / lever] * 3, [1.0] * 3
     unit = np.array([*turns, *shifts, 1.0 / lever][: len(placed.normal_matrix)])
-    area = placed.scale**2 * float(np.linalg.norm(face_area_vectors(surface), axis=1).sum())
+    area = placed.scale**2 * surface_area(surface)
     independent = min(area / samples / SPACING**2, 1.0)  # samples closer than the noise's reach do not add up
     information = placed.normal_matrix * np.outer(unit, unit) * independent
     weakest = float(np.linalg.eigvalsh(information)[0])

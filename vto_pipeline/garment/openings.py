@@ -23,7 +23,7 @@ from vto_pipeline.geometry.remeshing.holes import fill_holes
 from vto_pipeline.geometry.remeshing.remesh import edge_lengths
 from vto_pipeline.geometry.remeshing.repair import RepairConfig, repair
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import face_area_vectors, face_components
+from vto_pipeline.geometry.topology import face_areas, face_components, surface_area
 from vto_pipeline.model.garment import Opening
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -119,7 +119,7 @@ def close_scan_holes(
         filled, observed = lifted.after, ~lifted.filled
         if config.keep is None:
             check_lifted(lifted, distance, bare)
-        job.measure(lifted_cm2=1e4 * _area(filled, np.asarray(lifted.moved[filled.faces].any(axis=1))))
+        job.measure(lifted_cm2=1e4 * float(face_areas(filled)[lifted.moved[filled.faces].any(axis=1)].sum()))
     final = fair_rims(filled, config.fair_mm * 1e-3)
     if face_components(final)[0] != 1:
         raise GarmentError(f"the garment fell apart into {face_components(final)[0]} pieces")
@@ -131,13 +131,13 @@ def close_scan_holes(
         scanned |= observed[final.faces].all(axis=1) & ~before[final.faces].all(axis=1)
     found = list_openings(final)
     check_wearable(final, found)
-    seen = _area(final, scanned) / _area(final)
+    seen = float(face_areas(final)[scanned].sum()) / surface_area(final)
     job.measure(
         openings=len(found),
         filled_holes=len(shapes) - count,
         filled_notches=notches,
         perimeters_mm=[round(opening.perimeter * 1e3, 1) for opening in found],
-        trimmed_cm2=(_area(shell) - _area(clean)) * 1e4,
+        trimmed_cm2=(surface_area(shell) - surface_area(clean)) * 1e4,
         unobserved_share=1.0 - seen,
     )
     _check_seen(seen, final, config, job)
@@ -264,7 +264,3 @@ def _listing(shapes: list[LoopShape], real: list[bool]) -> str:
         f"({shape.center[0]:.2f}, {shape.center[1]:.2f}, {shape.center[2]:.2f}) m"
         for shape, is_opening in zip(shapes, real, strict=True)
     )
-
-
-def _area(mesh: TriangleMesh, which: NDArray[np.bool_] | slice = slice(None)) -> float:
-    return float(np.linalg.norm(face_area_vectors(mesh)[which], axis=1).sum())

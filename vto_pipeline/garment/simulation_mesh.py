@@ -19,10 +19,10 @@ from vto_pipeline.geometry.topology import (
     boundary_walks,
     component_areas,
     concatenate,
-    face_area_vectors,
     face_components,
     half_edges,
     submesh,
+    surface_area,
 )
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -182,7 +182,7 @@ def _without_pinholes(piece: TriangleMesh, edge: float, job: Job) -> TriangleMes
 def _width(piece: TriangleMesh) -> float:
     """Return how wide a strap of the same area and perimeter would be [m]; infinite without a border."""
     around = sum(perimeter(piece, loop) for loop in boundary_loops(piece))
-    area = float(np.linalg.norm(face_area_vectors(piece), axis=1).sum())
+    area = surface_area(piece)
     return 2.0 * area / around if around > 0.0 else np.inf
 
 

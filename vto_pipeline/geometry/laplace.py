@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix, diags
 from scipy.sparse.linalg import spsolve
 
-from vto_pipeline.geometry.topology import edge_face_counts, face_area_vectors
+from vto_pipeline.geometry.topology import edge_face_counts, face_areas
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -30,7 +30,7 @@ def laplacian(mesh: TriangleMesh) -> tuple[csr_matrix, FloatArray]:
     graph = coo_matrix((np.concatenate([half, half]), (np.concatenate([i, j]), np.concatenate([j, i]))), (count, count))
     graph = graph.tocsr()
     matrix = csr_matrix(diags(np.asarray(graph.sum(axis=1)).reshape(-1)) - graph)
-    third = np.linalg.norm(face_area_vectors(mesh), axis=1) / 3.0
+    third = face_areas(mesh) / 3.0
     area = np.bincount(mesh.faces.reshape(-1), np.repeat(third, 3), count)
     return matrix, np.maximum(area, 1e-3 * area.mean())
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vto_pipeline.geometry.topology import face_area_vectors, face_normals
+from vto_pipeline.geometry.topology import face_areas, face_normals
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -23,7 +23,7 @@ def sample_surface(mesh: TriangleMesh, count: int, seed: int) -> tuple[FloatArra
         Points (count, 3), unit normals (count, 3), faces (count,).
     """
     rng = np.random.default_rng(seed)
-    cumulative = np.cumsum(np.linalg.norm(face_area_vectors(mesh), axis=1))
+    cumulative = np.cumsum(face_areas(mesh))
     at = (np.arange(count) + rng.random(count)) / count * cumulative[-1]
     face = np.minimum(np.searchsorted(cumulative, at), len(mesh.faces) - 1)
     root, second = np.sqrt(rng.random(count)), rng.random(count)

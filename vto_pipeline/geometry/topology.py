@@ -171,8 +171,17 @@ def concatenate(meshes: Sequence[TriangleMesh]) -> TriangleMesh:
 def component_areas(mesh: TriangleMesh) -> tuple[IntArray, FloatArray]:
     """Return the piece of each face, as `face_components`, shape (F,), and the area of each piece [m²], shape (P,)."""
     count, piece = face_components(mesh)
-    area = np.linalg.norm(face_area_vectors(mesh), axis=1)
-    return piece, np.asarray(np.bincount(piece, area, count), dtype=np.float64)
+    return piece, np.asarray(np.bincount(piece, face_areas(mesh), count), dtype=np.float64)
+
+
+def surface_area(mesh: TriangleMesh) -> float:
+    """Return the area of all faces together [m²]."""
+    return float(face_areas(mesh).sum())
+
+
+def face_areas(mesh: TriangleMesh) -> FloatArray:
+    """Return the area of each face [m²], shape (F,)."""
+    return np.asarray(np.linalg.norm(face_area_vectors(mesh), axis=1))
 
 
 def face_area_vectors(mesh: TriangleMesh) -> FloatArray:

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
-from vto_pipeline.geometry.topology import edge_face_counts, face_area_vectors, face_components
+from vto_pipeline.geometry.topology import edge_face_counts, face_components, surface_area
 from vto_pipeline.model.mesh import TriangleMesh
 
 
@@ -20,7 +18,7 @@ def surface_facts(mesh: TriangleMesh) -> dict[str, Any]:
         "vertices": len(mesh.vertices),
         "triangles": len(mesh.faces),
         "size_m": [float(side) for side in mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)],
-        "area_m2": float(np.linalg.norm(face_area_vectors(mesh), axis=1).sum()),
+        "area_m2": surface_area(mesh),
         "pieces": face_components(mesh)[0],
         "closed": bool((faces != 1).all()),
         "edges_of_more_than_two_faces": int((faces > 2).sum()),

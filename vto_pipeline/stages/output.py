@@ -15,7 +15,7 @@ from vto_pipeline.cloth.judge.worn import vertex_maps
 from vto_pipeline.cloth.rest_shape.edge_length_embedding import lengths_in_space
 from vto_pipeline.geometry.remeshing.seams import cut_open
 from vto_pipeline.geometry.rigid import transform_mesh
-from vto_pipeline.geometry.topology import face_area_vectors
+from vto_pipeline.geometry.topology import face_areas
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
@@ -93,7 +93,7 @@ def _observed_share(inputs: Inputs) -> float | None:
     if "observed" not in inputs or "garment" not in inputs:
         return None
     garment: TriangleMesh = inputs["garment"]
-    area = np.linalg.norm(face_area_vectors(garment), axis=1)
+    area = face_areas(garment)
     return float(area[inputs["observed"][garment.faces].all(axis=1)].sum() / area.sum())
 
 

@@ -13,7 +13,7 @@ from vto_pipeline.avatar.template.template import JOINT_KINDS
 from vto_pipeline.errors import AvatarError
 from vto_pipeline.geometry.closest import closest_points
 from vto_pipeline.geometry.sampling import sample_surface
-from vto_pipeline.geometry.topology import edge_face_counts, face_area_vectors
+from vto_pipeline.geometry.topology import edge_face_counts, face_areas, surface_area
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Measurements
 from vto_pipeline.model.job import Job
@@ -59,11 +59,11 @@ def refuse_non_body(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray,
             hint="the scan must show the trunk from all sides, in metres, +Y up, its normals outwards",
         )
     body = TriangleMesh(vertices, space.base.faces)
-    each = _POINTS / np.linalg.norm(face_area_vectors(scan), axis=1).sum()  # points for an area
+    each = _POINTS / surface_area(scan)  # points for an area
     for limb, own in _limbs(space).items():
         whole: NDArray[np.bool_] = np.all(own[body.faces], axis=1)
         stray = whole[face] & (distance > EXPLAINED_M)
-        expected = each * np.linalg.norm(face_area_vectors(body)[whole], axis=1).sum()
+        expected = each * face_areas(body)[whole].sum()
         # what encloses a volume faces away from its middle
         outward = ((points[stray] - points[stray].mean(axis=0)) * normals[stray]).sum() if stray.any() else 0.0
         if stray.sum() > _STRAY * expected and outward < 0:

@@ -12,7 +12,7 @@ from vto_pipeline.bench.collision.penetration import penetration
 from vto_pipeline.bench.measures import edge_strain
 from vto_pipeline.cloth.judge.crossings import self_crossings
 from vto_pipeline.cloth.simulation import AnyCollider, Trajectory, simulate
-from vto_pipeline.geometry.topology import face_area_vectors
+from vto_pipeline.geometry.topology import face_areas
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.mesh import TriangleMesh
@@ -72,7 +72,7 @@ def contact_errors(scene: ContactScene, ended: Trajectory) -> dict[str, Value]:
     x = ended.positions
     mesh = TriangleMesh(x, scene.mesh.faces)
     strain = edge_strain(x, scene.rest, mesh.faces)
-    area = np.linalg.norm(face_area_vectors(TriangleMesh(scene.rest, mesh.faces)), axis=1)
+    area = face_areas(TriangleMesh(scene.rest, mesh.faces))
     mass = scene.fabric.areal_density * np.bincount(scene.mesh.faces.ravel(), np.repeat(area / 3.0, 3), len(x))
     moving = mass.copy()
     moving[list(scene.pinned)] = 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 LONGEST = 25
 """Words in a sentence."""
@@ -57,14 +58,32 @@ def count_words(text: str) -> int:
 def typed_figures(template: str) -> list[Fault]:
     """Return the figures with a unit, or with an exponent, in a page's source that no results file stands behind.
 
-    What was chosen rather than measured, such as a setting or a size, is written `chosen("2 s")` in a template.
+    What was chosen rather than measured, such as a setting or a size, is written `chosen("2 s")` in a template. Numbers
+    that the template itself holds and shows count too, with a unit or without.
     """
-    found = []
-    for blank in (_FENCE, _COMMENT, _TEMPLATE, _CODE):
+    found = [Fault(line, f"typed by hand: {value}") for line, value in _shown_constants(template)]
+    template = _FENCE.sub(_remarks, template)
+    for blank in (_COMMENT, _TEMPLATE, _CODE):
         template = blank.sub(_emptied, template)
     for number, line in enumerate(template.splitlines(), start=1):
         found += [Fault(number, f"typed by hand: {hit[0]}") for hit in _FIGURE.finditer(line)]
     return found
+
+
+def _shown_constants(template: str) -> Iterator[tuple[int, Any]]:
+    """Yield line and value of what is shown, or kept to be shown, and stands in the template: not what asks for it."""
+    from jinja2 import Environment, nodes
+
+    tree = Environment().parse(template)
+    roots: list[nodes.Node] = [one.node for one in tree.find_all(nodes.Assign)]
+    for root in [*roots, *(node for shown in tree.find_all(nodes.Output) for node in shown.nodes)]:
+        waiting = [root]
+        while waiting:
+            node = waiting.pop()
+            if isinstance(node, nodes.Const) and re.search(r"\d", str(node.value)):
+                yield node.lineno, node.value
+            if not isinstance(node, nodes.Call | nodes.Getitem):
+                waiting += node.iter_child_nodes()
 
 
 def _paragraphs(text: str) -> Iterator[tuple[int, str]]:
@@ -85,6 +104,11 @@ def _paragraphs(text: str) -> Iterator[tuple[int, str]]:
         if not kept:
             begun = number
         kept.append(line[starts.end() :] if starts else line.strip())
+
+
+def _remarks(block: re.Match[str]) -> str:
+    """Return as many lines, with what stands behind a # only: commands hold numbers, remarks may hold figures."""
+    return "\n".join(line.partition("#")[2] for line in block[0].split("\n"))
 
 
 def _emptied(hit: re.Match[str]) -> str:

@@ -16,7 +16,7 @@ from vto_pipeline.bench.drape.case import DrapeCase, findings
 from vto_pipeline.bench.samples.garments.wearer import Wearer
 from vto_pipeline.bench.timing import Timing, timed
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import boundary_loops, face_area_vectors
+from vto_pipeline.geometry.topology import boundary_loops, surface_area
 from vto_pipeline.model.cloth import Draped
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -68,7 +68,7 @@ def figures(garment: TriangleMesh, rest: TriangleMesh, wearer: Wearer) -> dict[s
 def _case(vertices: int) -> DrapeCase:
     """Return the garment with about this many vertices: V equilateral triangles' corners cover V √3/2 l²."""
     probe = DrapeCase(*_GARMENT, edge_mm=_PROBE_MM).made().mesh
-    area = float(np.linalg.norm(face_area_vectors(probe), axis=1).sum())
+    area = surface_area(probe)
     return DrapeCase(*_GARMENT, edge_mm=round(1e3 * float(np.sqrt(area / (vertices * np.sqrt(0.75)))), 2))
 
 

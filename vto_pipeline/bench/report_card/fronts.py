@@ -1,8 +1,9 @@
 """Error against run time: the points of a bench that nothing beats, and how far today's default is from them.
 
-A point is on the Pareto front if no other is both faster and more exact. How far a point is from it is one number: the
-factor by which both its time and its error would have to shrink until nothing beats it (the multiplicative epsilon
-indicator; Zitzler, Thiele, Laumanns, Fonseca & Grunert da Fonseca 2003).
+A point is on the Pareto front if no other is both faster and more exact. How far a point is from it is two numbers:
+its error against the least in its time, and its time against the least at its error. Neither follows from the other:
+where the error has stopped to fall, a point of four times the time errs as little. Times, and errors, less than 10 %
+apart count as the same, since a clock and a last digit would otherwise decide which point beats which.
 
 The truth's own row tells how far it is known, or what the cloth does in truth: at rest it is stretched by its weight.
 An error below that is as good as that one.
@@ -19,7 +20,7 @@ from typing import Any
 from vto_pipeline.bench.bench import Row
 
 NEAR = 1.1
-"""As near to the front as a default has to be."""
+"""As near to the front as a default has to be, and as near as what counts as the same."""
 
 Default = Callable[[Row], bool]
 Entry = dict[str, Any]
@@ -52,20 +53,23 @@ def fronts(module: str, rows: Iterable[Row], quick: bool) -> list[Entry] | str:
 
     Returns:
         A front for each scene and error: {"scene", "error", "front" (labels, the fastest first), "default" (its label),
-        "factor" and "verdict"}; the last three are None, None and words where the default was not measured.
+        "error_factor", "time_factor" and "verdict"}; None without a measured default, or where infinite.
     """
     trade: Trade | str = import_module(module).TRADE
     return trade if isinstance(trade, str) else list(_fronts(trade, list(rows), quick))
 
 
-def distance(time: float, error: float, points: Iterable[tuple[float, float]]) -> float:
-    """Return the factor by which time and error of a point would have to shrink until no other point beats it; 1 on it.
+def distances(time: float, error: float, points: Iterable[tuple[float, float]]) -> tuple[float, float]:
+    """Return by which factors the error of a point is above the least in its time, and its time the least at its error.
 
     Args:
         time, error: Of the point.
-        points: Times and errors of the others; it may be among them.
+        points: Times and errors of all, itself among them.
     """
-    return max([1.0, *(min(_ratio(time, t), _ratio(error, e)) for t, e in points if t < time or e < error)])
+    every = list(points)
+    least_error = min(e for t, e in every if t <= NEAR * time)
+    least_time = min(t for t, e in every if e <= NEAR * error)
+    return _ratio(error, least_error), _ratio(time, least_time)
 
 
 def _fronts(trade: Trade, rows: Sequence[Row], quick: bool) -> Iterator[Entry]:
@@ -86,23 +90,33 @@ def _fronts(trade: Trade, rows: Sequence[Row], quick: bool) -> Iterator[Entry]:
             entry: Entry = {"scene": scene, "error": error, "front": [_label(trade, row) for row in front]}
             chosen = [(row, value) for row, value in points if is_default(row)]
             if not chosen:
-                yield {**entry, "default": None, "factor": None, "verdict": "the default was not measured"}
+                nothing = {"default": None, "error_factor": None, "time_factor": None}
+                yield {**entry, **nothing, "verdict": "the default was not measured"}
                 continue
             row, value = chosen[0]
-            factor = 1.0 if row in front else distance(row.seconds, value, values)
+            more_error, more_time = distances(row.seconds, value, values)
             yield {
                 **entry,
                 "default": _label(trade, row),
-                "factor": round(factor, 3),
-                "verdict": _verdict(row in front, factor),
+                "error_factor": _rounded(more_error),
+                "time_factor": _rounded(more_time),
+                "verdict": _verdict(row in front, more_error, more_time),
             }
 
 
-def _verdict(on_front: bool, factor: float) -> str:
-    if on_front:
-        return "on the front"
-    off = f"{100.0 * (factor - 1.0):.0f} % off"
-    return f"within {100.0 * (NEAR - 1.0):.0f} % of the front: {off}" if factor <= NEAR else f"{off} the front"
+def _verdict(on_front: bool, more_error: float, more_time: float) -> str:
+    off = []
+    if more_error > NEAR:
+        off.append(f"{more_error:.2g} times the least error in its time")
+    if more_time > NEAR:
+        off.append(f"{more_time:.2g} times the least time at its error")
+    near = "on the front" if on_front else f"within {100.0 * (NEAR - 1.0):.0f} % of the front"
+    return ", ".join(off) or near
+
+
+def _rounded(factor: float) -> float | None:
+    """Return a factor for JSON, which has nothing for what is infinite."""
+    return round(factor, 3) if math.isfinite(factor) else None
 
 
 def _by_scene(trade: Trade, rows: Iterable[Row]) -> dict[str, list[Row]]:
@@ -135,4 +149,4 @@ def _beats(one: tuple[float, float], other: tuple[float, float]) -> bool:
 
 
 def _ratio(value: float, other: float) -> float:
-    return value / other if other > 0.0 else math.inf
+    return 1.0 if value == other else value / other if other > 0.0 else math.inf

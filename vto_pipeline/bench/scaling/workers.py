@@ -1,4 +1,9 @@
-"""`python -m vto_pipeline.bench.scaling.workers` runs garments x customers as a batch, with more and more workers."""
+"""`python -m vto_pipeline.bench.scaling.workers` runs garments x customers as a batch, with more and more workers.
+
+Processor time tells where the wall time went that more workers did not save. If the same rows cost more of it, their
+processes slow each other down: that is the machine. `busy` is the processor time in units of the wall time of all
+workers: beyond 1 it is the batch's own process, which then shares the workers' cores, and below 1 a worker waited.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +26,7 @@ _COARSE = {"simulation_mesh": {"edge_mm": 30.0}, "drape": {"target_error_mm": 5.
 _DRESSED, _BARE = ["draped", "fit_report", "page"], ["avatar", "page"]
 _FABRIC = "cotton_poplin"
 _LIMIT = 24 * 3600.0  # s
-_COLUMNS = ("workers", "rows", "done", "failed", "seconds", "share_of_first", "made")
+_COLUMNS = ("workers", "rows", "done", "failed", "seconds", "share_of_first", "cpu_seconds", "busy", "made")
 
 
 def order(garments: Sequence[Path], bodies: Sequence[Path], measurements: Sequence[Path]) -> dict[str, object]:
@@ -73,6 +78,8 @@ def rows(document: Mapping[str, object], counts: Sequence[int], folder: Path) ->
             "failed": sum(states.values()) - states.get("done", 0),
             "seconds": ended.seconds,
             "share_of_first": ended.seconds / first,
+            "cpu_seconds": ended.cpu_seconds,
+            "busy": ended.cpu_seconds / (count * ended.seconds),
             "made": ", ".join(f"{stage} {number}" for stage, number in sorted(made.items())),
         }
 

@@ -21,6 +21,7 @@ from vto_pipeline.bench.unsewn.scans import draped_truth, scanned
 from vto_pipeline.errors import InputError
 from vto_pipeline.garment.unsewn.recover import recover
 from vto_pipeline.garment.unsewn.unsew import Unsewn
+from vto_pipeline.geometry.topology import surface_area
 from vto_pipeline.io.fabrics import read_fabric
 from vto_pipeline.io.meshes import read_mesh, write_ply
 from vto_pipeline.io.patterns.panels_obj import write_panels_obj
@@ -76,9 +77,8 @@ def _true_panels(path: Path) -> TriangleMesh:
     mesh = read_mesh(path)
     if mesh.texture is None:
         raise InputError("no texture coordinates, so no true panels", where=str(path))
-    area = np.linalg.norm(np.cross(*np.swapaxes(np.diff(mesh.vertices[mesh.faces], axis=1), 0, 1)), axis=1).sum()
-    flat = np.abs(np.linalg.det(mesh.texture[:, 1:] - mesh.texture[:, :1])).sum()
-    unit = min(LENGTH_M.values(), key=lambda scale: abs(np.log(np.sqrt(area / flat) / scale)))
+    flat = 0.5 * np.abs(np.linalg.det(mesh.texture[:, 1:] - mesh.texture[:, :1])).sum()
+    unit = min(LENGTH_M.values(), key=lambda scale: abs(np.log(np.sqrt(surface_area(mesh) / flat) / scale)))
     return TriangleMesh(mesh.vertices, mesh.faces, texture=unit * mesh.texture)
 
 

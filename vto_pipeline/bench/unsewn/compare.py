@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from vto_pipeline.garment.unsewn.cut import Piece, Run, cut_apart, runs, seams_of_charts
 from vto_pipeline.garment.unsewn.unsew import Unsewn
 from vto_pipeline.geometry.closest import barycentric, closest_points
-from vto_pipeline.geometry.topology import face_area_vectors
+from vto_pipeline.geometry.topology import face_areas
 from vto_pipeline.io.patterns.loops import edges_area, edges_points
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
@@ -56,7 +56,7 @@ def compare(found: Unsewn, truth: TriangleMesh) -> list[PanelErrors]:
     assert found.mesh.texture is not None
     pieces = cut_apart(truth, seams_of_charts(truth))
     parts = runs(truth, pieces, [np.zeros(len(piece.start), np.bool_) for piece in pieces])
-    area = np.linalg.norm(face_area_vectors(truth), axis=1)
+    area = face_areas(truth)
     owner = np.empty(len(truth.faces), np.int64)
     for number, piece in enumerate(pieces):
         owner[piece.face] = number

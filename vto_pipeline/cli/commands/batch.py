@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from vto_pipeline.cli.options import PATH, force_option, log_option, message_options, quiet_option
+from vto_pipeline.cli.options import PATH, Quantity, force_option, log_option, message_options, quiet_option
 from vto_pipeline.cli.session import Session, pass_session
 from vto_pipeline.errors import BatchError, VtoError
+from vto_pipeline.units import MEMORY_B, TIME_S
 
 if TYPE_CHECKING:
     from vto_pipeline.pipeline.batch.ledger import Ledger
@@ -33,8 +34,8 @@ PROGRAM = (sys.executable, "-c", "import sys; from vto_pipeline.cli.main import 
 @click.option("-o", "--output", type=PATH, metavar="BATCH", help="Folder of the batch. [default: runs/NAME]")
 @click.option("--workers", type=click.IntRange(1, 1000), help="Rows at once. [default: one a core, as memory allows]")
 @click.option("--scheduler", metavar="ADDRESS", help="Of a dask scheduler; its workers see the same folders.")
-@click.option("--memory", type=click.FloatRange(0.1, 4096), default=6.0, show_default=True, help="Limit of a row [GB].")
-@click.option("--time-limit", type=click.FloatRange(1), default=3600.0, show_default=True, help="Limit of a row [s].")
+@click.option("--memory", type=Quantity(MEMORY_B), default="6GB", show_default=True, help="Limit of a row.")
+@click.option("--time-limit", type=Quantity(TIME_S), default="1h", show_default=True, help="Limit of a row.")
 @click.option("--retries", type=click.IntRange(0, 10), default=1, show_default=True, help="After a crash of a row.")
 @click.option(
     "--root",
@@ -99,7 +100,7 @@ def batch_command(
         ledger = Ledger(folder, names)
         publisher = Publisher(folder, publish) if publish else None
         missing = [one for one in planned if not ledger.is_done(one.row.name, one.key)]
-        expected = {one.row.name: _expected(one, ledger) for one in missing}
+        expected = {one.row.name: ledger.expected_seconds(one.row.name, one.key, one.seconds) for one in missing}
         missing.sort(key=lambda one: -expected[one.row.name])  # the longest first; stable
         if len(missing) < len(rows):
             session.say(f"{len(rows) - len(missing)} of {len(rows)} rows are done and unchanged")
@@ -110,8 +111,8 @@ def batch_command(
             publisher.put([LEDGER])  # before hours of work: whether it can be written to
         try:
             missing = list(_finish_stored(session, missing, folder, store, force_all, ledger))
-            count = workers or default_workers(1e3 * memory)
-            limits = {"seconds": time_limit, "memory_mb": 1e3 * memory, "retries": retries}
+            count = workers or default_workers(memory / 1e6)
+            limits = {"seconds": time_limit, "memory_mb": memory / 1e6, "retries": retries}
             tasks = [_task(one, folder, force_all, count, limits) for one in missing]
             results = run_rows(tasks, count, scheduler, folder / "workers", session.say) if tasks else ()
             left = TimeLeft({task.name: expected[task.name] for task in tasks}, count)
@@ -146,11 +147,6 @@ def _publish_row(session: Session, publisher: Publisher, row: Mapping[str, Any])
         publisher.put_row(row)
     except VtoError as error:
         session.say(f"{row['name']} is not published yet: {error.problem}")
-
-
-def _expected(one: PlannedRow, ledger: Ledger) -> float:
-    """Return the time that a row will take [s]; infinite where nothing like it was run."""
-    return ledger.expected_seconds(one.row.name) if one.seconds is None else one.seconds
 
 
 def _finish_stored(

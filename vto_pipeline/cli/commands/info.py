@@ -22,14 +22,19 @@ def info_command(session: Session, path: Path) -> None:
     vto info runs/demo
     vto info shirt.obj
     """
+    from vto_pipeline.cli.commands.status import status_command
     from vto_pipeline.cli.describe import DESCRIPTIONS
     from vto_pipeline.cli.results import outcome_lines, result_lines
     from vto_pipeline.cli.tables import table_lines
     from vto_pipeline.io.sniff import find_kind
     from vto_pipeline.model.job import Job
+    from vto_pipeline.pipeline.batch.ledger import LEDGER
     from vto_pipeline.pipeline.execution.folder import is_run
     from vto_pipeline.stages.entry.outcome import open_run
 
+    if (path / LEDGER).is_file():
+        click.get_current_context().invoke(status_command, batch=path)
+        return
     if path.is_dir() and is_run(path):
         outcome = open_run(path)
         failed = [

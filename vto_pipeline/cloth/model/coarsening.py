@@ -11,7 +11,7 @@ from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.remeshing.flat_faces import carry_flat_faces
 from vto_pipeline.geometry.remeshing.remesh import RemeshConfig, remesh
 from vto_pipeline.geometry.riding.binding import Binding, apply, bind
-from vto_pipeline.geometry.topology import face_area_vectors
+from vto_pipeline.geometry.topology import surface_area
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.garment import Garment
 from vto_pipeline.model.job import Job
@@ -52,7 +52,7 @@ def coarsen(fine: Garment, vertices: int) -> CoarseGarment:
         InputError: as `remesh`, or edges would be too long or too short for it; GarmentError: as `remesh`.
     """
     laid = TriangleMesh(fine.rest.positions, fine.mesh.faces)
-    area = float(np.linalg.norm(face_area_vectors(laid), axis=1).sum())
+    area = surface_area(laid)
     edge = np.sqrt(area / (vertices * np.sqrt(0.75)))  # V corners of equilateral triangles cover V √3/2 l²
     if not _SHORTEST <= edge <= _LONGEST:
         raise InputError(f"edges would be {1e3 * edge:.3g} mm")

@@ -13,7 +13,7 @@ from scipy.sparse.linalg import splu
 
 from vto_pipeline.geometry.laplace import laplacian
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import face_area_vectors, face_normals
+from vto_pipeline.geometry.topology import face_areas, face_normals
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -49,7 +49,7 @@ def _vertex_gradients(source: TriangleMesh, target: TriangleMesh) -> FloatArray:
     The normal of a triangle grows as the root of its area, so that a limb that becomes thicker does so in both ways.
     """
     was, now = (_edges_and_normal(mesh) for mesh in (source, target))
-    area = np.linalg.norm(face_area_vectors(source), axis=1)
+    area = face_areas(source)
     sound = area > 1e-4 * np.median(area)  # a sliver does not tell how it was stretched
     of_face = np.zeros((len(source.faces), 3, 3))
     of_face[sound] = now[sound] @ np.linalg.inv(was[sound])
@@ -67,7 +67,7 @@ def _vertex_gradients(source: TriangleMesh, target: TriangleMesh) -> FloatArray:
 def _edges_and_normal(mesh: TriangleMesh) -> FloatArray:
     """Return two edges and the normal with the length of the root of the area, as columns, shape (F, 3, 3)."""
     corners = mesh.vertices[mesh.faces]
-    root = np.sqrt(np.linalg.norm(face_area_vectors(mesh), axis=1))[:, None]
+    root = np.sqrt(face_areas(mesh))[:, None]
     return np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], root * face_normals(mesh)], axis=2)
 
 

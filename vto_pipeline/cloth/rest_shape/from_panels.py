@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from vto_pipeline.geometry.remeshing.flat_faces import carry_flat_faces, panel_of_faces
-from vto_pipeline.geometry.topology import face_area_vectors, laid_edge_lengths
+from vto_pipeline.geometry.topology import face_areas, laid_edge_lengths
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -64,7 +64,7 @@ def find_panels(garment: TriangleMesh) -> Panels:
         garment: With texture coordinates [m].
     """
     assert garment.texture is not None
-    area = np.linalg.norm(face_area_vectors(garment), axis=1)
+    area = face_areas(garment)
     flat = 0.5 * np.abs(np.linalg.det(garment.texture[:, 1:] - garment.texture[:, :1]))
     sound = (area > _FLAT * area.mean()) & (flat > _FLAT * flat.mean())
     if not sound.any():

@@ -28,7 +28,7 @@ from vto_pipeline.cloth.untangle.rows import SeparationRows, concatenate_rows
 from vto_pipeline.cloth.untangle.smooth import smoothed
 from vto_pipeline.geometry.intersections import intersecting_faces, self_intersections
 from vto_pipeline.geometry.laplace import laplacian
-from vto_pipeline.geometry.topology import face_area_vectors
+from vto_pipeline.geometry.topology import surface_area
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -145,7 +145,7 @@ class _UntangleProblem:
         self._bars = length_bounds(start, rest)
         self._laplacian, area = laplacian(start)
         self._sheet = mesh_graph(self._features.edges, area)
-        self._area = _area(start)
+        self._area = surface_area(start)
         self._body = body
         self._walls = None if body is None else OutermostFaces(body)
         self._thickness = thickness
@@ -205,7 +205,7 @@ class _UntangleProblem:
 
     def area_growth(self, positions: FloatArray) -> float:
         """Return by how much the area has grown, relative."""
-        return _area(self._mesh(positions)) / self._area - 1.0
+        return surface_area(self._mesh(positions)) / self._area - 1.0
 
     def _separation_rows(self, tangle: _Crossing, pushed: np.ndarray) -> list[SeparationRows]:
         """Return the rows that keep things apart that are, and lead out of the body."""
@@ -231,7 +231,3 @@ class _UntangleProblem:
 
     def _mesh(self, positions: FloatArray) -> TriangleMesh:
         return TriangleMesh(positions, self._faces)
-
-
-def _area(mesh: TriangleMesh) -> float:
-    return float(np.linalg.norm(face_area_vectors(mesh), axis=1).sum())

@@ -12,7 +12,7 @@ from vto_pipeline.garment.align import PosedPhotos
 from vto_pipeline.garment.color_model import color_evidence
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.geometry.seen.depth_picture import depth_picture
-from vto_pipeline.geometry.topology import face_area_vectors, submesh
+from vto_pipeline.geometry.topology import submesh, surface_area
 from vto_pipeline.io.captures.images import read_image
 from vto_pipeline.io.captures.undistort import undistorted
 from vto_pipeline.model.arrays import ByteArray, FloatArray
@@ -75,7 +75,7 @@ def look_at_mannequin(
     Returns:
         What they show; None where cloth and mannequin hardly differ in colour, or too little of either shows.
     """
-    area = float(np.linalg.norm(face_area_vectors(mannequin), axis=1).sum())
+    area = surface_area(mannequin)
     count = max(int(area / SPACING**2), 1)
     points, normals, _ = sample_surface(mannequin, count, job.seed)
     seen_cloth, _ = submesh(garment, np.all(observed[garment.faces], axis=1))

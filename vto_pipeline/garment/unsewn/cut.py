@@ -11,7 +11,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from vto_pipeline.errors import GarmentError
-from vto_pipeline.geometry.topology import boundary_walks, face_area_vectors, opposite_half_edges
+from vto_pipeline.geometry.topology import boundary_walks, opposite_half_edges, surface_area
 from vto_pipeline.model.arrays import IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -150,7 +150,7 @@ def _linked(one: NDArray[np.integer], other: NDArray[np.integer], count: int) ->
 
 
 def _no_disc(mesh: TriangleMesh, openings: int, number: int) -> GarmentError:
-    middle, area = mesh.vertices.mean(axis=0), np.linalg.norm(face_area_vectors(mesh), axis=1).sum()
+    middle, area = mesh.vertices.mean(axis=0), surface_area(mesh)
     x, y, z = middle
     place = f"piece {number} around ({x:.2f}, {y:.2f}, {z:.2f}) m, {1e4 * area:.0f} cm²"
     problem = f"{place}, has {openings} rims, where a piece that can be laid flat has one"

@@ -14,7 +14,7 @@ from scipy.sparse import coo_array, csc_array, eye_array
 from scipy.sparse.linalg import factorized, splu
 
 from vto_pipeline.errors import GarmentError
-from vto_pipeline.geometry.topology import boundary_loops, edges, face_area_vectors
+from vto_pipeline.geometry.topology import boundary_loops, edges, face_areas
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.mesh import TriangleMesh
@@ -126,7 +126,7 @@ def _upright(mesh: TriangleMesh, flat: FloatArray, warp: FloatArray) -> FloatArr
     sides = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
     laid = flat[mesh.faces]
     in_plane = np.swapaxes(laid[:, 1:] - laid[:, :1], 1, 2) @ np.linalg.pinv(sides) @ warp[:, :, None]
-    area = np.linalg.norm(face_area_vectors(mesh), axis=1)
+    area = face_areas(mesh)
     mean = (area[:, None] * in_plane[:, :, 0]).sum(axis=0) / area.sum()
     if np.linalg.norm(mean) < _UPRIGHT:
         middle = laid.mean(axis=1)
@@ -169,7 +169,7 @@ class _Energy:
     def __init__(self, mesh: TriangleMesh, own: FloatArray, fabric: Fabric) -> None:
         faces, count = mesh.faces, len(mesh.vertices)
         self._faces = faces
-        area = np.linalg.norm(face_area_vectors(mesh), axis=1)
+        area = face_areas(mesh)
         self._root = np.sqrt(area)[:, None, None] * _root_of_stiffness(fabric)
         inverse = np.linalg.inv(own)
         self._share = np.concatenate([-inverse.sum(axis=1)[:, None], inverse], axis=1)

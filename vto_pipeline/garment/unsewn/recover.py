@@ -18,7 +18,7 @@ from vto_pipeline.garment.unsewn.rims import rims_of
 from vto_pipeline.garment.unsewn.trace import trace
 from vto_pipeline.garment.unsewn.unsew import Unsewn, unsew
 from vto_pipeline.geometry.remeshing.repair import RepairConfig, is_manifold, is_oriented, repair
-from vto_pipeline.geometry.topology import boundary_loops, face_area_vectors
+from vto_pipeline.geometry.topology import boundary_loops, face_areas
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.job import Job
@@ -109,7 +109,7 @@ def _sound(mesh: TriangleMesh, job: Job) -> TriangleMesh:
 def _true_to_scale(mesh: TriangleMesh) -> FloatArray | None:
     """Return the texture coordinates in metres, shape (F, 3, 2), if in some unit they are as large as the cloth."""
     assert mesh.texture is not None
-    area = np.linalg.norm(face_area_vectors(mesh), axis=1)
+    area = face_areas(mesh)
     flat = 0.5 * np.abs(np.linalg.det(mesh.texture[:, 1:] - mesh.texture[:, :1]))
     if not (flat > 0.0).all():
         return None

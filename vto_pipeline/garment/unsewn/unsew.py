@@ -13,7 +13,7 @@ from vto_pipeline.garment.unsewn.flatten import flat_areas, flatten, stretches
 from vto_pipeline.garment.unsewn.names import panel_names
 from vto_pipeline.garment.unsewn.outline import crosses_itself, sharp_corners, smoothed
 from vto_pipeline.garment.unsewn.rims import Rims
-from vto_pipeline.geometry.topology import edges, face_area_vectors
+from vto_pipeline.geometry.topology import edges, face_areas
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.job import Job
@@ -145,7 +145,7 @@ def _side_by_side(flat: Sequence[FloatArray]) -> list[FloatArray]:
 
 
 def _figures(panel: Panel, piece: Piece, flat: FloatArray) -> FlatPiece:
-    area = np.linalg.norm(face_area_vectors(piece.mesh), axis=1)
+    area = face_areas(piece.mesh)
     off = np.abs(stretches(piece.mesh, flat) - 1.0).max(axis=1)
     middle, most = (float(np.quantile(off, q, weights=area, method="inverted_cdf")) for q in (0.5, 0.95))
     a, b = edges(piece.mesh).T

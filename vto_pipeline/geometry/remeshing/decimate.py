@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from vto_pipeline.geometry.topology import face_area_vectors, submesh
+from vto_pipeline.geometry.topology import submesh, surface_area
 from vto_pipeline.model.mesh import TriangleMesh
 
 
@@ -34,5 +34,5 @@ def decimate(mesh: TriangleMesh, triangles: int, *, aggressiveness: float = 7.0)
 
 def faces_at(mesh: TriangleMesh, edge: float) -> int:
     """Return how many equilateral triangles of an edge length [m] cover the mesh's area."""
-    area = float(np.linalg.norm(face_area_vectors(mesh), axis=1).sum())
+    area = surface_area(mesh)
     return int(np.ceil(area / (np.sqrt(3.0) / 4.0 * edge**2)))

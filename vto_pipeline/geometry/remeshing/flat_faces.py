@@ -17,7 +17,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import face_area_vectors
+from vto_pipeline.geometry.topology import face_areas
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -59,7 +59,7 @@ def carry_flat_faces(source: TriangleMesh, laid: FloatArray, mesh: TriangleMesh)
     Returns:
         Corners in the plane [m], shape (G, 3, 2).
     """
-    area = np.linalg.norm(face_area_vectors(source), axis=1)
+    area = face_areas(source)
     turn = np.linalg.det(_edges(laid))
     sound = (area > _FLAT * area.mean()) & (np.abs(turn) > _FLAT * np.abs(turn).mean())
     source, turn = TriangleMesh(source.vertices, source.faces[sound]), turn[sound]

@@ -19,7 +19,7 @@ from vto_pipeline.geometry.remeshing.refine import refine
 from vto_pipeline.geometry.remeshing.remesh import edge_lengths
 from vto_pipeline.geometry.remeshing.repair import is_manifold
 from vto_pipeline.geometry.remeshing.triangulate import triangulate_loop
-from vto_pipeline.geometry.topology import edges, face_area_vectors, face_normals, half_edges, submesh
+from vto_pipeline.geometry.topology import edges, face_normals, half_edges, submesh, surface_area
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -107,7 +107,7 @@ def _sew_in(mesh: TriangleMesh, rims: list[Rim]) -> TriangleMesh:
 def _edge_inside(patch: TriangleMesh) -> float:
     """Return the edge length wanted in a patch [m]: its rim's, or what makes no more than so many triangles."""
     rim = np.linalg.norm(patch.vertices - np.roll(patch.vertices, -1, axis=0), axis=1)
-    area = np.linalg.norm(face_area_vectors(patch), axis=1).sum()
+    area = surface_area(patch)
     return float(max(rim.mean(), np.sqrt(area / MOST_FACES * 4.0 / np.sqrt(3.0))))
 
 

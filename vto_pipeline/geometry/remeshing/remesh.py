@@ -21,9 +21,10 @@ from vto_pipeline.geometry.topology import (
     boundary_loops,
     edge_faces,
     edges,
-    face_area_vectors,
+    face_areas,
     face_components,
     submesh,
+    surface_area,
     vertex_normals,
 )
 from vto_pipeline.model.arrays import FloatArray, IntArray
@@ -175,7 +176,7 @@ def _majority(mesh: TriangleMesh, vote: NDArray[np.bool_], on_rim: NDArray[np.bo
     count = len(mesh.faces)
     graph = coo_matrix((np.ones(int(inner.sum()), np.int8), (beside[inner, 0], beside[inner, 1])), (count, count))
     patches, patch = connected_components(graph, directed=False)
-    area = np.linalg.norm(face_area_vectors(mesh), axis=1)
+    area = face_areas(mesh)
     return (np.bincount(patch, np.where(vote, area, -area), patches) > 0.0)[patch]
 
 
@@ -215,9 +216,5 @@ def _measure(before: TriangleMesh, after: TriangleMesh, rim_change: float, job: 
         hausdorff_mm=float(max(there.max(), back.max()) * 1e3),
         deviation_rms_mm=float(np.sqrt(np.mean(there**2)) * 1e3),
         opening_change=rim_change,
-        area_change=_area(after) / _area(before) - 1.0,
+        area_change=surface_area(after) / surface_area(before) - 1.0,
     )
-
-
-def _area(mesh: TriangleMesh) -> float:
-    return float(np.linalg.norm(face_area_vectors(mesh), axis=1).sum())

@@ -7,6 +7,7 @@ rarely that a row costs the same in a batch of any size.
 from __future__ import annotations
 
 import json
+import math
 import time
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
@@ -48,9 +49,19 @@ class Ledger:
         row = self.rows[name]
         return bool(row["status"] == "done" and row["key"] == key)
 
-    def expected_seconds(self, name: str) -> float:
-        """Return how long a row took before [s]; infinite where it was never run."""
-        return float(self.rows[name].get("seconds", float("inf")))
+    def expected_seconds(self, name: str, key: str, forecast: float | None) -> float:
+        """Return how long a row will take [s]; infinite where nothing tells.
+
+        Args:
+            name: Of the row.
+            key: Of its result. What failed early will fail as early again.
+            forecast: By rows that are like it [s]; None where there are none.
+        """
+        row = self.rows[name]
+        before = float(row["seconds"]) if row.get("exit_code", -1) >= 0 else math.inf  # not where it was killed
+        if forecast is None:
+            return before
+        return min(forecast, before) if row["key"] == key else forecast
 
     def wait(self, name: str) -> None:
         """Note that a row is still to be run."""

@@ -25,7 +25,9 @@ COLUMNS = {
 }
 """Of batch.csv and batch.parquet, with the names of their types; batch.json has more."""
 
-_FIRST_WORDS = 6
+_FIRST_WORDS = 8
+_OF_THE_ROW = re.compile(r"\([^()]*\)|'[^']*'|\"[^\"]*\"")
+"""Places and names in a message, which differ from row to row."""
 
 
 def failure_kind(row: Mapping[str, Any]) -> str:
@@ -36,9 +38,9 @@ def failure_kind(row: Mapping[str, Any]) -> str:
     """
     if row["status"] in ("done", "waiting"):
         return ""
-    reason = re.split(r"[:;,(\"']", row["problem"], maxsplit=1)[0] or row["status"]
-    words = [re.sub(r"\d+(\.\d+)?", "#", word) for word in reason.split()]
-    return f"exit {row.get('exit_code', '?')}: {' '.join(words[:_FIRST_WORDS])}"
+    reason = re.sub(r"\d+(\.\d+)?", "#", _OF_THE_ROW.sub(" ", row["problem"])) or row["status"]
+    words = " ".join(reason.split()[:_FIRST_WORDS])
+    return f"exit {row.get('exit_code', '?')}: {re.sub(r' (?=[:;,.])', '', words).strip(':;,. ')}"
 
 
 def failures(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:

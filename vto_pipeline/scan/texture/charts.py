@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vto_pipeline.geometry.topology import face_area_vectors
+from vto_pipeline.geometry.topology import surface_area
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.numerics.rasterise import rasterise
@@ -56,7 +56,7 @@ def unwrap(mesh: TriangleMesh, texel: float, largest: int) -> tuple[FloatArray, 
     """
     import xatlas
 
-    area = float(np.linalg.norm(face_area_vectors(mesh), axis=1).sum())
+    area = surface_area(mesh)
     texel = max(texel, float(np.sqrt(area / CROWDED)) / largest)
     atlas = xatlas.Atlas()
     atlas.add_mesh(mesh.vertices.astype(np.float32), mesh.faces.astype(np.uint32))
