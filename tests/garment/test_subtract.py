@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.openings import OpeningsConfig, close_scan_holes
-from vto_pipeline.garment.subtract import SubtractConfig, extract_garment, label_garment
+from vto_pipeline.garment.subtraction.subtract import SubtractConfig, extract_garment, label_garment
 from vto_pipeline.geometry.remeshing.repair import is_manifold
 from vto_pipeline.geometry.rigid import transform_mesh
 from vto_pipeline.geometry.signed_distance import SurfaceDistance

@@ -22,7 +22,7 @@ from vto_pipeline.bench.physics.cantilever import (
     refinements,
 )
 from vto_pipeline.bench.physics.closed_forms import cantilever_modes, hanging_sheet_modes
-from vto_pipeline.bench.physics.meshes import strip
+from vto_pipeline.cloth.swatch.meshes import strip
 from vto_pipeline.bench.physics.refinement import RefinementCase, refined
 from vto_pipeline.cloth.collision.contacts import empty_contacts
 from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
