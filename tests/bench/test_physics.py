@@ -11,10 +11,10 @@ from vto_pipeline.bench.physics.closed_forms import cantilever_modes, lateral_bu
 from vto_pipeline.bench.physics.cusick import fold_count
 from vto_pipeline.bench.physics.elastica import cantilever
 from vto_pipeline.bench.physics.hanging import hanging_rows
-from vto_pipeline.cloth.swatch.disc import DrapeTest, drape_coefficient
-from vto_pipeline.cloth.swatch.meshes import disc, strip
 from vto_pipeline.bench.physics.modes import bending_frequencies
 from vto_pipeline.cloth.rest.equilibrium import equilibrium
+from vto_pipeline.cloth.swatch.disc import DrapeTest, drape_coefficient
+from vto_pipeline.cloth.swatch.meshes import disc, strip
 from vto_pipeline.units import GRAVITY
 
 

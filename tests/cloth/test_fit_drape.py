@@ -1,4 +1,4 @@
-"""Rigidity from a drape coefficient: the reading backwards against a line that is known, and discs against themselves."""
+"""Rigidity from a drape coefficient: read backwards from a line that is known, and from discs of real fabrics."""
 
 from __future__ import annotations
 

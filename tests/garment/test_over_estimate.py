@@ -42,9 +42,10 @@ def iou(found, true):
 
 def dyed(scene, placed, cloth, form, noise=1.5):
     """The scan in two plain colours, each under light that halves from top to bottom."""
-    colors = np.where(scene.is_shirt[:, None], cloth, form) * np.linspace(0.5, 1.0, 64)[
-        np.clip((64 * placed.vertices[:, 1]).astype(int), 0, 63), None
-    ]
+    colors = (
+        np.where(scene.is_shirt[:, None], cloth, form)
+        * np.linspace(0.5, 1.0, 64)[np.clip((64 * placed.vertices[:, 1]).astype(int), 0, 63), None]
+    )
     colors = colors + np.random.default_rng(1).normal(0.0, noise, colors.shape)
     return TriangleMesh(placed.vertices, placed.faces, np.clip(colors, 0, 255).astype(np.uint8))
 

@@ -14,7 +14,7 @@ SIZE = 700
 
 
 def picture(path, radius=180.0, waves=0.15, dark=True, tilt=1.0, slope=0.0, at=(350.0, 340.0), noise=4.0, hole=False):
-    """A thing whose rim is radius (1 + waves cos 5φ), seen askew by `tilt`; its area is π radius² (1 + waves²/2) tilt."""
+    """A thing whose rim is radius (1 + waves cos 5φ), seen askew: its area is π radius² (1 + waves²/2) tilt."""
     y, x = np.mgrid[0:SIZE, 0:SIZE].astype(float)
     dx, dy = x - at[0], (y - at[1]) / tilt
     inside = np.hypot(dx, dy) < radius * (1.0 + waves * np.cos(5.0 * np.arctan2(dy, dx)))

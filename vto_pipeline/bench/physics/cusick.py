@@ -15,12 +15,12 @@ import numpy as np
 
 from vto_pipeline.bench.bench import Measured, Row, Value, Watch
 from vto_pipeline.bench.physics.cantilever import MESHES
-from vto_pipeline.cloth.swatch.disc import DrapeTest, Specimen, at_minimum, drape_coefficient, specimen
-from vto_pipeline.cloth.swatch.meshes import MeshKind
 from vto_pipeline.bench.timing import Timing, clocked
 from vto_pipeline.cloth.collision.contacts import empty_contacts
 from vto_pipeline.cloth.model.build import at_rest
 from vto_pipeline.cloth.solvers import SOLVERS
+from vto_pipeline.cloth.swatch.disc import DrapeTest, Specimen, at_minimum, drape_coefficient, specimen
+from vto_pipeline.cloth.swatch.meshes import MeshKind
 from vto_pipeline.errors import DivergedError
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import Fabric

@@ -41,12 +41,7 @@ def scanned_profile(points: FloatArray) -> FloatArray:
             hint="cut the strip out of the scan, with +Y up and in metres",
         )
     ahead, across = _along_and_across(centred, float(found.x))
-    return np.array(
-        [
-            (0.5 * (a.mean() + b.mean()), 0.5 * (b.mean() - a.mean()))
-            for a, b in _parts(ahead, across)
-        ]
-    )
+    return np.array([(0.5 * (a.mean() + b.mean()), 0.5 * (b.mean() - a.mean())) for a, b in _parts(ahead, across)])
 
 
 def _along_and_across(points: FloatArray, turn: float) -> tuple[FloatArray, FloatArray]:

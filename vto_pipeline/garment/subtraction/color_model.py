@@ -50,7 +50,7 @@ def color_overlap(
 ) -> float:
     """Return how alike the colours of two sets of vertices are: 0 where they share none, 1 where they are the same.
 
-    Bhattacharyya's coefficient of the histograms of `color_evidence`, whose arguments these are; 1 where a set is empty.
+    Bhattacharyya's coefficient of the histograms of `color_evidence`, with its arguments; 1 where a set is empty.
     """
     if not one.any() or not other.any():
         return 1.0

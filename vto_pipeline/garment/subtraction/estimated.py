@@ -80,7 +80,7 @@ def label_over_estimate(
     job.measure(colors_alike=alike, garment_share=float(garment.mean()))
     if alike > ALIKE:
         raise GarmentError(
-            f"cloth and mannequin have nearly the same colours: they overlap by {alike:.0%}; at most {ALIKE:.0%} can be "
+            f"cloth and mannequin have nearly the same colours: they overlap by {alike:.0%}; at most {ALIKE:.0%} is "
             "told apart",
             hint=_HINT,
         )
@@ -97,4 +97,3 @@ def _distance_evidence(distance: FloatArray) -> FloatArray:
     bare = np.square(distance / SIGMA)
     cloth = np.square(np.minimum(distance / SIGMA, 0.0))
     return np.clip(0.5 * (bare - cloth) - np.log(LOOSE / SIGMA), -CERTAIN, CERTAIN)
-

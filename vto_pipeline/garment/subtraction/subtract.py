@@ -6,10 +6,10 @@ import numpy as np
 from pydantic import Field
 
 from vto_pipeline.errors import GarmentError
+from vto_pipeline.garment.robust_icp import scan_noise
 from vto_pipeline.garment.subtraction.color_model import cielab, color_evidence
 from vto_pipeline.garment.subtraction.floor import not_worn
 from vto_pipeline.garment.subtraction.graph_cut import minimum_cut
-from vto_pipeline.garment.robust_icp import scan_noise
 from vto_pipeline.geometry.remeshing.clip import clip_to_positive
 from vto_pipeline.geometry.remeshing.repair import RepairConfig, repair
 from vto_pipeline.geometry.signed_distance import SurfaceDistance

@@ -38,7 +38,7 @@ def read_shadow_area(path: Path) -> float:
     count, _, figures, _ = cv2.connectedComponentsWithStats(thing.astype(np.uint8), connectivity=4)
     areas = figures[1:, cv2.CC_STAT_AREA]
     if count < 2 or areas.max() < _LEAST_PX:
-        raise InputError(f"no shadow of {_LEAST_PX} pixels or more", where=str(path), hint="take a larger picture of it")
+        raise InputError(f"no shadow of {_LEAST_PX} pixels or more", where=str(path), hint="take it larger")
     largest = int(np.argmax(areas))
     others = np.delete(areas, largest)
     if others.max(initial=0) > _OTHER * areas[largest]:

@@ -93,7 +93,8 @@ def _read(strip: str) -> Strip:
 
     mark = next((mark for mark in _FACES if strip.endswith(mark)), "")
     path = strip.removesuffix(mark)
-    points = scanned_profile(read_cloud(Path(path)).points) if Path(path).suffix.lower() in PARSERS else read_strip_profile(Path(path))
+    scanned = Path(path).suffix.lower() in PARSERS
+    points = scanned_profile(read_cloud(Path(path)).points) if scanned else read_strip_profile(Path(path))
     return Strip(points, _FACES.get(mark, 1), path)
 
 
