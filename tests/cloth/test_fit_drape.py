@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from vto_pipeline.bench.physics.cusick import MEASURED
 from vto_pipeline.cloth.swatch.disc import DrapeTest, at_minimum, drape_coefficient, specimen
 from vto_pipeline.cloth.swatch.fit_drape import fit_drape, read_backwards
-from vto_pipeline.errors import InputError
+from vto_pipeline.errors import ComputationError, InputError
 from vto_pipeline.model.job import Job
 
 TRUTH, SLOPE, SPREAD = np.log(5e-6), 0.22, 0.04
@@ -52,6 +52,16 @@ def test_a_coefficient_that_does_not_change_tells_nothing():
     rng = np.random.default_rng(1)
     with pytest.raises(InputError, match="hardly changes"):
         read_backwards(0.5, 1, TRUTH, lambda x, seed: 0.5 + 0.05 * rng.normal(), Job())
+
+
+def test_drapes_that_find_no_rest_are_left_out():
+    """Every fourth of them: the line is where it was; and where none comes to rest, that is said."""
+    found = read_backwards(
+        0.5, 1, TRUTH + 0.5, lambda x, seed: np.nan if seed % 4 == 1 else 0.5 + SLOPE * (x - TRUTH), Job()
+    )
+    assert_allclose(found.rigidity, np.exp(TRUTH), rtol=1e-9)  # no scatter: rounding
+    with pytest.raises(ComputationError, match="0 of 4 simulated drapes"):
+        read_backwards(0.5, 1, TRUTH, lambda x, seed: np.nan, Job())
 
 
 @pytest.mark.parametrize(("share", "size"), [(0.12, "24 cm"), (0.97, "36 cm")])

@@ -52,7 +52,7 @@ def test_the_rigidity_is_that_of_the_cloth():
 
 def test_what_is_no_strip_is_refused():
     rng = np.random.default_rng(0)
-    with pytest.raises(InputError, match="no strip that is straight"):
+    with pytest.raises(InputError, match="not a strip that is straight"):
         scanned_profile(rng.normal(0.0, 0.05, (5000, 3)))
     with pytest.raises(InputError, match="expected 500"):
         scanned_profile(rng.normal(0.0, 0.05, (40, 3)))

@@ -1,4 +1,4 @@
-"""A mannequin that nobody scanned bare: estimated inside the scan of what it wears, from what is known of it."""
+"""A mannequin that was never scanned bare: estimated inside the scan of what it wears, from what is known of it."""
 
 from __future__ import annotations
 

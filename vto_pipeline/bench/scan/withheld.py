@@ -68,7 +68,7 @@ def true_garment(surface: TriangleMesh, garment: TriangleMesh, form: TriangleMes
 
 def largest_piece(surface: TriangleMesh, garment: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return which vertices belong to the largest piece of what is labelled garment, the one that is kept."""
-    part, source = submesh(surface, garment[surface.faces].all(axis=1))
+    part, source = submesh(surface, np.asarray(garment[surface.faces].all(axis=1)))
     piece, area = component_areas(part)
     kept = np.zeros(len(surface.vertices), dtype=bool)
     kept[source[part.faces[piece == int(np.argmax(area))].ravel()]] = True
@@ -103,7 +103,7 @@ def withheld_row(capture: Path, run: Path, known: str, sex: str) -> dict[str, Va
         "missed": float(area[true & ~found].sum()) / whole,
         "false": float(area[found & ~true].sum()) / whole,
         "cpu_s": time.process_time() - began,
-        **{name: job.metrics.get(name) for name in ("bare_ends_share", "colors_alike")},  # type: ignore[dict-item]
+        **{name: float(str(job.metrics[name])) for name in ("bare_ends_share", "colors_alike") if name in job.metrics},
     }
 
 
@@ -111,11 +111,11 @@ def _labels(
     surface: TriangleMesh, placed: TriangleMesh, form: TriangleMesh, known: str, sex: str, job: Job
 ) -> SurfaceLabels:
     if known == "scan":
-        return label_garment(placed, form, SubtractConfig(), job)
+        return label_garment(placed, form, SubtractConfig.model_validate({}), job)
     values = measure(form).values
     tape = Measurements({name: values[name] for name in KNOWN[known]}, sex=sex)
     body = fit_dressed(surface, tape, ScanConfig(), job)
-    return label_over_estimate(surface, body.mesh, extremity_weights(body), SubtractConfig(), job)
+    return label_over_estimate(surface, body.mesh, extremity_weights(body), SubtractConfig.model_validate({}), job)
 
 
 def main() -> None:

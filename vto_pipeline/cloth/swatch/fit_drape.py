@@ -14,7 +14,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from vto_pipeline.cloth.swatch.disc import DrapeTest, at_minimum, drape_coefficient, specimen
-from vto_pipeline.errors import InputError
+from vto_pipeline.errors import ComputationError, DivergedError, InputError
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.job import Job
@@ -28,6 +28,7 @@ _FALL = (0.72, 22.7, 0.22)  # a first guess: 72 % at Γ = w h³ / B = 22.7, less
 _LEVELS = (-0.6, -0.2, 0.2, 0.6)  # of log B about the guess
 _ROUNDS = 6
 _NEAR = 0.9  # simulations of a log B farther from the guess are left out: the line is one only nearby
+_FEWEST = 3  # drapes at rest that a line goes through
 _STEEP = 3.0  # standard errors
 
 
@@ -81,7 +82,10 @@ def fit_drape(coefficient: float, drapes: int, fabric: Fabric, test: DrapeTest, 
             _EDGE,
             seed=seed,
         )
-        return drape_coefficient(at_minimum(one), one.model.faces, test)
+        try:
+            return drape_coefficient(at_minimum(one), one.model.faces, test)
+        except DivergedError:  # of very limp cloth some discs get caught in a fold that is finer than the mesh
+            return np.nan
 
     return read_backwards(coefficient, drapes, guess, simulate, job)
 
@@ -94,11 +98,12 @@ def read_backwards(
     Args:
         coefficient, drapes: As measured.
         guess: log B to begin at.
-        simulate: Coefficient of a log B and a seed.
+        simulate: Coefficient of a log B and a seed; not a number where no rest was found.
         job: For progress.
 
     Raises:
         InputError: the coefficient does not rise clearly with the rigidity.
+        ComputationError: too few drapes come to rest.
     """
     tried, found = np.empty(0), np.empty(0)
     for turn in range(_ROUNDS):
@@ -106,7 +111,9 @@ def read_backwards(
             job.progress(len(tried) / (_ROUNDS * len(_LEVELS)), f"simulated drape {len(tried) + 1}")
             found = np.append(found, simulate(guess + level, job.seed + len(tried)))
             tried = np.append(tried, guess + level)
-        near = np.abs(tried - guess) < _NEAR
+        near = (np.abs(tried - guess) < _NEAR) & np.isfinite(found)
+        if near.sum() < _FEWEST:
+            raise ComputationError(f"only {near.sum()} of {len(tried)} simulated drapes came to rest")
         slope, at_guess = np.polyfit(tried[near] - guess, found[near], 1)
         step = (coefficient - at_guess) / slope if slope > 0.0 else np.inf
         if turn < _ROUNDS - 1:

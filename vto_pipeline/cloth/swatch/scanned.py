@@ -37,7 +37,7 @@ def scanned_profile(points: FloatArray) -> FloatArray:
     found = minimize_scalar(lambda turn: _thickness(centred, turn), bounds=(best - step, best + step), method="bounded")
     if found.fun > _THICKEST:
         raise InputError(
-            f"the scan is no strip that is straight across: seen along its width, it is {1e3 * found.fun:.1f} mm thick",
+            f"the scan is not a strip that is straight across: seen along it, it is {1e3 * found.fun:.1f} mm thick",
             hint="cut the strip out of the scan, with +Y up and in metres",
         )
     ahead, across = _along_and_across(centred, float(found.x))

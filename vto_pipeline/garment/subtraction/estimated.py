@@ -1,4 +1,4 @@
-"""Label the garment over a mannequin that nobody scanned bare: colour carries what distance cannot.
+"""Label the garment over a mannequin that was never scanned bare: colour carries what distance cannot.
 
 A body fitted into a dressed scan is off by a centimetre or two, more than tight cloth lies above it. It tells where
 head, hands and feet are. What shows there is bare, and teaches the mannequin's colours.
@@ -31,7 +31,7 @@ FOOT = 0.15
 ENOUGH = 0.01
 """Least share of what stands that head, hands and feet must be to teach the mannequin's colours."""
 ALIKE = 0.5
-"""Largest overlap of the colours of head, hands and feet with those of what was found to be cloth: 0.13 at most
+"""Largest overlap of the colours of head, hands and feet with those of what was found to be cloth: 0.35 at most
 where they differ, and 0.99 of white cloth on a white form."""
 BINS, LIGHT = 48, 5.0
 """Of the histograms, and how far lightness is smoothed [bins]: cloth and mannequin may differ by 10 in CIELAB, and what
@@ -80,11 +80,11 @@ def label_over_estimate(
     job.measure(colors_alike=alike, garment_share=float(garment.mean()))
     if alike > ALIKE:
         raise GarmentError(
-            f"cloth and mannequin have nearly the same colours: they overlap by {alike:.0%}; at most {ALIKE:.0%} is "
-            "told apart",
+            f"cloth and mannequin have nearly the same colours: they overlap by {alike:.0%}; at most {ALIKE:.0%} "
+            "is allowed",
             hint=_HINT,
         )
-    job.warn("the mannequin was not scanned bare: cloth and body are told apart by colour")
+    job.warn("the mannequin was not scanned bare: colour parts cloth and body")
     confidence = 1.0 / (1.0 + np.exp(-np.where(garment, evidence, -evidence)))
     return SurfaceLabels(garment, confidence)
 

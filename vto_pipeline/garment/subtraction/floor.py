@@ -23,7 +23,7 @@ def not_worn(surface: TriangleMesh, below: float, sigma: float, job: Job) -> NDA
         surface: The scan, +Y up [m].
         below: Height that the floor is not above [m].
         sigma: Noise of the scan [m].
-        job: Told of both.
+        job: Receives both.
     """
     lying = _lying(surface, job)
     floor = floor_height(surface, below)

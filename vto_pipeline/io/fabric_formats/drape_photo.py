@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,7 +53,7 @@ def read_shadow_area(path: Path) -> float:
     return float(filled.sum())
 
 
-def _check_tones(gray: NDArray[np.uint8], level: float, path: Path) -> None:
+def _check_tones(gray: NDArray[Any], level: float, path: Path) -> None:
     """Refuse a picture that is not of two tones."""
     dark = gray <= level
     share = float(dark.mean())

@@ -17,6 +17,7 @@ from vto_pipeline.bench.physics.cusick import GEOMETRIES, MEASURED
 from vto_pipeline.bench.printed_table import print_table
 from vto_pipeline.cloth.swatch.disc import at_minimum, drape_coefficient, specimen
 from vto_pipeline.cloth.swatch.fit_drape import fit_drape
+from vto_pipeline.errors import DivergedError
 from vto_pipeline.model.job import Job
 
 _HEADS = (
@@ -42,7 +43,10 @@ def row(name: str, geometry: str, drapes: int, edge: float) -> tuple[str, ...]:
     anew = []
     for seed in range(_FRESH, _FRESH + drapes):
         one = specimen(fabric, test, "irregular", edge, seed=seed)
-        anew.append(100.0 * drape_coefficient(at_minimum(one), one.model.faces, test))
+        try:
+            anew.append(100.0 * drape_coefficient(at_minimum(one), one.model.faces, test))
+        except DivergedError as error:
+            sys.stderr.write(f"{name}, seed {seed}: {error}\n")
     low, high = (1e6 * end for end in found.interval)
     figures = (100.0 * real.drape, 1e6 * found.rigidity)
     return (

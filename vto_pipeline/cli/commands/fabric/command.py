@@ -50,9 +50,9 @@ def fabric_command(
 ) -> None:
     """Measure the bending rigidity of a fabric from strips that hang over a table's edge, or from a drape test.
 
-    A profile is a CSV with the header x_mm,y_mm, from the table to the tip, or a scan of the strip alone, +Y up, as PLY
-    or another cloud. Add :down where the face looks down.
-    Repeat --drape or --drape-photo for every time the cloth was draped anew.
+    A profile is a CSV with the header x_mm,y_mm, from the table to the tip. A scan of the strip alone, as PLY with
+    +Y up, serves too. Add :down where the face looks down. Repeat --drape or --drape-photo for every time the cloth
+    was draped anew.
 
     \b
     vto fabric --mass 115 --strip up.csv --strip back.csv:down -o my_fabric.yaml
