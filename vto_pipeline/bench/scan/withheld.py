@@ -98,12 +98,15 @@ def withheld_row(capture: Path, run: Path, known: str, sex: str) -> dict[str, Va
         return row | {"reason": error.problem}
     found = largest_piece(surface, labels.garment)
     whole = float(area[true].sum())
+    said: dict[str, Value] = {
+        name: float(str(job.metrics[name])) for name in ("bare_ends_share", "colors_alike") if name in job.metrics
+    }
     return row | {
         "iou": float(area[found & true].sum() / area[found | true].sum()),
         "missed": float(area[true & ~found].sum()) / whole,
         "false": float(area[found & ~true].sum()) / whole,
         "cpu_s": time.process_time() - began,
-        **{name: float(str(job.metrics[name])) for name in ("bare_ends_share", "colors_alike") if name in job.metrics},
+        **said,
     }
 
 
