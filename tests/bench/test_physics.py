@@ -8,12 +8,13 @@ from vto_pipeline.bench.bench import Watch
 from vto_pipeline.bench.physics.buckling import critical_load
 from vto_pipeline.bench.physics.cantilever import clamped_strip, strip_errors
 from vto_pipeline.bench.physics.closed_forms import cantilever_modes, lateral_buckling
-from vto_pipeline.bench.physics.cusick import drape_coefficient, fold_count
+from vto_pipeline.bench.physics.cusick import fold_count
 from vto_pipeline.bench.physics.elastica import cantilever
 from vto_pipeline.bench.physics.hanging import hanging_rows
-from vto_pipeline.bench.physics.meshes import disc, strip
 from vto_pipeline.bench.physics.modes import bending_frequencies
 from vto_pipeline.cloth.rest.equilibrium import equilibrium
+from vto_pipeline.cloth.swatch.disc import DrapeTest, drape_coefficient
+from vto_pipeline.cloth.swatch.meshes import disc, strip
 from vto_pipeline.units import GRAVITY
 
 
@@ -70,7 +71,7 @@ def test_irregular_meshes_follow_no_direction_and_fill_their_shape():
 def test_drape_coefficient_and_folds_of_known_shapes(kind):
     points, faces = disc(kind, 0.15, 0.01, 0.09)
     flat = np.column_stack([points[:, 0], np.zeros(len(points)), -points[:, 1]])
-    assert_allclose(drape_coefficient(flat, faces, 0.15, 0.09), 1.0, rtol=0, atol=0.01)  # a polygon for a circle
+    assert_allclose(drape_coefficient(flat, faces, DrapeTest()), 1.0, rtol=0, atol=0.01)  # a polygon for a circle
     assert fold_count(flat, flat, 0.15) == 0
     r, angle = np.linalg.norm(points, axis=1), np.arctan2(points[:, 1], points[:, 0])
     shrink = 1.0 - np.clip((r - 0.09) / 0.06, 0, 1) * (0.2 + 0.08 * np.cos(5 * angle))
@@ -78,5 +79,5 @@ def test_drape_coefficient_and_folds_of_known_shapes(kind):
     outline = 0.15 * (0.8 - 0.08 * np.cos(5 * np.linspace(0, 2 * np.pi, 1001)[:-1]))
     shadow = np.pi * np.mean(outline**2)
     wanted = (shadow - np.pi * 0.09**2) / (np.pi * (0.15**2 - 0.09**2))
-    assert_allclose(drape_coefficient(waved, faces, 0.15, 0.09), wanted, rtol=0, atol=0.01)
+    assert_allclose(drape_coefficient(waved, faces, DrapeTest()), wanted, rtol=0, atol=0.01)
     assert fold_count(waved, flat, 0.15) == 5

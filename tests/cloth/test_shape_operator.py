@@ -6,9 +6,9 @@ from cloth_scenes import fabric, tube
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from vto_pipeline.bench.physics.meshes import strip
 from vto_pipeline.cloth.constraints.bending.shape_operator import shape_operator
 from vto_pipeline.cloth.constraints.sweep import add_forces, linearised
+from vto_pipeline.cloth.swatch.meshes import strip
 from vto_pipeline.errors import InputError
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import RestShape

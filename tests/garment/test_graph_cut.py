@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from vto_pipeline.garment.color_model import cielab, color_evidence
-from vto_pipeline.garment.graph_cut import minimum_cut
+from vto_pipeline.garment.subtraction.color_model import cielab, color_evidence
+from vto_pipeline.garment.subtraction.graph_cut import minimum_cut
 
 
 def energy(label, unary, edges, pairwise):

@@ -10,7 +10,7 @@ from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.openings import OpeningsConfig, close_scan_holes, list_openings
 from vto_pipeline.garment.rims import drop_flaps, smooth_curve, trim_ledges
 from vto_pipeline.garment.simulation_mesh import SimulationMeshConfig, reason_to_skip_remeshing, remesh_for_simulation
-from vto_pipeline.garment.subtract import SubtractConfig, extract_garment, label_garment
+from vto_pipeline.garment.subtraction.subtract import SubtractConfig, extract_garment, label_garment
 from vto_pipeline.geometry.remeshing.repair import is_manifold
 from vto_pipeline.geometry.remeshing.rims import perimeter
 from vto_pipeline.geometry.rigid import transform_mesh

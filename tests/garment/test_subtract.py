@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.openings import OpeningsConfig, close_scan_holes
-from vto_pipeline.garment.subtract import SubtractConfig, extract_garment, label_garment
+from vto_pipeline.garment.subtraction.subtract import SubtractConfig, extract_garment, label_garment
 from vto_pipeline.geometry.remeshing.repair import is_manifold
 from vto_pipeline.geometry.rigid import transform_mesh
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
@@ -65,12 +65,12 @@ def test_the_board_is_no_garment(scene, placed):
     assert not labels.garment[placed.vertices[:, 1] < -0.001].any()
 
 
-def beside(scene, turned):
+def beside(scene, turned, noise):
     """A rough plate of 20 by 20 cm, 30 cm from the form and as high as its chest; lying, or turned upright."""
     x, z = np.meshgrid(np.arange(41) * 0.005, np.arange(41) * 0.005, indexing="ij")
     at = np.arange(x.size).reshape(x.shape)
     a, b, c, d = at[:-1, :-1].ravel(), at[1:, :-1].ravel(), at[1:, 1:].ravel(), at[:-1, 1:].ravel()
-    rough = np.random.default_rng(0).normal(0.0, 5e-4, x.shape)
+    rough = np.random.default_rng(0).normal(0.0, noise, x.shape)
     points = np.stack([x, z, rough] if turned else [x, rough, z], axis=-1).reshape(-1, 3)
     faces = np.vstack([np.column_stack([a, c, b]), np.column_stack([a, d, c])])
     top = scene.form.vertices.max(axis=0)
@@ -78,15 +78,18 @@ def beside(scene, turned):
     return TriangleMesh(points + place, faces, np.full((len(points), 3), 40, np.uint8))
 
 
+@pytest.mark.parametrize("noise", [0.0005, 0.0035])
 @pytest.mark.parametrize("turned", [False, True])
-def test_a_level_piece_beside_the_form_is_no_garment_and_one_that_hangs_is(scene, placed, turned):
-    plate = beside(scene, turned)
+def test_a_level_piece_beside_the_form_is_no_garment_and_one_that_hangs_is(scene, placed, turned, noise):
+    """The noise of a depth camera, the second, makes a table's area half as large again."""
+    plate = beside(scene, turned, noise)
     both = concatenate([placed, plate])
     job = Job()
     labels = label_garment(both, scene.form, SubtractConfig(), job)
     mine = labels.garment[len(placed.vertices) :]
     assert mine.all() if turned else not mine.any()
-    assert any("a level piece of 4" in note for note in job.notes) == (not turned)  # 20 by 20 cm, and its roughness
+    area = "a level piece of 4" if noise < 1e-3 else "a level piece of"  # 20 by 20 cm, and its roughness
+    assert any(area in note for note in job.notes) == (not turned)
 
 
 def test_the_shell_is_one_manifold_piece_on_the_true_shirt(scene, placed):

@@ -1,6 +1,7 @@
 """The parametric body.
 
 from_measurements, from_scan, from_silhouettes: the three ways to an avatar
+from_dressed: a mannequin inside the scan of what it wears
 measure: measure any body
 template/: fixed topology, and how it is built
 model/: shape and pose

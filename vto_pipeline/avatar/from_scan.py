@@ -38,7 +38,7 @@ from vto_pipeline.avatar.scan.upright import in_metres
 from vto_pipeline.avatar.template.template import JOINT_KINDS
 from vto_pipeline.geometry.closest import closest_points
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.model.body import Avatar
+from vto_pipeline.model.body import Avatar, Measurements
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
@@ -72,7 +72,9 @@ class ScanConfig(Config):
     )
 
 
-def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | None = None) -> Avatar:
+def fit_scan(
+    scan: TriangleMesh, config: ScanConfig | None = None, job: Job | None = None, tape: Measurements | None = None
+) -> Avatar:
     """Return our body registered to a scan, posed as the scan and in its frame: metres, its upward axis turned to +Y.
 
     Args:
@@ -81,6 +83,7 @@ def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | No
         config: Settings.
         job: Receives mean, rms and p95 of the distance from scan to body [mm]: of all points, of the core (no head,
             hands, feet), and of the explained ones (nearer than 10 mm: no stand, floor or hair), and their share.
+        tape: What was measured of the body under clothes; only with `clothed`.
 
     Raises:
         AvatarError: the scan is no body, or a garment, with what is missing; or it is bent and cannot be reconstructed.
@@ -105,7 +108,7 @@ def fit_scan(scan: TriangleMesh, config: ScanConfig | None = None, job: Job | No
     if config.clothed:
         job.progress(0.75, "finding the body inside the clothes")
         shell, _ = to_bind_pose(space, fit, stands, posed, vertices)
-        fit, sigmas = fit_under_clothes(space, fit, target, shell, job)
+        fit, sigmas = fit_under_clothes(space, fit, target, shell, job, tape)
         # which posture is the body's own does not show
         stands = replace(stance(space, fit), joints=space.joints(fit.parameters), pose=fit.pose)
         stands = replace(stands, translation=fit.translation)
@@ -162,7 +165,7 @@ def _displaced(
 ) -> tuple[FloatArray, float]:
     unlike = np.array([_UNLIKE.get(kind, 0.0) for kind in JOINT_KINDS])
     trust = 1 - space.base.weights @ unlike
-    core = extremity_weights(space) < CORE
+    core = extremity_weights(space.base) < CORE
     vertices, softest = displace(target, start, space.base.faces, trust, core, stiffness, rounds)
     return separate_thighs(space, fit, vertices), softest
 
@@ -185,7 +188,7 @@ def _pose_and_shape(
 
 def _pairs(space: ShapeSpace, target: Target, fit: Fit, reach_mm: float) -> Correspondences:
     # what the scan may lack must not reach out for the rest of it
-    chosen = np.flatnonzero(extremity_weights(space) < CORE)[::3]
+    chosen = np.flatnonzero(extremity_weights(space.base) < CORE)[::3]
     return target.pairs(posed_vertices(space, fit), space.base.faces, chosen, reach_mm * 1e-3)
 
 

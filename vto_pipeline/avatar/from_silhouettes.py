@@ -126,7 +126,7 @@ def _fit(sex: str, begin: Solution, silhouettes: Silhouettes, config: Silhouette
     views = tuple(
         replace(view, fit=replace(view.fit, parameters=mean.parameters, expected=mean.expected)) for view in begin.views
     )
-    trust = 1 - (1 - _ENDS_SHARE) * extremity_weights(space)
+    trust = 1 - (1 - _ENDS_SHARE) * extremity_weights(space.base)
     evidence = _evidence(sex, silhouettes, config)
     return run_steps(space, views, evidence, trust, config.outline_sigma_mm * 1e-3, config.iterations)
 

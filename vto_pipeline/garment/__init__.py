@@ -2,7 +2,7 @@
 
 coarse_align, scale_search, robust_icp, align: the scan in the frame, and if need be the scale, of its mannequin
 outline/: the mannequin found by its outline in the photos
-color_model, graph_cut, subtract: the mannequin taken away
+subtraction/: the mannequin taken away
 loop_evidence, bare_parts, notches, rims, openings: real openings kept, scan holes filled
 lifting: fillings kept off the mannequin
 simulation_mesh: the mesh that is simulated

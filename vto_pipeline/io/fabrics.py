@@ -6,7 +6,7 @@ Which kind of file it is shows in its content: `instrument` heads a sheet of KES
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
@@ -72,14 +72,16 @@ def read_fabric(fabric: str | Path | Mapping[str, Any]) -> Fabric:
     return complete_fabric(_read(_LOADERS[suffix](path)))
 
 
-def write_measured(path: Path, areal_density_gsm: float, direction: str, rigidity: float, source: str) -> None:
+def write_measured(
+    path: Path, areal_density_gsm: float, directions: Sequence[str], rigidity: float, source: str
+) -> None:
     """Write a fabric file that holds a mass and a bending rigidity, and nothing that was not measured.
 
     Args:
         path: File, .yaml.
         areal_density_gsm: [g/m²].
-        direction: warp or weft.
-        rigidity: In that direction [N·m].
+        directions: warp, weft or both.
+        rigidity: In these directions [N·m].
         source: Where the figures come from.
 
     Raises:
@@ -93,7 +95,7 @@ def write_measured(path: Path, areal_density_gsm: float, direction: str, rigidit
     held = {
         "name": path.stem,
         "areal_density_gsm": areal_density_gsm,
-        "bending": {direction: float(f"{rigidity:.4g}")},
+        "bending": {direction: float(f"{rigidity:.4g}") for direction in directions},
         "source": source,
     }
     with replacing(path) as beside:

@@ -21,6 +21,7 @@ GIVEN = {
     "garment.pattern": "garment_pattern",
     "mannequin.measurements": "mannequin_measurements",
     "mannequin.avatar": "source_avatar",
+    "mannequin.dressed": "dressed_measurements",
     "body.measurements": "body_measurements",
     "body.silhouettes": "body_silhouettes",
     "body.avatar": "fitted_avatar",

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
+from vto_pipeline.avatar.from_dressed import fit_dressed
 from vto_pipeline.avatar.from_measurements import MeasurementsConfig, fit_measurements
 from vto_pipeline.avatar.from_scan import ScanConfig, fit_scan
 from vto_pipeline.avatar.from_silhouettes import SilhouettesConfig, fit_silhouettes
@@ -37,6 +38,11 @@ def _register_mannequin(inputs: Inputs, settings: ScanConfig, job: Job) -> Outpu
 def _shape_mannequin(inputs: Inputs, settings: MeasurementsConfig, job: Job) -> Outputs:
     avatar = fit_measurements(inputs["mannequin_measurements"], settings, job)
     return {"source_avatar": avatar, "mannequin_surface": avatar.mesh}
+
+
+def _fit_dressed(inputs: Inputs, settings: ScanConfig, job: Job) -> Outputs:
+    avatar = fit_dressed(inputs["garment_surface"], inputs["dressed_measurements"], settings, job)
+    return {"dressed_avatar": avatar, "source_avatar": avatar}
 
 
 def _register_body(inputs: Inputs, settings: ScanConfig, job: Job) -> Outputs:
@@ -92,6 +98,15 @@ STAGES: tuple[Stage, ...] = (
         run=_shape_mannequin,
         settings=MeasurementsConfig,
         uses=("scipy",),
+    ),
+    Stage(
+        name="fit_dressed",
+        about="a mannequin that was never scanned bare, estimated inside the dressed scan",
+        needs=("garment_surface", "dressed_measurements"),
+        makes=("dressed_avatar", "source_avatar"),
+        run=_fit_dressed,
+        settings=ScanConfig,
+        uses=("scipy", "libigl", "pyfqmr"),
     ),
     Stage(
         name="register_body",

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vto_pipeline.avatar.scan.report import extremity_weights
 from vto_pipeline.cloth.rest_shape.from_hanging import RestShapeConfig, rest_shape
 from vto_pipeline.garment.align import AlignConfig, PosedPhotos, align_to_mannequin
 from vto_pipeline.garment.bare_parts import BareParts
@@ -17,13 +18,15 @@ from vto_pipeline.garment.pattern.embed import in_shape
 from vto_pipeline.garment.pattern.sew import SewConfig, sew
 from vto_pipeline.garment.photographed.confirmed import LookAgain
 from vto_pipeline.garment.simulation_mesh import SimulationMeshConfig, remesh_for_simulation
-from vto_pipeline.garment.subtract import SubtractConfig, extract_garment, label_garment
+from vto_pipeline.garment.subtraction.estimated import label_over_estimate
+from vto_pipeline.garment.subtraction.subtract import SubtractConfig, extract_garment, label_garment
 from vto_pipeline.garment.wearable import check_wearable
 from vto_pipeline.geometry.metres import need_metres
 from vto_pipeline.geometry.remeshing.repair import RepairConfig, repair
 from vto_pipeline.geometry.rigid import transform_cameras, transform_mesh
 from vto_pipeline.geometry.topology import concatenate
 from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.body import Avatar
 from vto_pipeline.model.garment import SurfaceLabels
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -52,6 +55,9 @@ def _subtract(inputs: Inputs, settings: SubtractConfig, job: Job) -> Outputs:
     if "garment_placement" in inputs:
         surface = replace(transform_mesh(surface, inputs["garment_placement"]), metric=True)
         labels = label_garment(surface, inputs["mannequin_surface"], settings, job)
+    elif "dressed_avatar" in inputs:
+        body: Avatar = inputs["dressed_avatar"]
+        labels = label_over_estimate(surface, body.mesh, extremity_weights(body), settings, job)
     else:
         need_metres(surface, "a garment without a mannequin")
         job.leave_out("subtraction", "no mannequin was given: the whole scan is garment")
@@ -159,7 +165,7 @@ STAGES: tuple[Stage, ...] = (
         name="subtract",
         about="the scan split into garment and mannequin (graph cut)",
         needs=("garment_surface",),
-        optional=("mannequin_surface", "garment_placement"),
+        optional=("mannequin_surface", "garment_placement", "dressed_avatar"),
         makes=("labels", "garment_shell"),
         run=_subtract,
         settings=SubtractConfig,

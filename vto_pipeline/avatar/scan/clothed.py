@@ -35,7 +35,7 @@ _LEVEL_M = 0.01
 
 
 def fit_under_clothes(
-    space: ShapeSpace, fit: Fit, scan: Target, shell: Avatar, job: Job
+    space: ShapeSpace, fit: Fit, scan: Target, shell: Avatar, job: Job, tape: Measurements | None = None
 ) -> tuple[Fit, dict[str, float]]:
     """Return shape and pose of the body inside, and the standard uncertainty of all its measurements [m, kg].
 
@@ -45,12 +45,16 @@ def fit_under_clothes(
         scan: The clothes.
         shell: That model, displaced onto the clothes.
         job: For its seed.
+        tape: What was measured of the body itself.
     """
     sex, config = sex_name(space.base.sex), MeasurementsConfig()
-    expected = likely_wearers(population(sex), _clothes(shell), job.seed)
-    parameters = solve_shape(space, {}, expected, config, Job(), mean_parameters(sex, config))
+    known = {} if tape is None else dict(tape.values)
+    people = population(sex) if tape is None else population(sex).given(known, dict(tape.sigmas))
+    expected = likely_wearers(people, _clothes(shell), job.seed)
+    held = {} if tape is None else {name: value for name, value in known.items() if name not in tape.sigmas}
+    parameters = solve_shape(space, held, expected, config, Job(), mean_parameters(sex, config))
     found = replace(fit, parameters=parameters, expected=parameters)
-    chosen = np.flatnonzero(extremity_weights(space) < CORE)[::3]
+    chosen = np.flatnonzero(extremity_weights(space.base) < CORE)[::3]
     clothes = scan.as_clothes((_WITHIN_M / _LOOSE_M) ** 2)
     for _ in range(_STEPS):
         pairs = clothes.pairs(posed_vertices(space, found), space.base.faces, chosen, _REACH_M)

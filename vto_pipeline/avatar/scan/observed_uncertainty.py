@@ -60,7 +60,7 @@ def surface_sigmas(space: ShapeSpace, scan: Target, body: Avatar) -> dict[str, f
     """
     _, at, away = closest_points(body.vertices, scan.vertices, scan.faces)
     off = ((at - body.vertices) * vertex_normals(body.mesh)).sum(axis=1)
-    judged = (away < EXPLAINED_M) & (extremity_weights(space) < CORE)
+    judged = (away < EXPLAINED_M) & (extremity_weights(space.base) < CORE)
     size = float(np.sqrt((off[judged] ** 2).mean())) if judged.any() else 0.0
     normals = vertex_normals(TriangleMesh(body.bind_vertices, body.faces))
     tape = Tape(body)

@@ -15,7 +15,7 @@ from vto_pipeline.geometry.closest import closest_points
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.geometry.topology import edge_face_counts, face_areas, surface_area
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.model.body import Measurements
+from vto_pipeline.model.body import Avatar, Measurements
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -85,7 +85,7 @@ def refuse_shape_of_no_body(scan: TriangleMesh, space: ShapeSpace, posed: FloatA
     """
     points, _, _ = sample_surface(scan, _POINTS, 0)
     face, _, distance = closest_points(points, posed, space.base.faces)
-    core = extremity_weights(space)[space.base.faces].mean(axis=1)[face] < CORE
+    core = extremity_weights(space.base)[space.base.faces].mean(axis=1)[face] < CORE
     share = float((distance[core] < EXPLAINED_M).mean()) if core.any() else 0.0
     if share < _LIKE_A_BODY:
         raise AvatarError(
@@ -152,7 +152,7 @@ def report_registration(scan: TriangleMesh, space: ShapeSpace, vertices: FloatAr
     faces = space.base.faces
     points, _, _ = sample_surface(scan, _POINTS, job.seed + 1)
     face, _, distance = closest_points(points, vertices, faces)
-    core = extremity_weights(space)[faces].mean(axis=1)[face] < CORE
+    core = extremity_weights(space.base)[faces].mean(axis=1)[face] < CORE
     explained = distance < EXPLAINED_M
     for kind, which in (("", slice(None)), ("core_", core), ("explained_", explained)):
         part = distance[which] * 1e3
@@ -177,10 +177,10 @@ def report_registration(scan: TriangleMesh, space: ShapeSpace, vertices: FloatAr
     return hidden
 
 
-def extremity_weights(space: ShapeSpace) -> FloatArray:
+def extremity_weights(body: Avatar) -> FloatArray:
     """Return how much each vertex belongs to head, hands and feet, 0 to 1, shape (V,)."""
     ends = np.flatnonzero(np.isin(JOINT_KINDS, _ENDS))
-    share: FloatArray = space.base.weights[:, ends].sum(axis=1)
+    share: FloatArray = body.weights[:, ends].sum(axis=1)
     return share
 
 

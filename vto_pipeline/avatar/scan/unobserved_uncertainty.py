@@ -35,7 +35,7 @@ def unseen_sigmas(
     """
     away = closest_points(body.vertices, scan.vertices, scan.faces)[2]
     unseen = away > EXPLAINED_M
-    shown = ~unseen & (extremity_weights(space) < CORE)
+    shown = ~unseen & (extremity_weights(space.base) < CORE)
     misfit = float(np.sqrt((np.linalg.norm(body.vertices - posed, axis=1)[shown] ** 2).mean())) if shown.any() else 0.0
     tape, sigmas = Tape(body), {}
     for name, what in DEFINITIONS.items():

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from vto_pipeline.bench.physics.closed_forms import capstan
-from vto_pipeline.bench.physics.meshes import strip
 from vto_pipeline.cloth import Capsule
 from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
 from vto_pipeline.cloth.model.build import at_rest, build_cloth
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.model.settings import checked
+from vto_pipeline.cloth.swatch.meshes import strip
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.mesh import TriangleMesh

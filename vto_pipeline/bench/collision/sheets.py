@@ -6,7 +6,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from vto_pipeline.bench.cloth.scenes import grid
-from vto_pipeline.bench.physics.meshes import strip
+from vto_pipeline.cloth.swatch.meshes import strip
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 

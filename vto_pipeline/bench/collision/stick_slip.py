@@ -7,12 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from vto_pipeline.bench.physics.elastica import held_strip, slipping_strip
-from vto_pipeline.bench.physics.meshes import strip
 from vto_pipeline.cloth import Plane
 from vto_pipeline.cloth.dynamics.methods import FRAME
 from vto_pipeline.cloth.dynamics.stepper import Pins, StepConfig, Stepper
 from vto_pipeline.cloth.model.build import at_rest, build_cloth
 from vto_pipeline.cloth.model.settings import checked
+from vto_pipeline.cloth.swatch.meshes import strip
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import RestShape

@@ -1,7 +1,6 @@
 """Cloth against mechanics: shapes, modes, buckling loads and drape coefficients.
 
 closed_forms, elastica: what mechanics says
-meshes: flat strips and discs
 cantilever, buckling, cusick, hanging, modes: the scenes
 refinement: the order of convergence of one scene
 swatch/: rigidity measured from strips of known rigidity

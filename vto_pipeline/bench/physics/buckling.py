@@ -11,10 +11,10 @@ import numpy as np
 from vto_pipeline.bench.bench import Row, Watch
 from vto_pipeline.bench.physics.cantilever import DENSITY, LENGTH, MESHES, ClampedStrip, clamped_strip
 from vto_pipeline.bench.physics.closed_forms import lateral_buckling, lateral_buckling_at_tip, upright_strip
-from vto_pipeline.bench.physics.meshes import MeshKind
 from vto_pipeline.bench.physics.refinement import RefinementCase, refined
 from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
 from vto_pipeline.cloth.rest.equilibrium import EquilibriumConfig, equilibrium
+from vto_pipeline.cloth.swatch.meshes import MeshKind
 from vto_pipeline.numerics.linear.direct import DirectSolver
 
 _RIGIDITY = 1e-5  # [N·m]

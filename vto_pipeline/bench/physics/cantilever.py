@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from vto_pipeline.bench.bench import Row, Watch
 from vto_pipeline.bench.physics.elastica import Elastica, cantilever
-from vto_pipeline.bench.physics.meshes import MeshKind, strip
 from vto_pipeline.bench.physics.refinement import RefinementCase, refined
 from vto_pipeline.cloth.model.build import ClothModel, build_cloth
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.model.settings import checked
 from vto_pipeline.cloth.rest.equilibrium import Equilibrium, equilibrium
+from vto_pipeline.cloth.swatch.meshes import MeshKind, strip
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import RestShape

@@ -15,31 +15,25 @@ import numpy as np
 
 from vto_pipeline.bench.bench import Measured, Row, Value, Watch
 from vto_pipeline.bench.physics.cantilever import MESHES
-from vto_pipeline.bench.physics.meshes import MeshKind, disc
 from vto_pipeline.bench.timing import Timing, clocked
 from vto_pipeline.cloth.collision.contacts import empty_contacts
-from vto_pipeline.cloth.model.build import ClothModel, at_rest, build_cloth
-from vto_pipeline.cloth.model.materials import Materials
-from vto_pipeline.cloth.model.settings import checked
-from vto_pipeline.cloth.rest.equilibrium import EquilibriumConfig, equilibrium
+from vto_pipeline.cloth.model.build import at_rest
 from vto_pipeline.cloth.solvers import SOLVERS
+from vto_pipeline.cloth.swatch.disc import DrapeTest, Specimen, at_minimum, drape_coefficient, specimen
+from vto_pipeline.cloth.swatch.meshes import MeshKind
 from vto_pipeline.errors import DivergedError
-from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import Fabric
-from vto_pipeline.model.garment import RestShape
-from vto_pipeline.model.mesh import TriangleMesh
 
 MEMBRANE = 1000.0  # warp and weft, assumed [N/m]
 SHEAR = 40.0  # assumed: a woven of medium shear rigidity, 0.7 gf/(cm deg) [N/m]
 
-GEOMETRIES = {"30/18": (0.15, 0.09), "25.4/12.7": (0.127, 0.0635)}
-"""Radius of the specimen and of the disc [m]; BS 5058 and ISO 9073-9, and JIS L 1096."""
+GEOMETRIES = {"30/18": DrapeTest(), "25.4/12.7": DrapeTest(0.127, 0.0635)}
+"""BS 5058 and ISO 9073-9, and JIS L 1096."""
 
-_PIXEL = 2.5e-4  # of the shadow [m]
 _STEP, _LONGEST = 1.0 / 200.0, 20.0  # [s]
 _DAMPING = 4.0  # [1/s]
 _STILL = 1e-6  # [m/s]
-_UNEVENNESS = 1e-3  # of the start, of the specimen's radius: where the folds come from
 
 
 @dataclass(frozen=True)
@@ -75,88 +69,6 @@ MEASURED = {
     "MAT-F": Measurement(0.1043, 0.226e-3, 1.863263e-06, 6.864655e-05, 0.283, 7),
 }
 """Cotton broad, wool tropical, polyester tropical, polyester faille; KES-FB2, read in a transcription."""
-
-
-@dataclass(frozen=True)
-class Specimen:
-    """A disc of cloth over its support.
-
-    Args:
-        model: The cloth.
-        start: Nearly flat [m], shape (V, 3).
-        radius, support: [m].
-    """
-
-    model: ClothModel
-    start: FloatArray
-    radius: float
-    support: float
-
-
-def specimen(
-    fabric: Fabric,
-    geometry: str,
-    kind: MeshKind,
-    edge: float,
-    *,
-    bending: str = "shape_operator",
-    hysteresis: bool = False,
-    seed: int = 0,
-) -> Specimen:
-    """Return a disc of this fabric.
-
-    Args:
-        fabric: What it is made of.
-        geometry: Of `GEOMETRIES`.
-        kind: Of mesh.
-        edge: [m].
-        bending: A model of `Materials`.
-        hysteresis: With internal friction.
-        seed: Of the unevenness it starts with, and of an irregular mesh.
-    """
-    radius, support = GEOMETRIES[geometry]
-    points, faces = disc(kind, radius, edge, support, seed)
-    flat = np.column_stack([points[:, 0], np.zeros(len(points)), -points[:, 1]])
-    away = np.linalg.norm(points, axis=1)
-    held = np.flatnonzero(away < support * (1.0 + 1e-9))
-    model = build_cloth(
-        TriangleMesh(flat, faces),
-        RestShape(flat),
-        fabric,
-        pinned=held,
-        materials=checked(Materials, {"bending": bending, "hysteresis": hysteresis}),
-    )
-    start = flat.copy()
-    rise = np.clip((away - support) / (radius - support), 0.0, 1.0)
-    angle, rng = np.arctan2(points[:, 1], points[:, 0]), np.random.default_rng(seed)
-    for waves in range(2, 13):  # smooth, of no preferred number
-        start[:, 1] += _UNEVENNESS * radius * rise**2 * rng.normal() * np.cos(waves * angle + rng.uniform(0, 2 * np.pi))
-    return Specimen(model, start, radius, support)
-
-
-def drape_coefficient(positions: FloatArray, faces: IntArray, radius: float, support: float) -> float:
-    """Return (shadow - disc) / (specimen - disc), with the shadow of a cloth from above, on a raster.
-
-    Args:
-        positions: [m], shape (V, 3), the axis of the disc plumb through the origin.
-        faces: Shape (F, 3).
-        radius, support: Of specimen and disc [m].
-    """
-    count = int(np.ceil(2.2 * radius / _PIXEL))
-    shade = np.zeros((count, count), dtype=bool)
-    corners = positions[faces][:, :, [0, 2]] / _PIXEL + 0.5 * count
-    for (ax, ay), (bx, by), (cx, cy) in corners:
-        turn = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        if turn == 0.0:
-            continue
-        x0, x1 = int(max(0, np.floor(min(ax, bx, cx)))), int(min(count, np.ceil(max(ax, bx, cx)) + 1))
-        y0, y1 = int(max(0, np.floor(min(ay, by, cy)))), int(min(count, np.ceil(max(ay, by, cy)) + 1))
-        x, y = np.arange(x0, x1)[:, None] + 0.5, np.arange(y0, y1)[None, :] + 0.5
-        u = ((bx - x) * (cy - y) - (by - y) * (cx - x)) / turn
-        v = ((cx - x) * (ay - y) - (cy - y) * (ax - x)) / turn
-        shade[x0:x1, y0:y1] |= (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0)
-    shadow = shade.sum() * _PIXEL**2
-    return float((shadow - np.pi * support**2) / (np.pi * (radius**2 - support**2)))
 
 
 def fold_count(positions: FloatArray, flat: FloatArray, radius: float) -> int:
@@ -199,27 +111,21 @@ def cusick_rows(quick: bool, watch: Watch) -> Iterator[Row]:
 
 def _row(watch: Watch, geometry: str, name: str, method: str, kind: MeshKind, edge: float, seed: int) -> Row:
     fabric = MEASURED[name]
-    one = specimen(fabric.fabric(name), geometry, kind, edge, hysteresis="2HB" in method, seed=seed)
+    one = specimen(fabric.fabric(name), GEOMETRIES[geometry], kind, edge, hysteresis="2HB" in method, seed=seed)
 
     def measure() -> Measured:
         rest, seconds = clocked(let_fall if "fall" in method else at_minimum, one)
-        drape = drape_coefficient(rest, one.model.faces, one.radius, one.support)
+        drape = drape_coefficient(rest, one.model.faces, one.test)
         return Timing(seconds), {
             "drape_error_share": drape - fabric.drape,
             "drape_share": drape,
             "measured_share": fabric.drape,
-            "nodes": float(fold_count(rest, one.start, one.radius)),
+            "nodes": float(fold_count(rest, one.start, one.test.radius)),
             "nodes_measured": float(fabric.nodes),
         }
 
     settings: dict[str, Value] = {"fabric": name, "mesh": kind, "edge_mm": 1e3 * edge, "seed": seed}
     return watch.row(f"Cusick {geometry}", method, settings, len(one.start), measure)
-
-
-def at_minimum(one: Specimen) -> FloatArray:
-    """Return the positions in the minimum of energy that Newton finds [m], shape (V, 3)."""
-    limits = EquilibriumConfig(tolerance=1e-6, iterations=2000)
-    return equilibrium(one.model, one.start, limits).positions
 
 
 def let_fall(one: Specimen) -> FloatArray:

@@ -11,7 +11,6 @@ import numpy as np
 from vto_pipeline.bench.bench import Row, Watch
 from vto_pipeline.bench.physics.cantilever import MESHES
 from vto_pipeline.bench.physics.closed_forms import catenary, hanging_strip, pendulum_period
-from vto_pipeline.bench.physics.meshes import MeshKind, strip
 from vto_pipeline.bench.physics.refinement import RefinementCase, refined
 from vto_pipeline.cloth.collision.contacts import empty_contacts
 from vto_pipeline.cloth.constraints.points.spring import springs
@@ -21,6 +20,7 @@ from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.model.settings import checked
 from vto_pipeline.cloth.rest.equilibrium import EquilibriumConfig, equilibrium
 from vto_pipeline.cloth.solvers import SOLVERS
+from vto_pipeline.cloth.swatch.meshes import MeshKind, strip
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import RestShape

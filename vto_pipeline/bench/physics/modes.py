@@ -22,7 +22,6 @@ from vto_pipeline.bench.physics.cantilever import (
     refinements,
 )
 from vto_pipeline.bench.physics.closed_forms import cantilever_modes, hanging_sheet_modes
-from vto_pipeline.bench.physics.meshes import strip
 from vto_pipeline.bench.physics.refinement import RefinementCase, refined
 from vto_pipeline.cloth.collision.contacts import empty_contacts
 from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
@@ -31,6 +30,7 @@ from vto_pipeline.cloth.model.build import ClothModel, ClothState, build_cloth
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.model.settings import checked
 from vto_pipeline.cloth.rest.equilibrium import EquilibriumConfig, equilibrium
+from vto_pipeline.cloth.swatch.meshes import strip
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import RestShape

@@ -17,7 +17,7 @@ _MARK = re.compile(r"(.+):(-?[\d.]+),(-?[\d.]+)")
 @click.command("scan")
 @click.argument("source", metavar="INPUT", type=PATH)
 @click.option("--role", type=click.Choice(["garment", "body", "mannequin"]), required=True, help="What was captured.")
-@click.option("--mannequin", type=PATH, metavar="FILE", help="Surface of the mannequin the garment was scanned on.")
+@click.option("--mannequin", type=PATH, metavar="FILE", help="Mannequin it was on: surface, or tape.yaml.")
 @click.option(
     "--distance",
     "distances",

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vto_pipeline.garment.align import PosedPhotos
-from vto_pipeline.garment.color_model import color_evidence
+from vto_pipeline.garment.subtraction.color_model import color_evidence
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.geometry.seen.depth_picture import depth_picture
 from vto_pipeline.geometry.topology import submesh, surface_area

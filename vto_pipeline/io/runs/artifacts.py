@@ -252,6 +252,19 @@ ARTIFACTS: tuple[ArtifactKind, ...] = (
         garments.read_rest_shape,
         garments.write_rest_shape,
     ),
+    _leaf(
+        "dressed_measurements",
+        "mannequin that was never scanned bare: what is known of it, its stature at least",
+        bodies.read_measurements,
+        inline=bodies.read_measurements,
+    ),
+    ArtifactKind(
+        "dressed_avatar",
+        "dressed_avatar.npz",
+        "the mannequin as estimated inside the dressed scan",
+        avatars.read_avatar,
+        avatars.write_avatar,
+    ),
     ArtifactKind(
         "source_avatar",
         "source_avatar.npz",

@@ -17,6 +17,7 @@ from vto_pipeline.io.sniff import find_kind
 from vto_pipeline.stages.entry import planning
 
 _CAPTURES = ("photos", "video", "depth", "cloud", "surface")
+_MEASUREMENTS = (".yaml", ".yml", ".json")
 _DRAPED = ("draped", "audit", "trace", "render_mesh", "fit_report", "page")
 _POSED = ("pose_report", "posed_scene")
 _MOVED = ("draped_motion", "motion_audit", "motion_report", "moving_scene")
@@ -47,7 +48,8 @@ def scan_order(
     Args:
         source: Folder of photos or of depth frames, video, point cloud or mesh.
         role: "garment", "body" or "mannequin".
-        mannequin: Surface of the mannequin that a garment was scanned on.
+        mannequin: Surface of the mannequin that a garment was scanned on; or its measurements, where it was never
+            scanned bare.
         lengths: Known distances in photos, each with `one`, `other` (photo -> pixel) and `metres`.
         name: Stands where a file's name stands in messages.
 
@@ -72,7 +74,8 @@ def scan_order(
         wanted = ["garment", "openings"]
     if "garment" in wanted and kind in ("photos", "video"):
         wanted.append("garment_texture")
-    given = {"mannequin.surface": mannequin, f"{role}.{kind}": source}
+    written = mannequin is not None and mannequin.suffix.lower() in _MEASUREMENTS
+    given = {f"mannequin.{'dressed' if written else 'surface'}": mannequin, f"{role}.{kind}": source}
     settings = {"scale": {"lengths": [dict(length) for length in lengths]}} if lengths else {}
     # what a scan makes of a body or a form has one name, whichever it was
     copies = {} if role == "garment" else {own: f"{role}_{own}" for own in ("surface.ply", "scan_report.json")}

@@ -1,4 +1,5 @@
-"""Strips of known rigidity, curl and tilt, simulated with noise, and what is measured from them.
+"""Swatches of known rigidity, and what is measured from them.
 
-strips: shapes by shooting, which share nothing with the fit, and their noise
+strips: hanging strips by shooting, which shares nothing with the fit, and their noise
+discs: real fabrics fitted to their drape coefficients
 """

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from vto_pipeline.errors import GarmentError
-from vto_pipeline.garment.color_model import cielab, color_evidence
-from vto_pipeline.garment.graph_cut import minimum_cut
 from vto_pipeline.garment.robust_icp import scan_noise
-from vto_pipeline.geometry.floor import floor_height
+from vto_pipeline.garment.subtraction.color_model import cielab, color_evidence
+from vto_pipeline.garment.subtraction.floor import not_worn
+from vto_pipeline.garment.subtraction.graph_cut import minimum_cut
 from vto_pipeline.geometry.remeshing.clip import clip_to_positive
 from vto_pipeline.geometry.remeshing.repair import RepairConfig, repair
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
@@ -18,7 +17,6 @@ from vto_pipeline.geometry.smooth import smooth_values
 from vto_pipeline.geometry.topology import (
     component_areas,
     edges,
-    face_area_vectors,
     face_normals,
     submesh,
     vertex_normals,
@@ -36,13 +34,10 @@ TIGHT = 0.007
 LEAST_SIGMA = 1e-4
 """Scans claim to be better than this only by accident [m]."""
 MOST_SIGMA = 5e-3
-LARGE = 0.1
-"""With pieces of a larger share of the garment it was torn, and they are cloth that will be missing."""
-LEVEL, ROUGH = 0.8, 0.02
-"""Seen from above, a board or a table that lies beside the mannequin shows more than this share of its area. Its height
-differs by less than this share of its side (standard deviation)."""
 FLOOR_REACH = 0.01
 """A board on the floor may lie so much higher than the lowest point of the mannequin [m]."""
+LARGE = 0.1
+"""With pieces of a larger share of the garment it was torn, and they are cloth that will be missing."""
 
 
 class SubtractConfig(Config):
@@ -74,7 +69,7 @@ def label_garment(surface: TriangleMesh, mannequin: TriangleMesh, config: Subtra
     near = SurfaceDistance(mannequin).signed(surface.vertices)
     facing = np.einsum("vd,vd->v", vertex_normals(surface), face_normals(mannequin)[near.face])
     sigma = float(np.clip(scan_noise(near.distance, 4.0 * MOST_SIGMA), LEAST_SIGMA, MOST_SIGMA))
-    floor = _on_floor(surface, mannequin, sigma, job)
+    floor = not_worn(surface, float(mannequin.vertices[:, 1].min()) + FLOOR_REACH, sigma, job)
     thickness = config.thickness_mm * 1e-3
     sure_garment = (near.distance > thickness + 3.0 * sigma) & ~floor
     sure_bare = (near.distance < 0.0) & (near.distance > -2.0 * sigma) & (facing > 0.7) & ~floor
@@ -93,7 +88,7 @@ def label_garment(surface: TriangleMesh, mannequin: TriangleMesh, config: Subtra
         by_color = color_evidence(surface.colors, sure_garment, sure_bare)
         evidence = evidence + np.clip(by_color, -CERTAIN, CERTAIN)
     evidence = np.where(floor, -4.0 * CERTAIN, evidence)
-    garment = minimum_cut(evidence, edges(surface), _boundary_price(surface, config))
+    garment = minimum_cut(evidence, edges(surface), boundary_price(surface, config))
     job.measure(noise_mm=sigma * 1e3, garment_share=float(garment.mean()))
     confidence = 1.0 / (1.0 + np.exp(-np.where(garment, evidence, -evidence)))
     return SurfaceLabels(garment, confidence)
@@ -124,36 +119,6 @@ def extract_garment(surface: TriangleMesh, labels: SurfaceLabels, config: Subtra
     return submesh(shell, piece == int(np.argmax(area)))[0]
 
 
-def _on_floor(surface: TriangleMesh, mannequin: TriangleMesh, sigma: float, job: Job) -> NDArray[np.bool_]:
-    """Return which vertices lie on or under the floor, shape (V,); none where the scan shows no floor."""
-    lying = _lying(surface, job)
-    floor = floor_height(surface, float(mannequin.vertices[:, 1].min()) + FLOOR_REACH)
-    if floor is None:
-        job.leave_out("floor", "no level surface lies under the mannequin")
-        return lying
-    job.measure(floor_mm=floor * 1e3)
-    return lying | (surface.vertices[:, 1] < floor + 3.0 * sigma)
-
-
-def _lying(surface: TriangleMesh, job: Job) -> NDArray[np.bool_]:
-    """Return which vertices belong to a level piece beside the largest, as a board on a table, shape (V,): cloth that
-    is worn hangs."""
-    piece, area = component_areas(surface)
-    lying = np.zeros(len(surface.vertices), dtype=bool)
-    for k in np.flatnonzero(np.arange(len(area)) != np.argmax(area)):
-        one, source = submesh(surface, piece == k)
-        upward = face_area_vectors(one)
-        size = np.linalg.norm(upward, axis=1)
-        height = one.vertices[one.faces, 1].mean(axis=1)
-        middle = np.average(height, weights=size)
-        rough = np.sqrt(np.average(np.square(height - middle), weights=size))
-        if rough < ROUGH * np.sqrt(area[k]) and abs(upward[:, 1].sum()) > LEVEL * size.sum():
-            lying[source] = True
-            what = f"a level piece of {1e4 * area[k]:.0f} cm² at a height of {1e3 * middle:.0f} mm"
-            job.note(f"left out {what}: cloth that is worn hangs")
-    return lying
-
-
 def _distance_evidence(distance: FloatArray, sigma: float, thickness: float) -> FloatArray:
     """Return the log-likelihood ratio of cloth, anywhere beyond its thickness, against bare mannequin at zero."""
     bare = np.square(distance / sigma)
@@ -161,7 +126,7 @@ def _distance_evidence(distance: FloatArray, sigma: float, thickness: float) -> 
     return np.clip(0.5 * (bare - cloth) - np.log(TIGHT / sigma), -CERTAIN, 2.0 * CERTAIN)
 
 
-def _boundary_price(surface: TriangleMesh, config: SubtractConfig) -> FloatArray:
+def boundary_price(surface: TriangleMesh, config: SubtractConfig) -> FloatArray:
     """Return the price of cutting each edge, shape (E,): by length, and less where the colour changes."""
     pair: IntArray = edges(surface)
     length = np.linalg.norm(surface.vertices[pair[:, 0]] - surface.vertices[pair[:, 1]], axis=1)

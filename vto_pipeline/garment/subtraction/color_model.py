@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from vto_pipeline.model.arrays import ByteArray, FloatArray
+from vto_pipeline.model.arrays import ByteArray, FloatArray, IntArray
 from vto_pipeline.numerics.srgb import decode_srgb
 
 BINS = 24
@@ -18,7 +18,13 @@ MOST_MIXED = 0.9
 """With more of the pure material than this among the mixed, the two hardly differ in colour."""
 
 
-def color_evidence(colors: ByteArray, pure: NDArray[np.bool_], mixed: NDArray[np.bool_]) -> FloatArray:
+def color_evidence(
+    colors: ByteArray,
+    pure: NDArray[np.bool_],
+    mixed: NDArray[np.bool_],
+    bins: int = BINS,
+    light: float = HISTOGRAM_SIGMA,
+) -> FloatArray:
     """Return log p(colour | the pure material) - log p(colour | the other) per vertex, shape (V,).
 
     From smoothed CIELAB histograms. Places of the other material may hold some of the pure one, as close-lying cloth
@@ -28,20 +34,41 @@ def color_evidence(colors: ByteArray, pure: NDArray[np.bool_], mixed: NDArray[np
         colors: sRGB, shape (V, 3).
         pure: Vertices sure to be of the one material, shape (V,); at least one.
         mixed: Vertices most of which are of the other; at least one.
+        bins: Of the histogram, along each axis; more part colours that differ less, and need more vertices.
+        light: Standard deviation of the smoothing along lightness [bins]; more where the two lie in other light.
     """
-    scaled = (cielab(colors) - [0.0, -90.0, -110.0]) / [100.0, 190.0, 210.0]
-    cell = tuple(np.clip((scaled * BINS).astype(int), 0, BINS - 1).T)
-
-    def density(members: NDArray[np.bool_]) -> FloatArray:
-        histogram = np.zeros((BINS, BINS, BINS))
-        np.add.at(histogram, tuple(axis[members] for axis in cell), 1.0)
-        return gaussian_filter(histogram / members.sum(), HISTOGRAM_SIGMA, mode="nearest")[cell]
-
-    one, both = density(pure), density(mixed)
+    cell = _cells(colors, bins)
+    one, both = (_density(cell, members, bins, light)[cell] for members in (pure, mixed))
     share = min(float(np.median(both[pure] / one[pure])), MOST_MIXED)
     other = np.maximum(both - share * one, 0.0) / (1.0 - share)
-    anything = SURPRISE / BINS**3
+    anything = SURPRISE / bins**3
     return np.log((1.0 - SURPRISE) * one + anything) - np.log((1.0 - SURPRISE) * other + anything)
+
+
+def color_overlap(
+    colors: ByteArray, one: NDArray[np.bool_], other: NDArray[np.bool_], bins: int, light: float
+) -> float:
+    """Return how alike the colours of two sets of vertices are: 0 where they share none, 1 where they are the same.
+
+    Bhattacharyya's coefficient of the histograms of `color_evidence`, with its arguments; 1 where a set is empty.
+    """
+    if not one.any() or not other.any():
+        return 1.0
+    cell = _cells(colors, bins)
+    return float(np.sqrt(_density(cell, one, bins, light) * _density(cell, other, bins, light)).sum())
+
+
+def _cells(colors: ByteArray, bins: int) -> tuple[IntArray, ...]:
+    scaled = (cielab(colors) - [0.0, -90.0, -110.0]) / [100.0, 190.0, 210.0]
+    return tuple(np.clip((scaled * bins).astype(int), 0, bins - 1).T)
+
+
+def _density(cell: tuple[IntArray, ...], members: NDArray[np.bool_], bins: int, light: float) -> FloatArray:
+    histogram = np.zeros((bins, bins, bins))
+    np.add.at(histogram, tuple(axis[members] for axis in cell), 1.0)
+    sigmas = (light, HISTOGRAM_SIGMA, HISTOGRAM_SIGMA)
+    smooth: FloatArray = gaussian_filter(histogram / members.sum(), sigmas, mode="nearest")
+    return smooth
 
 
 def cielab(colors: ByteArray) -> FloatArray:
