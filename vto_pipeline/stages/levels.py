@@ -1,0 +1,59 @@
+"""What a stage takes, and at which levels a run with a time budget may run it: as measured on the sample shirt.
+
+Times are shares of CPU time, errors multiples of the 95th percentile of the garment's distance to the truth, each level
+alone against all defaults (`python -m vto_pipeline.bench.scan.levels` measures them again). A drape that has to stop, and a
+coarser mesh, add their distance from the drape as it ends to the scan's error as independent errors add. The usual
+times are those of docs/results, with both threads of a quiet machine.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from vto_pipeline.pipeline.levels import Level, UsualTime
+from vto_pipeline.pipeline.stage import Stage
+
+LEVELS: dict[str, tuple[Level, ...]] = {
+    "sfm": (
+        Level({"features": {"all_pairs_up_to": 2, "window": 4}}, {"sfm": 0.6}, 1.02),
+        Level({"features": {"max_features": 2048, "all_pairs_up_to": 2, "window": 4}}, {"sfm": 0.4}, 1.05),
+    ),
+    "stereo": (
+        Level({"max_side_px": 600}, {"stereo": 0.6, "fuse_photos": 0.6, "openings": 0.7}, 1.3),
+        Level({"max_side_px": 450}, {"stereo": 0.35, "fuse_photos": 0.4, "openings": 0.6}, 1.8),
+    ),
+    "openings": (Level({"look_again": False}, {"openings": 0.3}, 1.1),),
+    "texture": (Level({"max_side_px": 1024, "max_triangles": 8000}, {"texture": 0.5}, 1.02),),
+    "simulation_mesh": (Level({"edge_mm": 15.0}, {"drape": 0.35}, 1.5),),
+    "drape": (Level({}, {"drape": 0.6}, 1.05), Level({}, {"drape": 0.45}, 1.3), Level({}, {"drape": 0.25}, 4.6)),
+}
+"""Section -> its levels besides the default."""
+
+USUAL: dict[str, UsualTime] = {
+    "sfm": UsualTime(0.0, 0.18, "photos", 1.5),
+    "scale": UsualTime(0.6),
+    "stereo": UsualTime(0.0, 0.89, "photos"),
+    "fuse_photos": UsualTime(4.5),
+    "odometry": UsualTime(0.0, 0.25, "depth"),
+    "fuse_depth": UsualTime(4.5),
+    "poisson": UsualTime(4.5),
+    "align": UsualTime(4.0),
+    "subtract": UsualTime(4.0),
+    "openings": UsualTime(3.0, 0.42, "photos"),
+    "texture": UsualTime(9.5),
+    "simulation_mesh": UsualTime(4.7),
+    "register_mannequin": UsualTime(11.0),
+    "register_body": UsualTime(11.0),
+    "fit_scan": UsualTime(18.0),
+    "fit_silhouettes": UsualTime(9.7),
+    "drape": UsualTime(32.0),
+    "transfer": UsualTime(0.6),
+    "assess": UsualTime(0.4),
+    "page": UsualTime(1.5),
+}
+"""Section -> what its stages take by default."""
+
+
+def with_levels(stage: Stage) -> Stage:
+    """Return the row of the table with what is known of its time."""
+    return replace(stage, levels=LEVELS.get(stage.section, ()), usual=USUAL.get(stage.section))
