@@ -24,7 +24,10 @@ from vto_pipeline.pipeline.plan import make_plan
 from vto_pipeline.pipeline.request import read_request
 from vto_pipeline.pipeline.stage import Stage
 
-SCAN = (Level({"pixels": 500}, {"scan": 0.5, "mesh": 0.8}, 1.5), Level({"pixels": 250}, {"scan": 0.2, "mesh": 0.6}, 2.5))
+SCAN = (
+    Level({"pixels": 500}, {"scan": 0.5, "mesh": 0.8}, 1.5),
+    Level({"pixels": 250}, {"scan": 0.2, "mesh": 0.6}, 2.5),
+)
 MESH = (Level({"edge": 20}, {"mesh": 0.7, "drape": 0.4}, 1.4),)
 DRAPE = (Level({}, {"drape": 0.6}, 1.3), Level({}, {"drape": 0.3}, 4.0))
 USUAL = {"scan": 60.0, "mesh": 10.0, "drape": 40.0, "page": 2.0}
@@ -63,7 +66,8 @@ class Machine:
         monkeypatch.setattr(time, "perf_counter", lambda: self.now)
         monkeypatch.setattr(budget, "machine_pace", lambda: self.probed or self.pace)
         (folder / "start.txt").write_text("3")
-        kinds = (*(ArtifactKind(n, f"{n}.txt", n, read_number, write_number) for n in ("start", "seen", "meshed", "hung")),)
+        names = ("start", "seen", "meshed", "hung")
+        kinds = [ArtifactKind(name, f"{name}.txt", name, read_number, write_number) for name in names]
         page = ArtifactKind("page", "page.json", "a page", lambda path: path.read_text(), write_number)
         stages = (
             self.stage("scan", ("start",), "seen", ScanConfig, SCAN),
@@ -210,9 +214,8 @@ def test_a_setting_that_is_stated_stays(machine):
 def test_without_a_budget_levels_change_nothing(machine):
     plain = machine()
     assert chosen(machine) == (1000, 10)
-    machine.tables = Catalogue(
-        tuple(replace(stage, levels=(), usual=None) for stage in machine.tables.stages), machine.tables.kinds, {"start": "start"}
-    )
+    rows = tuple(replace(stage, levels=(), usual=None) for stage in machine.tables.stages)
+    machine.tables = Catalogue(rows, machine.tables.kinds, machine.tables.given)
     bare = machine()
     assert [stage["key"] for stage in bare["stages"]] == [stage["key"] for stage in plain["stages"]]
     assert [stage["status"] for stage in bare["stages"]] == ["cached", "cached", "cached", "ran"]

@@ -64,7 +64,8 @@ def test_the_least_error_that_fits_is_found(seed, share):
 def test_more_time_never_buys_more_error(seed):
     seconds, offers = a_table(seed)
     least = share_out(seconds, offers, 0.0).seconds
-    errors = [share_out(seconds, offers, left).error for left in np.linspace(least + 1e-6, 2 * sum(seconds.values()), 30)]
+    times = np.linspace(least + 1e-6, 2 * sum(seconds.values()), 30)
+    errors = [share_out(seconds, offers, left).error for left in times]
     assert all(later <= earlier for earlier, later in itertools.pairwise(errors))
 
 

@@ -62,7 +62,7 @@ def test_the_level_of_a_stage_is_told_with_what_it_costs_and_what_a_minute_more_
 def test_a_budget_that_was_not_kept_is_told_with_the_least():
     late = record(stage("garment.sfm", "ran", 70.0), time_spent_s=75.0, time_least_s=71.3)
     assert list(budget_lines(late, ()))[1] == (
-        "the time budget was not kept: this run needs about 71 s at least, on this machine and at its load"
+        "the time budget was not kept: this run takes 71 s at least, on this machine as loaded"
     )
     assert len(list(budget_lines({**late, "time_spent_s": 65.9}, ()))) == 1
 

@@ -27,7 +27,7 @@ def budget_lines(run_record: Mapping[str, Any], trace: Sequence[TraceRow]) -> It
         yield f"time budget: {used:.1f} of {run_record['time_budget_s']:g} s used; {bought}"
         least = run_record.get("time_least_s")
         if used > _LATE * run_record["time_budget_s"] and least is not None:
-            yield f"the time budget was not kept: this run needs about {least:.0f} s at least, on this machine and at its load"
+            yield f"the time budget was not kept: this run takes {least:.0f} s at least, on this machine as loaded"
         yield from _another_minute(run_record, trace)
     if run_record.get("memory_budget_mb"):
         yield f"memory budget of {run_record['memory_budget_mb'] / 1e3:g} GB: {_largest(run_record)}"
@@ -88,9 +88,7 @@ def _another_minute(run_record: Mapping[str, Any], trace: Sequence[TraceRow]) ->
     """Yield what more time would buy: for the whole, shared out anew, and for the drape alone."""
     more = run_record.get("another_minute")
     if more is not None and more["levels"]:
-        bought = "; ".join(
-            f"{section} {in_words(settings) if settings else 'as usual'}" for section, settings in more["levels"].items()
-        )
+        bought = "; ".join(f"{section} {in_words(chosen) or 'as usual'}" for section, chosen in more["levels"].items())
         yield f"another minute for the whole run: {bought}; about {more['error']:.2f} times this error"
     elif more is not None:
         yield "another minute for the whole run: nothing more"

@@ -1,9 +1,9 @@
 """What a stage takes, and at which levels a run with a time budget may run it: as measured on the sample shirt.
 
 Times are shares of CPU time, errors multiples of the 95th percentile of the garment's distance to the truth, each level
-alone against all defaults (`python -m vto_pipeline.bench.scan.levels` measures them again). A drape that has to stop, and a
-coarser mesh, add their distance from the drape as it ends to the scan's error as independent errors add. The usual
-times are those of docs/results, with both threads of a quiet machine.
+alone against all defaults (`python -m vto_pipeline.bench.scan.levels` measures them again). A drape that has to stop,
+and a coarser mesh, add their distance from the drape as it ends to the scan's error as independent errors add. The
+usual times are those of docs/results, with both threads of a quiet machine.
 """
 
 from __future__ import annotations
@@ -13,18 +13,33 @@ from dataclasses import replace
 from vto_pipeline.pipeline.levels import Level, UsualTime
 from vto_pipeline.pipeline.stage import Stage
 
+_FEW = {"max_side_px": 600, "max_features": 1024, "all_pairs_up_to": 2, "window": 4}
+
 LEVELS: dict[str, tuple[Level, ...]] = {
     "sfm": (
-        Level({"features": {"all_pairs_up_to": 2, "window": 4}}, {"sfm": 0.6}, 1.02),
-        Level({"features": {"max_features": 2048, "all_pairs_up_to": 2, "window": 4}}, {"sfm": 0.4}, 1.05),
+        Level({"features": _FEW}, {"sfm": 0.47}, 1.03),
+        Level({"features": _FEW, "refined": False}, {"sfm": 0.28}, 1.2),
     ),
     "stereo": (
-        Level({"max_side_px": 600}, {"stereo": 0.6, "fuse_photos": 0.6, "openings": 0.7}, 1.3),
-        Level({"max_side_px": 450}, {"stereo": 0.35, "fuse_photos": 0.4, "openings": 0.6}, 1.8),
+        Level(
+            {"max_side_px": 600, "rematch": {"rounds": 1}},
+            {"stereo": 0.5, "fuse_photos": 0.6, "subtract": 0.6, "texture": 0.9},
+            1.3,
+        ),
+        Level(
+            {"max_side_px": 450, "rematch": {"rounds": 1}},
+            {"stereo": 0.31, "fuse_photos": 0.38, "subtract": 0.31, "texture": 0.8},
+            1.9,
+        ),
     ),
-    "openings": (Level({"look_again": False}, {"openings": 0.3}, 1.1),),
-    "texture": (Level({"max_side_px": 1024, "max_triangles": 8000}, {"texture": 0.5}, 1.02),),
-    "simulation_mesh": (Level({"edge_mm": 15.0}, {"drape": 0.35}, 1.5),),
+    "align": (Level({"samples": 3000, "candidates": 3}, {"align": 0.6}, 1.02),),
+    "openings": (
+        Level({"look_again": False, "edge_mm": 6.0}, {"openings": 0.5, "simulation_mesh": 0.6}, 1.1),
+        Level({"look_again": False, "edge_mm": 8.0}, {"openings": 0.42, "simulation_mesh": 0.5}, 1.2),
+    ),
+    "register_mannequin": (Level({"iterations": 8, "rounds": 1, "probes": 4000}, {"register_mannequin": 0.3}, 1.05),),
+    "texture": (Level({"max_side_px": 1024, "max_triangles": 8000}, {"texture": 0.45}, 1.02),),
+    "simulation_mesh": (Level({"edge_mm": 15.0}, {"simulation_mesh": 0.9, "drape": 0.35}, 1.5),),
     "drape": (Level({}, {"drape": 0.6}, 1.05), Level({}, {"drape": 0.45}, 1.3), Level({}, {"drape": 0.25}, 4.6)),
 }
 """Section -> its levels besides the default."""

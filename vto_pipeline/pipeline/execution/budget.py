@@ -21,7 +21,7 @@ from vto_pipeline.pipeline.plan import Plan, Step
 from vto_pipeline.pipeline.request import Request
 
 SETTING = "time_budget_s"
-"""A stage whose settings have this can stop in time; others can be run at another level, or take as long as they take."""
+"""A stage whose settings have this can stop in time; others can run at another level, or take as long as they take."""
 _AT_LEAST = 0.001  # s; the setting is positive
 _SURE = 2.0  # s of stages after which their pace counts as much as what was forecast
 _KEPT_BACK = 0.04  # of what is left, for what forecasts miss
@@ -80,6 +80,7 @@ class Budget:
         open_sections = {name.rpartition(".")[2] for name in self._open}
         self._offers = {name: levels for name, levels in offers.items() if name in open_sections and len(levels) > 1}
         self._chosen: dict[str, Level] = {}
+        self._given: dict[str, float] = {}
         self._took = self._forecast = 0.0
         self._warned = False
 
@@ -94,15 +95,20 @@ class Budget:
             self._chosen[section] = self._offers[section][self._shares().levels[section]]
         return self._chosen.get(section, DEFAULT)
 
+    def by_default(self, step: Step) -> None:
+        """Take note that a stage has to be run by default after all."""
+        self._chosen[step.stage.section] = DEFAULT
+
     def share(self, step: Step, job: Job) -> Config:
         """Return a stage's settings, with what is left as its own budget if it can stop in time."""
         if not can_stop(step):
             return step.settings
         left, stated = self.left_for(step), getattr(step.settings, SETTING)
+        given = self._given[step.stage.name] = min(max(left, _AT_LEAST), stated or math.inf)
         job.measure(time_budget_s=round(left, 1))
         if left <= 0.0:
             job.warn(f"nothing is left for it of the time budget of {self.whole.seconds:g} s")
-        return step.settings.model_copy(update={SETTING: min(max(left, _AT_LEAST), stated or math.inf)})
+        return step.settings.model_copy(update={SETTING: given})
 
     def left_for(self, step: Step) -> float:
         """Return what is left for a stage [s]: neither spent, nor needed by those after it; maybe less than none."""
@@ -119,17 +125,16 @@ class Budget:
                 self._chosen.setdefault(section, one)
         self._ended(name, seconds / self._factor(name))
 
-    def ran(self, step: Step, seconds: float, given: float | None) -> float:
+    def ran(self, step: Step, seconds: float) -> float:
         """Take note of a stage that has run, and return that time as a share of what it takes by default.
 
         Args:
             step: The stage.
             seconds: What it took [s].
-            given: The time after which it had to stop [s].
         """
         name, share = step.stage.name, self._factor(step.stage.name)
         by_default = seconds / share
-        if given is not None and seconds >= _STOPPED * given:  # it would have taken longer; how long is not known
+        if seconds >= _STOPPED * self._given.get(name, math.inf):  # it would have taken longer; how long is not known
             by_default = max(by_default, self._usual[name] * self._pace)
             if name.rpartition(".")[2] in self._offers:
                 self._chosen[step.stage.section] = _stopped_at(self._offers[step.stage.section], seconds / by_default)

@@ -38,7 +38,7 @@ class StageRecord:
         left_out: Parts of its work that this data did not need: (what, reason).
         key: Of its result.
         figures: What the plan knew of its work, from which its time is forecast.
-        level: "settings" that a time budget chose, and their "error", as a multiple of that by default; empty by default.
+        level: "settings" that a time budget chose, and their "error", as a multiple of that by default; or empty.
         share: Its time as a share of what it takes by default.
     """
 

@@ -13,7 +13,7 @@ from vto_pipeline.errors import ComputationError, ConfigError, InputError, VtoEr
 from vto_pipeline.io.documents import suggest
 from vto_pipeline.model.job import Job
 from vto_pipeline.pipeline.catalogue import Catalogue
-from vto_pipeline.pipeline.execution.budget import SETTING, Budget, TimeBudget, can_stop, check_memory
+from vto_pipeline.pipeline.execution.budget import Budget, TimeBudget, can_stop, check_memory
 from vto_pipeline.pipeline.execution.cost import Meter
 from vto_pipeline.pipeline.execution.digest import digest_given
 from vto_pipeline.pipeline.execution.final import make_final
@@ -181,7 +181,7 @@ class _Run:
         self.out.publish(result, mine)
 
     def _key(self, step: Step, digests: dict[str, str]) -> str:
-        """Return the key of a stage's result: with the budget in it if it depends on that, and none is stored without."""
+        """Return the key of a stage's result: with the budget in it if that counts and no result is stored without."""
         name, seed = step.stage.name, self.request.seed
         plain = result_key(step, digests, seed, self.force_all)
         if self.budget is None or not self.budget.adapts(step):
@@ -210,7 +210,7 @@ class _Run:
                 write_value(self.catalogue.kind(artifact), outputs[artifact], unfinished)
             record.take(job, meter)
             if self.budget is not None:
-                record.share = self.budget.ran(step, record.seconds, job.metrics.get(SETTING))
+                record.share = self.budget.ran(step, record.seconds)
             files = {artifact: self.catalogue.kind(artifact).filename for artifact in step.stage.makes}
             return self.store.finish(unfinished, name, record.key, files, asdict(record) | {"reason": reason})
 
@@ -227,6 +227,7 @@ class _Run:
             return self._work(step.changed(level.settings), job)
         except ComputationError as error:
             record.level = {}
+            self.budget.by_default(step)
             job.warn(f"what would have saved time did not do: {error.problem}")
             return self._work(step, job)
 
