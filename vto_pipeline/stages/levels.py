@@ -17,30 +17,27 @@ _FEW = {"max_side_px": 600, "max_features": 1024, "all_pairs_up_to": 2, "window"
 
 LEVELS: dict[str, tuple[Level, ...]] = {
     "sfm": (
-        Level({"features": _FEW}, {"sfm": 0.47}, 1.03),
-        Level({"features": _FEW, "refined": False}, {"sfm": 0.28}, 1.2),
+        Level({"features": _FEW}, {"sfm": 0.47}, 1.02),
+        Level({"features": _FEW, "refined": False}, {"sfm": 0.28}, 1.05),
     ),
     "stereo": (
         Level(
             {"max_side_px": 600, "rematch": {"rounds": 1}},
-            {"stereo": 0.5, "fuse_photos": 0.6, "subtract": 0.6, "texture": 0.9},
-            1.3,
+            {"stereo": 0.52, "fuse_photos": 0.65, "subtract": 0.63, "openings": 1.3, "texture": 0.9},
+            1.4,
         ),
         Level(
             {"max_side_px": 450, "rematch": {"rounds": 1}},
-            {"stereo": 0.31, "fuse_photos": 0.38, "subtract": 0.31, "texture": 0.8},
-            1.9,
+            {"stereo": 0.31, "fuse_photos": 0.38, "subtract": 0.31, "openings": 1.3, "texture": 0.8},
+            2.2,
         ),
     ),
     "align": (Level({"samples": 3000, "candidates": 3}, {"align": 0.6}, 1.02),),
-    "openings": (
-        Level({"look_again": False, "edge_mm": 6.0}, {"openings": 0.5, "simulation_mesh": 0.6}, 1.1),
-        Level({"look_again": False, "edge_mm": 8.0}, {"openings": 0.42, "simulation_mesh": 0.5}, 1.2),
-    ),
+    "openings": (Level({"look_again": False, "edge_mm": 6.0}, {"openings": 0.7, "simulation_mesh": 0.6}, 1.03),),
     "register_mannequin": (Level({"iterations": 8, "rounds": 1, "probes": 4000}, {"register_mannequin": 0.3}, 1.05),),
     "texture": (Level({"max_side_px": 1024, "max_triangles": 8000}, {"texture": 0.45}, 1.02),),
     "simulation_mesh": (Level({"edge_mm": 15.0}, {"simulation_mesh": 0.9, "drape": 0.35}, 1.5),),
-    "drape": (Level({}, {"drape": 0.6}, 1.05), Level({}, {"drape": 0.45}, 1.3), Level({}, {"drape": 0.25}, 4.6)),
+    "drape": (Level({}, {"drape": 0.6}, 1.05), Level({}, {"drape": 0.45}, 1.3)),
 }
 """Section -> its levels besides the default."""
 
