@@ -13,7 +13,7 @@ from dataclasses import replace
 from vto_pipeline.pipeline.levels import Level, UsualTime
 from vto_pipeline.pipeline.stage import Stage
 
-_FEW = {"max_side_px": 600, "max_features": 1024, "all_pairs_up_to": 2, "window": 4}
+_FEW = {"max_side_px": 1200, "max_features": 1024, "all_pairs_up_to": 2, "window": 4}
 
 LEVELS: dict[str, tuple[Level, ...]] = {
     "sfm": (
