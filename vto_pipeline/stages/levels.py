@@ -1,10 +1,11 @@
 """What a stage takes, and at which levels a run with a time budget may run it: as measured on the sample shirt.
 
 Times are shares of CPU time, errors multiples of the 95th percentile of the garment's distance to the truth, each level
-alone against all defaults (`python -m vto_pipeline.bench.scan.levels` measures them again). Errors of a drape that has to
-stop, and of a coarser mesh, are set by their distance from the drape by default, beside what two scans differ by. What
-shows in neither, as texture, has a small one, so that it is given up first. Those of `align` and `register_mannequin`
-are judged, not measured. The usual times are those of docs/results, with both threads of a quiet machine.
+alone against all defaults (`python -m vto_pipeline.bench.scan.levels` measures them again). Errors of a drape that has
+to stop, and of a coarser mesh, are set by their distance from the drape by default, beside what two scans differ by.
+What shows in neither, as texture, has a small one, so that it is given up first. Those of `align` and
+`register_mannequin` are judged, not measured. The usual times are those of docs/results, with both threads of a quiet
+machine.
 """
 
 from __future__ import annotations

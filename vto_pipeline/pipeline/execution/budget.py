@@ -24,6 +24,8 @@ SETTING = "time_budget_s"
 """A stage whose settings have this can stop in time; others can run at another level, or take as long as they take."""
 _AT_LEAST = 0.001  # s; the setting is positive
 _SURE = 2.0  # s of stages after which their pace counts as much as what was forecast
+UNSURE = 1.25
+"""What the table of stages says is taken so many times: other captures take longer than the sample."""
 _KEPT_BACK = 0.04  # of what is left, for what forecasts miss
 _MORE = 60.0  # s, of which it is said what they would buy
 _STOPPED = 0.95  # of what a stage may take; one that took that had to stop
@@ -212,7 +214,7 @@ def _usual_times(request: Request, plan: Plan, model: CostModel, finals: Mapping
         stage = next(step.stage for step in plan.steps if step.stage.name == name)
         rough = stage.usual.of(_files(figures)) if stage.usual else 0.0
         known = finals.get(name, model.seconds(name, figures))
-        found[name] = pace * rough if known is None else known
+        found[name] = UNSURE * pace * rough if known is None else known
     return found
 
 

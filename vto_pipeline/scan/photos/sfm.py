@@ -48,7 +48,9 @@ class SfmConfig(Config):
 
     features: FeatureConfig = Field(default_factory=FeatureConfig, description="Features and matching")
     enough_features: int = Field(1000, ge=50, le=20_000, description="With fewer per photo, fainter ones are used")
-    refined: bool = Field(True, description="Cameras are adjusted to far more points than features, in neighbouring photos")
+    refined: bool = Field(
+        True, description="Cameras are adjusted to far more points than features, in neighbouring photos"
+    )
     max_error_px: float = Field(2.0, gt=0.1, le=10, description="Largest mean error of a sparse point [px]")
     min_views: int = Field(3, ge=2, le=10, description="Photos that must have seen a sparse point")
     max_camera_px: float = Field(
