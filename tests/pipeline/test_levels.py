@@ -286,3 +286,14 @@ def test_a_level_that_fails_is_done_by_default(machine):
     machine.broken = {("scan", 1000)}
     with pytest.raises(ComputationError, match="too few pixels"):
         machine(300.0, run_name="other")
+
+
+def test_a_failure_after_coarser_stages_is_told_with_them(machine):
+    """At more time it might not fail; where nothing was made coarser, time does not help."""
+    machine.broken = {("mesh", None)}
+    with pytest.raises(ComputationError) as hurried:
+        machine(40.0)
+    assert hurried.value.hint == "give more time than 40 s: for that, less was made of scan"
+    with pytest.raises(ComputationError) as calm:
+        machine(300.0, run_name="calm")
+    assert not calm.value.hint

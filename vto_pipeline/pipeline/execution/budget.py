@@ -101,6 +101,12 @@ class Budget:
         """Take note that a stage has to be run by default after all."""
         self._chosen[step.stage.section] = DEFAULT
 
+    @property
+    def coarser(self) -> str:
+        """What the budget made of the stages so far, in words; empty where all ran by default."""
+        names = ", ".join(name for name, level in self._chosen.items() if level.settings)
+        return names and f"give more time than {self.whole.seconds:g} s: for that, less was made of {names}"
+
     def share(self, step: Step, job: Job) -> Config:
         """Return a stage's settings, with what is left as its own budget if it can stop in time."""
         if not can_stop(step):

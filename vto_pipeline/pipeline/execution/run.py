@@ -149,6 +149,8 @@ class _Run:
             record.status, record.reason = "failed", error.problem
             if isinstance(error, ComputationError) and error.partial:
                 self.out.put_partial(error.partial)
+            if isinstance(error, ComputationError) and self.budget is not None:
+                error.hint = "; ".join(filter(None, [self.budget.coarser, error.hint]))
             raise
         except OSError as error:  # a full disk, say; what can no longer be recorded is still told
             record.status, record.reason = "failed", str(error.strerror)
