@@ -17,7 +17,7 @@ from vto_pipeline.pipeline.levels import Level, UsualTime
 from vto_pipeline.pipeline.stage import Stage
 
 _FEW = {"max_side_px": 1200, "max_features": 1024}
-"""Never fewer pairs: matched with their nearest four only, 16 photos of a scene were placed wrongly by 0.9 m, silently."""
+"""Never fewer pairs: matched with the nearest four only, 16 photos of a scene were placed 0.9 m off, silently."""
 
 LEVELS: dict[str, tuple[Level, ...]] = {
     "sfm": (
