@@ -10,6 +10,7 @@ from pydantic import Field
 from toy_tables import GIVEN, KINDS, TOY, AddConfig
 
 from vto_pipeline.pipeline.catalogue import Catalogue
+from vto_pipeline.pipeline.execution import budget
 from vto_pipeline.pipeline.execution.budget import TimeBudget
 from vto_pipeline.pipeline.execution.run import run
 from vto_pipeline.pipeline.plan import make_plan
@@ -34,6 +35,7 @@ def budgeted(ask, tmp_path, monkeypatch):
     told: list[float | None] = []
     now = 100.0
     monkeypatch.setattr(time, "perf_counter", lambda: now)
+    monkeypatch.setattr(budget, "machine_pace", lambda: 1.0)
 
     def taking(stage, seconds):
         def slow(inputs, settings, job):
@@ -55,7 +57,7 @@ def budgeted(ask, tmp_path, monkeypatch):
 
     def budgeted(seconds: float | None, offset: int = 0) -> tuple[dict, list[float | None]]:
         told.clear()
-        overrides = [f"add.offset={offset}", *([f"add.time_budget_s={seconds}"] if seconds else [])]
+        overrides = [f"add.offset={offset}"]
         whole = TimeBudget(seconds, time.perf_counter() - STARTING) if seconds else None
         request = ask(DOCUMENT, overrides)
         return run(request, make_plan(request, tables), tables, tmp_path / "run", time_budget=whole), list(told)
@@ -85,4 +87,4 @@ def test_a_budget_that_is_spent_is_a_warning(budgeted):
     record, (left,) = budgeted(BEFORE / 2)
     assert 0.0 < left < 0.01
     add = next(stage for stage in record["stages"] if stage["name"] == "add")
-    assert add["warnings"] == ["nothing is left for it of the time budget of 1.5 s"]
+    assert add["warnings"][-1] == "nothing is left for it of the time budget of 1.5 s"

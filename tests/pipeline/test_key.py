@@ -42,6 +42,12 @@ def test_each_part_counts(step, inputs, seed, force_all):
     assert result_key(step, inputs, seed, force_all) != result_key(STEP, INPUTS, 0, False)
 
 
+def test_a_time_budget_counts_and_none_is_no_part_of_the_key():
+    plain = result_key(STEP, INPUTS, 0, False)
+    assert result_key(STEP, INPUTS, 0, False, None) == plain
+    assert len({plain, result_key(STEP, INPUTS, 0, False, 60.0), result_key(STEP, INPUTS, 0, False, 61.0)}) == 3
+
+
 def test_a_new_version_or_source_counts(monkeypatch):
     before = result_key(STEP, INPUTS, 0, False)
     monkeypatch.setattr(key_module, "_version", lambda name: "99")

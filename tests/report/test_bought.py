@@ -46,6 +46,27 @@ def test_what_took_longest_comes_first_and_what_was_stored_took_nothing():
     assert second.startswith("another minute for drape: not known, as it has not moved for long enough")
 
 
+def test_the_level_of_a_stage_is_told_with_what_it_costs_and_what_a_minute_more_would_choose():
+    level = {"settings": {"max_side_px": 600, "rematch": {"rounds": 2}}, "error": 1.25}
+    scanned = {**stage("garment.stereo", "ran", 12.0), "level": level}
+    more = {"levels": {"stereo": {}, "sfm": {"features": {"window": 4}}}, "error": 0.8}
+    first, second = budget_lines(record(scanned, another_minute=more, time_least_s=40.0), ())
+    assert first.endswith("garment.stereo 12.0 s (max_side_px=600, rematch.rounds=2: 1.25 times the usual error)")
+    assert second == (
+        "another minute for the whole run: stereo as usual; sfm features.window=4; about 0.80 times this error"
+    )
+    nothing = record(scanned, another_minute={"levels": {}, "error": 1.0}, time_least_s=40.0)
+    assert list(budget_lines(nothing, ()))[1] == "another minute for the whole run: nothing more"
+
+
+def test_a_budget_that_was_not_kept_is_told_with_the_least():
+    late = record(stage("garment.sfm", "ran", 70.0), time_spent_s=75.0, time_least_s=71.3)
+    assert list(budget_lines(late, ()))[1] == (
+        "the time budget was not kept: this run takes 71 s at least, on this machine as loaded"
+    )
+    assert len(list(budget_lines({**late, "time_spent_s": 65.9}, ()))) == 1
+
+
 def test_a_run_of_an_earlier_version_has_no_time_spent():
     older = record(stage("drape", "ran", 31.5))
     del older["time_spent_s"]

@@ -21,6 +21,7 @@ from vto_pipeline.scan.photos.matching.mapping import copy_database
 from vto_pipeline.scan.photos.scale import ScaleConfig, apply_board, apply_scale
 from vto_pipeline.scan.photos.sfm import SfmConfig, estimate_cameras
 from vto_pipeline.scan.similarity import fit_similarity
+from vto_pipeline.stages.levels import LEVELS
 
 
 @pytest.fixture(scope="module")
@@ -41,6 +42,19 @@ def test_every_photo_is_placed_where_it_was_taken(sparse, shot):
     error = np.linalg.norm(scale * centers @ transform[:3, :3].T + transform[:3, 3] - truth, axis=1)
     assert np.median(error) < 2e-3  # at 1 m and 1.9 mm per pixel
     assert_allclose(cameras.intrinsics[0].fx, 528.0, rtol=0.01, atol=0)  # focal length is refined, from 16 photos
+
+
+def test_cameras_are_not_adjusted_to_more_points_when_that_is_not_asked(shot):
+    """The coarsest level of a run with a time budget: cameras are found all the same, less well."""
+    job = Job()
+    cameras, _ = estimate_cameras(shot[0], SfmConfig.model_validate(LEVELS["sfm"][-1].settings), job)
+    assert not cameras.unregistered
+    assert "tracked_points" not in job.metrics
+    assert [what for what, _ in job.left_out] == ["an adjustment to more points than features"]
+    centers, truth = cameras.world_from_cam[:, :3, 3], shot[1][:, :3, 3]
+    scale, transform = fit_similarity(centers, truth)
+    error = np.linalg.norm(scale * centers @ transform[:3, :3].T + transform[:3, 3] - truth, axis=1)
+    assert 1e-4 < np.median(error) < 4e-3  # at 1 m; twice what is asked of the default
 
 
 def test_first_camera_is_in_front_and_up_is_up(sparse):

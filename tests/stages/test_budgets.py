@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -16,9 +18,10 @@ from vto_pipeline.cli.session import Session
 from vto_pipeline.errors import ConfigError
 from vto_pipeline.pipeline.execution.budget import TimeBudget
 from vto_pipeline.stages.entry import commands
-from vto_pipeline.stages.entry.documents import drape_order, fit_order
+from vto_pipeline.stages.entry.documents import drape_order, fit_order, scan_order
 from vto_pipeline.stages.entry.outcome import Outcome
 from vto_pipeline.stages.entry.planning import catalogue
+from vto_pipeline.stages.levels import LEVELS, USUAL
 from vto_pipeline.units import LENGTH_M, MEMORY_B, TIME_S
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"
@@ -49,15 +52,50 @@ def test_the_drape_keeps_both(asked, garments):
     order = drape_order([SHIRT, FORM][:garments], ["denim"], None, TAPE, FORM, False, "a test")
     whole = TimeBudget(90.0)
     settings, time_budget = asked(order, time_budget=whole, target_error=0.002)
-    assert (settings.time_budget_s, settings.target_error_mm, time_budget) == (90.0, 2.0, whole)
+    assert (settings.time_budget_s, settings.target_error_mm, time_budget) == (None, 2.0, whole)
     settings, time_budget = asked(order)
-    assert (settings.time_budget_s, time_budget) == (None, None)
+    assert (settings.time_budget_s, settings.target_error_mm, time_budget) == (None, 0.5, None)
 
 
-@pytest.mark.parametrize("budgets", [{"time_budget": TimeBudget(90.0)}, {"target_error": 0.002}])
-def test_a_run_without_a_drape_promises_nothing(asked, budgets):
-    with pytest.raises(ConfigError, match="no drape in this run"):
+@pytest.mark.parametrize(
+    ("budgets", "refused"),
+    [({"time_budget": TimeBudget(90.0)}, "no stage of this run works"), ({"target_error": 0.002}, "no drape")],
+)
+def test_a_run_that_cannot_adapt_promises_nothing(asked, budgets, refused):
+    with pytest.raises(ConfigError, match=refused):
         asked(fit_order(None, TAPE, None, None, None, None, "a test"), **budgets)
+
+
+def test_a_scan_takes_a_budget_without_a_drape(asked):
+    order = scan_order(SAMPLES / "shirt_on_form" / "photos", "garment", FORM, (), "a test")
+    whole = TimeBudget(90.0)
+    assert asked(order, time_budget=whole)[1] == whole
+
+
+def test_every_level_is_a_valid_setting_and_each_coarser_one_saves_time_for_error():
+    stages = {stage.section: stage for stage in catalogue().stages}
+    assert LEVELS.keys() <= stages.keys()
+    assert USUAL.keys() <= stages.keys()
+    for section, levels in LEVELS.items():
+        assert section in USUAL
+        before = (1.0, 1.0)
+        for level in levels:
+            stages[section].settings.model_validate(level.settings)
+            assert level.seconds.keys() <= stages.keys()
+            time_share = math.prod(level.seconds.values())
+            assert time_share < before[0]
+            assert level.error > before[1]
+            before = (time_share, level.error)
+
+
+def test_usual_times_are_those_of_the_results():
+    """Within a half of what the last measured run of the demo took, for all that takes long."""
+    rows = json.loads((SAMPLES.parent / "docs" / "results" / "demo.json").read_text())["rows"]
+    files = {"photos": 37.0}
+    for row in rows:
+        if row["method"].startswith("stage ") and row["seconds"] > 1.0:
+            section = row["method"].removeprefix("stage ").rpartition(".")[2]
+            assert USUAL[section].of(files) == pytest.approx(row["seconds"], rel=0.5), section
 
 
 @pytest.mark.parametrize(

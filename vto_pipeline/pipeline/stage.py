@@ -8,6 +8,7 @@ from typing import Any
 
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.settings import Config
+from vto_pipeline.pipeline.levels import Level, UsualTime
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,8 @@ class Stage:
         fits_memory: It works in what `Job.memory_left` says, or refuses in words.
         piecewise: It keeps what it has made in `Job.kept`, and begins with what is there.
         idle: Settings -> those of the optional artifacts that it has no use for under these.
+        levels: What a run with a time budget may run it at instead of by default.
+        usual: What it takes by default, where it has never run.
     """
 
     name: str
@@ -46,6 +49,8 @@ class Stage:
     fits_memory: bool = False
     piecewise: bool = False
     idle: Callable[[Any], tuple[str, ...]] = lambda settings: ()
+    levels: tuple[Level, ...] = ()
+    usual: UsualTime | None = None
 
     def __post_init__(self) -> None:
         if self.skip is not None and set(self.passes) != set(self.makes):

@@ -11,6 +11,7 @@ from vto_pipeline.model.cloth import TraceRow
 
 _MORE = 60.0  # s
 _FEWEST = 3  # errors that a rate is taken from
+_LATE = 1.1  # of a budget; later it is not kept
 
 
 def budget_lines(run_record: Mapping[str, Any], trace: Sequence[TraceRow]) -> Iterator[str]:
@@ -24,6 +25,9 @@ def budget_lines(run_record: Mapping[str, Any], trace: Sequence[TraceRow]) -> It
         used = run_record.get("time_spent_s", run_record["seconds"])
         bought = ", ".join(_bought(run_record)) or "everything was stored"
         yield f"time budget: {used:.1f} of {run_record['time_budget_s']:g} s used; {bought}"
+        least = run_record.get("time_least_s")
+        if used > _LATE * run_record["time_budget_s"] and least is not None:
+            yield f"the time budget was not kept: this run takes {least:.0f} s at least, on this machine as loaded"
         yield from _another_minute(run_record, trace)
     if run_record.get("memory_budget_mb"):
         yield f"memory budget of {run_record['memory_budget_mb'] / 1e3:g} GB: {_largest(run_record)}"
@@ -62,11 +66,32 @@ def _bought(run_record: Mapping[str, Any]) -> Iterator[str]:
         if "settled" in stage["metrics"]:
             error = stage["metrics"]["error_mm"]
             reached = " (how much motion is left is unknown)" if error is None else f" ({error:.2g} mm of motion left)"
-        yield f"{stage['name']} {stage['seconds']:.1f} s{reached}"
+        level = stage.get("level") or {}
+        chosen = f" ({in_words(level['settings'])}: {_times(level['error'])})" if level.get("settings") else ""
+        yield f"{stage['name']} {stage['seconds']:.1f} s{chosen}{reached}"
+
+
+def in_words(settings: Mapping[str, Any]) -> str:
+    """Return settings as `key=value`, those within settings with a dot."""
+    found = []
+    for name, value in settings.items():
+        inner = value.items() if isinstance(value, Mapping) else [("", value)]
+        found += [f"{name}.{key}={one}" if key else f"{name}={one}" for key, one in inner]
+    return ", ".join(found)
+
+
+def _times(error: float) -> str:
+    return f"{error:.2f} times the usual error"
 
 
 def _another_minute(run_record: Mapping[str, Any], trace: Sequence[TraceRow]) -> Iterator[str]:
-    """Yield what more time would buy, where there is a drape."""
+    """Yield what more time would buy: for the whole, shared out anew, and for the drape alone."""
+    more = run_record.get("another_minute")
+    if more is not None and more["levels"]:
+        bought = "; ".join(f"{section} {in_words(chosen) or 'as usual'}" for section, chosen in more["levels"].items())
+        yield f"another minute for the whole run: {bought}; about {more['error']:.2f} times this error"
+    elif more is not None:
+        yield "another minute for the whole run: nothing more"
     for stage in run_record["stages"]:
         settled, reached = (stage["metrics"].get(name) for name in ("settled", "error_mm"))
         if settled is None:

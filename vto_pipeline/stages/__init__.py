@@ -1,6 +1,7 @@
 """The table: every stage, every artifact, and what may be given.
 
 scan, garment, avatar, cloth, motion, poses, scan_report, output: the rows, by subject
+levels: what stages take, and what a time budget may run them at
 roles: rows that serve garment, mannequin and body alike
 outfit, outfit_page: several garments in one document
 entry: the ways in to the tables
@@ -11,6 +12,7 @@ from __future__ import annotations
 from vto_pipeline.io.runs.artifacts import ARTIFACTS
 from vto_pipeline.pipeline.catalogue import Catalogue
 from vto_pipeline.stages import avatar, cloth, garment, motion, output, poses, scan, scan_report
+from vto_pipeline.stages.levels import with_levels
 from vto_pipeline.stages.roles import ROLES
 
 _SCANNED = ("photos", "video", "depth", "cloud", "surface")
@@ -33,15 +35,10 @@ GIVEN = {
 """Key under `given:` in a document -> artifact."""
 
 CATALOGUE = Catalogue(
-    stages=(
-        *scan.STAGES,
-        *garment.STAGES,
-        *avatar.STAGES,
-        *cloth.STAGES,
-        *motion.STAGES,
-        *poses.STAGES,
-        *scan_report.STAGES,
-        *output.STAGES,
+    stages=tuple(
+        with_levels(row)
+        for rows in (scan, garment, avatar, cloth, motion, poses, scan_report, output)
+        for row in rows.STAGES
     ),
     kinds=ARTIFACTS,
     given=GIVEN,

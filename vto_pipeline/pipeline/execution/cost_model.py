@@ -27,6 +27,8 @@ from vto_pipeline.pipeline.request import Request
 Figures = Mapping[str, float | str]
 """What a plan knows of a stage's work: logarithms of sizes and settings, and names of what was given."""
 
+FILES = " files"
+"""What follows the key of something given in the name of the number of its files."""
 _NOISE = 0.3  # of the logarithm of a time: one run against the next
 _EXPONENT = 1.0  # prior of the power of a size; work is rarely more than quadratic
 _EFFECT = 0.5  # prior of what one garment or body adds to the logarithm
@@ -76,7 +78,7 @@ def _of_given(one: Given, size: Callable[[Path], tuple[int, int]]) -> dict[str, 
     found: dict[str, float | str] = {one.key: str(one.source)}
     if sizes:
         files, held = (sum(column) for column in zip(*sizes, strict=True))
-        found |= {f"{one.key} files": math.log1p(files), f"{one.key} bytes": math.log1p(held)}
+        found |= {f"{one.key}{FILES}": math.log1p(files), f"{one.key} bytes": math.log1p(held)}
     return found
 
 
@@ -195,7 +197,10 @@ class CostModel:
 
 
 def _records(store: Store, stage: str) -> Iterator[tuple[Figures, float, float]]:
-    """Yield figures, time [s] and peak memory [MB] of a stage's latest results that were not skipped."""
+    """Yield figures, time [s] and peak memory [MB] of a stage's latest results that were not skipped.
+
+    The time is that by default: at a level that takes a third of it, three times as much as was measured.
+    """
     dated = []
     for manifest in (store.folder / stage).glob(f"*/{MANIFEST}"):
         with suppress(OSError):  # gone meanwhile
@@ -204,4 +209,5 @@ def _records(store: Store, stage: str) -> Iterator[tuple[Figures, float, float]]
         with suppress(OSError, ValueError, KeyError, TypeError):  # not ours
             record = json.loads(manifest.read_text(encoding="utf-8"))["record"]
             if not record["reason"]:
-                yield record["figures"], float(record["seconds"]), float(record["peak_mb"])
+                by_default = float(record["seconds"]) / float(record.get("share", 1.0))
+                yield record["figures"], by_default, float(record["peak_mb"])

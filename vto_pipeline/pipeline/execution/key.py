@@ -13,7 +13,9 @@ from vto_pipeline.pipeline.plan import Plan, Step
 from vto_pipeline.pipeline.request import Request
 
 
-def result_key(step: Step, inputs: Mapping[str, str], seed: int, force_all: bool) -> str:
+def result_key(
+    step: Step, inputs: Mapping[str, str], seed: int, force_all: bool, time_budget: float | None = None
+) -> str:
     """Digest of stage, settings with defaults, content of the inputs, versions, seed.
 
     Args:
@@ -21,8 +23,10 @@ def result_key(step: Step, inputs: Mapping[str, str], seed: int, force_all: bool
         inputs: Artifact -> content digest, for the inputs it gets.
         seed: The run's.
         force_all: Whether nothing may be left out.
+        time_budget: Of the whole run [s], for a stage that does by it what it can in time.
     """
-    return digest_value({**_of_step(step), "inputs": dict(inputs), **_of_run(seed, force_all)})[:32]
+    budget = {} if time_budget is None else {"time_budget_s": time_budget}
+    return digest_value({**_of_step(step), "inputs": dict(inputs), **_of_run(seed, force_all), **budget})[:32]
 
 
 def run_key(request: Request, plan: Plan, force_all: bool, of_path: OfPath = digest_path) -> str:

@@ -38,6 +38,8 @@ class StageRecord:
         left_out: Parts of its work that this data did not need: (what, reason).
         key: Of its result.
         figures: What the plan knew of its work, from which its time is forecast.
+        level: "settings" that a time budget chose, and their "error", as a multiple of that by default; or empty.
+        share: Its time as a share of what it takes by default.
     """
 
     name: str
@@ -51,6 +53,8 @@ class StageRecord:
     left_out: list[Any] = field(default_factory=list)
     key: str = ""
     figures: Mapping[str, float | str] = field(default_factory=dict)
+    level: Mapping[str, Any] = field(default_factory=dict)
+    share: float = 1.0
 
     def take(self, job: Job, meter: Meter) -> None:
         """Copy a job's messages, metrics and cost."""
@@ -60,12 +64,12 @@ class StageRecord:
 
     def recall(self, stored: Mapping[str, Any]) -> None:
         """Copy what was stored with a cached result."""
-        for name in ("seconds", "peak_mb", "metrics", "notes", "warnings", "left_out"):
-            setattr(self, name, stored[name])
+        for name in ("seconds", "peak_mb", "metrics", "notes", "warnings", "left_out", "level", "share"):
+            setattr(self, name, stored.get(name, getattr(self, name)))
 
 
 class RunRecord:
-    """All of run.json, kept in step with the run."""
+    """All of run.json, kept in step with the run. `bought` is what a time budget has to say at the end."""
 
     def __init__(
         self,
@@ -76,6 +80,7 @@ class RunRecord:
         memory: float | None = None,
     ) -> None:
         self._path, self._meter, self._time_budget = path, Meter(), time_budget
+        self.bought: dict[str, Any] = {}
         uses = sorted({name for step in plan.steps for name in step.stage.uses})
         figures = step_figures(request, plan)
         self.stages = {name: StageRecord(name, figures=known) for name, known in figures.items()}
@@ -97,7 +102,13 @@ class RunRecord:
         """What run.json holds."""
         stages = [asdict(stage) for stage in self.stages.values()]
         spent = self._time_budget and round(self._time_budget.spent, 3)
-        return {**self._head, "stages": stages, "seconds": self._meter.seconds(), "time_spent_s": spent}
+        return {
+            **self._head,
+            "stages": stages,
+            "seconds": self._meter.seconds(),
+            "time_spent_s": spent,
+            **self.bought,
+        }
 
     def save(self) -> None:
         """Write run.json, whole or not at all."""

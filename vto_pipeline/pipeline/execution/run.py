@@ -13,16 +13,18 @@ from vto_pipeline.errors import ComputationError, ConfigError, InputError, VtoEr
 from vto_pipeline.io.documents import suggest
 from vto_pipeline.model.job import Job
 from vto_pipeline.pipeline.catalogue import Catalogue
-from vto_pipeline.pipeline.execution.budget import Budget, TimeBudget, check_memory
+from vto_pipeline.pipeline.execution.budget import Budget, TimeBudget, can_stop, check_memory
 from vto_pipeline.pipeline.execution.cost import Meter
 from vto_pipeline.pipeline.execution.digest import digest_given
 from vto_pipeline.pipeline.execution.final import make_final
 from vto_pipeline.pipeline.execution.folder import RECORD, locked_run_folder
+from vto_pipeline.pipeline.execution.forecast import stored_results
 from vto_pipeline.pipeline.execution.key import result_key
 from vto_pipeline.pipeline.execution.listener import Listener
 from vto_pipeline.pipeline.execution.out import OutputFolder, write_value
 from vto_pipeline.pipeline.execution.record import RunRecord, StageRecord, final_seconds
 from vto_pipeline.pipeline.execution.store import Result, Store
+from vto_pipeline.pipeline.levels import DEFAULT
 from vto_pipeline.pipeline.plan import Plan, Step
 from vto_pipeline.pipeline.request import Request
 
@@ -51,8 +53,8 @@ def run(
         listener: Receives how it goes.
         cache: Where results are kept, which several runs may share; None: in the run's folder.
         afresh: Stage that is made anew, with all that depends on it, though results are stored.
-        time_budget: Of the whole run; what other stages leave of it is the budget of one that can stop in time. None:
-            each has what its settings say.
+        time_budget: Of the whole run: stages are run at levels that fit, and what is left is the budget of one that can
+            stop in time. None: each has what its settings say.
         memory: Budget of the process's resident memory [B], for each stage; None: what the machine has.
 
     Returns:
@@ -68,7 +70,10 @@ def run(
     with locked_run_folder(folder, [path for one in request.given.values() for path in one.paths]):
         store = Store(folder / "cache" if cache is None else cache)
         finals = final_seconds(folder / RECORD, plan)
-        budget = None if time_budget is None else Budget(time_budget, request, plan, store, finals)
+        budget = None
+        if time_budget is not None:
+            ready = [step.stage.name for step, found in stored_results(request, plan, store, force_all) if found]
+            budget = Budget(time_budget, request, plan, store, finals, set(ready) - renewed)
         if memory is not None:
             check_memory(memory, request, plan, store, force_all, renewed)
         runner = _Run(
@@ -144,6 +149,8 @@ class _Run:
             record.status, record.reason = "failed", error.problem
             if isinstance(error, ComputationError) and error.partial:
                 self.out.put_partial(error.partial)
+            if isinstance(error, ComputationError) and self.budget is not None:
+                error.hint = "; ".join(filter(None, [self.budget.coarser, error.hint]))
             raise
         except OSError as error:  # a full disk, say; what can no longer be recorded is still told
             record.status, record.reason = "failed", str(error.strerror)
@@ -156,7 +163,7 @@ class _Run:
     def _do(self, number: int, step: Step, record: StageRecord) -> None:
         name = step.stage.name
         digests = {artifact: self._digest(artifact) for artifact in step.inputs}
-        record.key = result_key(step, digests, self.request.seed, self.force_all)
+        record.key = self._key(step, digests)
         with self.store.claimed(name, record.key):
             result = None if name in self.renewed else self.store.find(name, record.key)
             if result is None:
@@ -166,12 +173,27 @@ class _Run:
             else:
                 record.recall(result.record)
                 record.status = "cached"
+                if self.budget is not None:
+                    self.budget.found(name, record.level, record.seconds)
         record.reason = result.record["reason"]
         if record.reason:
             record.status = "left_out"
         mine = [artifact for artifact in step.stage.makes if self.plan.makers.get(artifact) == name]
         self.results.update(dict.fromkeys(mine, result))
         self.out.publish(result, mine)
+
+    def _key(self, step: Step, digests: dict[str, str]) -> str:
+        """Return the key of a stage's result: with the budget in it if that counts and no result is stored without."""
+        name, seed = step.stage.name, self.request.seed
+        plain = result_key(step, digests, seed, self.force_all)
+        if self.budget is None or not self.budget.adapts(step):
+            return plain
+        hurried = result_key(step, digests, seed, self.force_all, self.budget.whole.seconds)
+        if name not in self.renewed:
+            for key in (plain, hurried):
+                if self.store.find(name, key) is not None:
+                    return key
+        return plain if self.budget.level(step) is DEFAULT and not can_stop(step) else hurried
 
     def _make(self, step: Step, record: StageRecord) -> Result:
         """Read the inputs, call the stage, write what it returns."""
@@ -183,17 +205,35 @@ class _Run:
             job.kept = self.store.kept(name, record.key) if step.stage.piecewise else None
             try:
                 with self._unchanged(step):
-                    outputs, reason = self._call(step, job)
+                    outputs, reason = self._call(step, job, record)
             finally:
                 record.take(job, meter)
             for artifact in step.stage.makes:
                 write_value(self.catalogue.kind(artifact), outputs[artifact], unfinished)
             record.take(job, meter)
+            if self.budget is not None:
+                record.share = self.budget.ran(step, record.seconds)
             files = {artifact: self.catalogue.kind(artifact).filename for artifact in step.stage.makes}
             return self.store.finish(unfinished, name, record.key, files, asdict(record) | {"reason": reason})
 
-    def _call(self, step: Step, job: Job) -> tuple[dict[str, Any], str]:
+    def _call(self, step: Step, job: Job, record: StageRecord) -> tuple[dict[str, Any], str]:
         """Outputs by artifact, and the reason if the stage was skipped."""
+        if self.budget is None:
+            return self._work(step, job)
+        self.budget.warn_if_short(job)
+        level = self.budget.level(step)
+        if level is DEFAULT:
+            return self._work(step, job)
+        try:
+            record.level = {"settings": dict(level.settings), "error": level.error}
+            return self._work(step.changed(level.settings), job)
+        except ComputationError as error:
+            record.level = {}
+            self.budget.by_default(step)
+            job.warn(f"what would have saved time did not do: {error.problem}")
+            return self._work(step, job)
+
+    def _work(self, step: Step, job: Job) -> tuple[dict[str, Any], str]:
         inputs = {artifact: self._read(artifact, job) for artifact in step.inputs}
         skip = None if self.force_all else step.stage.skip
         reason = skip(inputs) if skip is not None else None
@@ -228,6 +268,8 @@ class _Run:
                 )
 
     def _finals(self, steps: list[tuple[int, Step]]) -> None:
+        if self.budget is not None:
+            self.record.bought = self.budget.summary()
         for number, step in steps:
             record, meter = self.record.stages[step.stage.name], Meter()
             self.listener.started(number, len(self.plan.steps), step.stage)

@@ -48,6 +48,9 @@ class SfmConfig(Config):
 
     features: FeatureConfig = Field(default_factory=FeatureConfig, description="Features and matching")
     enough_features: int = Field(1000, ge=50, le=20_000, description="With fewer per photo, fainter ones are used")
+    refined: bool = Field(
+        True, description="Cameras are adjusted to far more points than features, in neighbouring photos"
+    )
     max_error_px: float = Field(2.0, gt=0.1, le=10, description="Largest mean error of a sparse point [px]")
     min_views: int = Field(3, ge=2, le=10, description="Photos that must have seen a sparse point")
     max_camera_px: float = Field(
@@ -98,7 +101,10 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
         few = f"fewer than {MIN_PHOTOS} of {len(names)} photos could be placed and tied together by {LEAST_TIES} points"
         problem = f"{few} ({pairs} pairs match); features per photo: {each}"
         raise ScanError(problem, where=str(photos.paths[0].parent), hint=ADVICE)
-    model = adjust(model, photos, job)
+    if config.refined:
+        model = adjust(model, photos, job)
+    else:
+        job.leave_out("an adjustment to more points than features", "sfm.refined is false")
     _check_certain(model, photos, config, job)
     cameras, cloud = _upright(*_values(model, names, config))
     cloud = _without_surroundings(cameras, cloud, job)

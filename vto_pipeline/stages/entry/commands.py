@@ -11,7 +11,7 @@ from typing import Any
 from vto_pipeline.errors import ComputationError, ConfigError
 from vto_pipeline.io.documents import Document, load_yaml
 from vto_pipeline.io.files import replacing
-from vto_pipeline.pipeline.execution.budget import SETTING, TimeBudget
+from vto_pipeline.pipeline.execution.budget import TimeBudget
 from vto_pipeline.pipeline.execution.listener import Listener
 from vto_pipeline.pipeline.execution.run import run as run_plan
 from vto_pipeline.stages.entry import planning
@@ -182,7 +182,7 @@ def run_order(
         cache: Where results are kept, which several runs may share; None: in RUN.
         until: Stage to stop after; None: all that is wanted is made.
         afresh: Stage that is made anew with all that depends on it, though results are stored.
-        time_budget: Of the whole run: the drape takes what the other stages leave of it.
+        time_budget: Of the whole run, shared out over its stages; the drape takes what is left.
         target_error: Error of the drape [m] at which it may end.
         memory: Budget of memory [B], for each stage.
 
@@ -190,12 +190,14 @@ def run_order(
         VtoError: of whatever kind; a failed computation is recorded in run.json and its partial result named.
     """
     folder = Path(output) if output is not None else order.folder
-    changes = [*overrides, *_budget_settings(time_budget, target_error)]
+    changes = [*overrides, *_target_settings(target_error)]
     request, plan, tables = planning.planned_document(
         order.document, base or Path.cwd(), changes, planning.catalogue(), until
     )
-    if len(changes) > len(overrides) and not any(step.stage.section == _DRAPE for step in plan.steps):
-        raise ConfigError("no drape in this run, and no other stage works to a time or an error that can be chosen")
+    if target_error is not None and not any(step.stage.section == _DRAPE for step in plan.steps):
+        raise ConfigError("no drape in this run, and no other stage works to an error that can be chosen")
+    if time_budget is not None and not any(step.stage.levels for step in plan.steps):
+        raise ConfigError("no stage of this run works to a time that can be chosen")
     try:
         record = run_plan(
             request,
@@ -220,9 +222,8 @@ def run_order(
     return Outcome(folder, record, tables)
 
 
-def _budget_settings(time_budget: TimeBudget | None, target_error: float | None) -> list[str]:
-    found = [] if time_budget is None else [f"{_DRAPE}.{SETTING}={time_budget.seconds}"]
-    return found if target_error is None else [*found, f"{_DRAPE}.target_error_mm={1e3 * target_error:g}"]
+def _target_settings(target_error: float | None) -> list[str]:
+    return [] if target_error is None else [f"{_DRAPE}.target_error_mm={1e3 * target_error:g}"]
 
 
 def _path(given: Path | str | None) -> Path | None:

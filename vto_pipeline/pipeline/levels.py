@@ -1,0 +1,47 @@
+"""Levels of a stage: what it can be run at for less time and more error than by default, or the other way round."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Level:
+    """One way to run a stage, as measured against the stage by default.
+
+    Args:
+        settings: Setting -> value. None for a stage that can stop in time: it is given as long.
+        seconds: Section -> its time as a share of that by default: of the stage itself, and of later ones.
+        error: Of what the run makes, as a multiple of that by default.
+    """
+
+    settings: Mapping[str, Any]
+    seconds: Mapping[str, float]
+    error: float
+
+
+DEFAULT = Level({}, {}, 1.0)
+
+
+@dataclass(frozen=True)
+class UsualTime:
+    """What a stage takes by default where it has never run: on the machine that its levels were measured on, quiet.
+
+    Args:
+        seconds: Whatever is given [s].
+        per_file: Besides, for each file of what it is made from [s].
+        kind: Which files count: what follows the role under `given` in a document, such as "photos".
+        power: Of their number.
+    """
+
+    seconds: float
+    per_file: float = 0.0
+    kind: str = ""
+    power: float = 1.0
+
+    def of(self, files: Mapping[str, float]) -> float:
+        """Return the time, by the number of files of each kind [s]."""
+        return self.seconds + self.per_file * math.pow(files.get(self.kind, 0.0), self.power)
