@@ -221,6 +221,13 @@ def test_a_setting_that_is_stated_stays(machine):
     assert machine.ran["drape"].time_budget_s == 5.0
 
 
+def test_a_stage_that_stops_in_time_gets_what_its_least_level_takes_though_nothing_is_left(machine):
+    record = machine(20.0)  # the quickest levels of all take more
+    assert chosen(machine) == (250, 20)
+    assert machine.ran["drape"].time_budget_s == pytest.approx(0.3 * 0.4 * USUAL["drape"])
+    assert record["time_spent_s"] > 20.0
+
+
 def test_without_a_budget_levels_change_nothing(machine):
     plain = machine()
     assert chosen(machine) == (1000, 10)

@@ -108,11 +108,16 @@ class Budget:
         return names and f"give more time than {self.whole.seconds:g} s: for that, less was made of {names}"
 
     def share(self, step: Step, job: Job) -> Config:
-        """Return a stage's settings, with what is left as its own budget if it can stop in time."""
+        """Return a stage's settings, with what is left as its own budget if it can stop in time.
+
+        It gets the least of its levels, though that be more than what is left: stopped before, it is of no use.
+        """
         if not can_stop(step):
             return step.settings
         left, stated = self.left_for(step), getattr(step.settings, SETTING)
-        given = self._given[step.stage.name] = min(max(left, _AT_LEAST), stated or math.inf)
+        least = min((one.seconds[step.stage.section] for one in step.stage.levels if not one.settings), default=0.0)
+        least *= self._times().get(step.stage.name, 0.0)
+        given = self._given[step.stage.name] = min(max(left, least, _AT_LEAST), stated or math.inf)
         job.measure(time_budget_s=round(left, 1))
         if left <= 0.0:
             job.warn(f"nothing is left for it of the time budget of {self.whole.seconds:g} s")
