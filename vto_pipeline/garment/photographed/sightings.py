@@ -84,7 +84,7 @@ def look_at_mannequin(
     chosen = np.unique(np.linspace(0, len(usable) - 1, min(len(usable), MAX_PHOTOS)).round().astype(int))
     score, views, told = np.zeros(count), np.zeros(count, dtype=int), 0
     for k in (usable[c] for c in chosen):
-        picture, camera = _small(at[photos.cameras.names[k]], photos.cameras.intrinsics[k])
+        picture, camera = small_photo(at[photos.cameras.names[k]], photos.cameras.intrinsics[k])
         pose = photos.cameras.world_from_cam[k]
         cam_from_world: FloatArray = np.asarray(np.linalg.inv(pose), dtype=np.float64)
         form = depth_picture(mannequin, camera, cam_from_world)
@@ -109,7 +109,7 @@ def look_at_mannequin(
     return Sightings(points[enough], mean > SURE, area / count)
 
 
-def _small(path: Path, lens: Intrinsics) -> tuple[ByteArray, Intrinsics]:
+def small_photo(path: Path, lens: Intrinsics) -> tuple[ByteArray, Intrinsics]:
     """Return a photo without distortion, scaled down, and its camera."""
     import cv2
 
