@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, label, map_coordinates, uniform_filter
 
 from vto_pipeline.garment.align import PosedPhotos
-from vto_pipeline.garment.photographed.sightings import BORDER_PX, small_photo
+from vto_pipeline.garment.photographed.sightings import BORDER_PX, small_photos
 from vto_pipeline.garment.subtraction.color_model import usual_colors
 from vto_pipeline.geometry.seen.depth_picture import depth_picture
 from vto_pipeline.geometry.topology import submesh
@@ -52,7 +52,7 @@ def find_backdrops(
     """Find the background in those photos whose colours tell it from cloth beside what was filled.
 
     What was seen of the garment, and the mannequin, hide it for certain; what lies beside everything is it for
-    certain. Where only a filling hides it, colour decides, and it must hang together with what is certain.
+    certain. Where only a filling hides it, colour decides, and it must be connected with what is certain.
 
     Args:
         garment: Its holes filled.
@@ -61,13 +61,8 @@ def find_backdrops(
         photos: With their cameras in that frame.
     """
     seen, _ = submesh(garment, np.all(observed[garment.faces], axis=1))
-    at = {path.name: path for path in photos.paths}
     found = []
-    cameras = photos.cameras
-    for name, lens, pose in zip(cameras.names, cameras.intrinsics, cameras.world_from_cam, strict=True):
-        if name not in at:
-            continue
-        picture, camera = small_photo(at[name], lens)
+    for picture, camera, pose in small_photos(photos):
         cam_from_world: FloatArray = np.asarray(np.linalg.inv(pose), dtype=np.float64)
         cloth, form, whole = (
             np.isfinite(depth_picture(thing, camera, cam_from_world)) for thing in (seen, mannequin, garment)
