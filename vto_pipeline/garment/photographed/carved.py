@@ -70,11 +70,12 @@ def carve_fillings(
     way, tried = np.zeros_like(mesh.vertices), np.flatnonzero(apart)
     far = _far_inwards(mesh.vertices[tried], inwards[tried], backdrops)
     way[tried] = far[:, None] * inwards[tried]
-    moved, _ = moved_uncrossed(mesh, way, held, apart, distance, least)
+    moved, went = moved_uncrossed(mesh, way, held, apart, distance, least)
+    gone = far[went[tried] & (far > 0.0)]
     job.measure(
         carving_photos=len(backdrops),
-        carved_vertices=int(np.count_nonzero(far)),
-        carved_p95_mm=round(1e3 * float(np.percentile(far[far > 0.0], 95)), 2) if far.any() else 0.0,
+        carved_vertices=len(gone),
+        carved_p95_mm=round(1e3 * float(np.percentile(gone, 95)), 2) if len(gone) else 0.0,
     )
     return moved
 
