@@ -12,6 +12,7 @@ from vto_pipeline.garment.bare_parts import BareParts
 from vto_pipeline.garment.lifting import check_lifted, lift_fillings
 from vto_pipeline.garment.loop_evidence import LoopShape, encloses, measure_loops
 from vto_pipeline.garment.notches import close_notches
+from vto_pipeline.garment.photographed.carved import carve_fillings
 from vto_pipeline.garment.photographed.confirmed import LookAgain, confirm_fillings
 from vto_pipeline.garment.photographed.covered import covered_loops
 from vto_pipeline.garment.photographed.parted import refuse_parted
@@ -124,6 +125,8 @@ def close_scan_holes(
     if face_components(final)[0] != 1:
         raise GarmentError(f"the garment fell apart into {face_components(final)[0]} pieces")
     scanned = np.arange(len(final.faces)) < len(clean.faces)
+    if mannequin is not None and distance is not None and photos is not None and count and not observed.all():
+        final = carve_fillings(final, observed, mannequin, photos, distance, config.clearance_mm * 1e-3, job)
     if look is not None and not observed.all():
         job.progress(0.6, "looking again at what was filled")
         before = observed

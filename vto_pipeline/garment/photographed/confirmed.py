@@ -50,16 +50,8 @@ def confirm_fillings(
     """
     start = perf_counter()
     places, found = look(mesh, ~observed)
-    way, found = places - mesh.vertices, found & ~observed
-    crossing = self_intersections(mesh)
-    for number in count():
-        moved = TriangleMesh(_followed(mesh, way, observed, found, distance, least), mesh.faces, mesh.colors)
-        doubted = meeting_vertices(_more(self_intersections(moved), crossing), mesh.faces, len(found))
-        if not doubted.any():
-            break
-        for _ in range(2 ** (number - ALONE) if number >= ALONE else 0):
-            doubted[mesh.faces[doubted[mesh.faces].any(axis=1)]] = True
-        found &= ~doubted
+    way = places - mesh.vertices
+    moved, found = moved_uncrossed(mesh, way, observed, found & ~observed, distance, least)
     found &= np.linalg.norm(moved.vertices - mesh.vertices - way, axis=1) <= least
     far = 1e3 * np.linalg.norm(way[found], axis=1) if found.any() else np.zeros(1)
     job.measure(
@@ -70,6 +62,39 @@ def confirm_fillings(
         confirmed_s=round(perf_counter() - start, 1),
     )
     return moved, observed | found
+
+
+def moved_uncrossed(
+    mesh: TriangleMesh,
+    way: FloatArray,
+    observed: NDArray[np.bool_],
+    found: NDArray[np.bool_],
+    distance: SurfaceDistance | None,
+    least: float,
+) -> tuple[TriangleMesh, NDArray[np.bool_]]:
+    """Move vertices their ways, but none that makes the surface cross itself where it did not.
+
+    Args:
+        mesh: A garment, its holes filled.
+        way: Of each vertex [m], shape (V, 3).
+        observed: Which of them stay, shape (V,).
+        found: Which others go their ways, shape (V,); the rest follows harmonically.
+        distance: Signed distances to the mannequin [m], or None.
+        least: What moves may not come nearer to it, or than it was [m].
+
+    Returns:
+        The garment; which of its vertices went their ways, shape (V,).
+    """
+    crossing, found = self_intersections(mesh), found.copy()
+    for number in count():
+        moved = TriangleMesh(_followed(mesh, way, observed, found, distance, least), mesh.faces, mesh.colors)
+        doubted = meeting_vertices(_more(self_intersections(moved), crossing), mesh.faces, len(found))
+        if not doubted.any():
+            break
+        for _ in range(2 ** (number - ALONE) if number >= ALONE else 0):
+            doubted[mesh.faces[doubted[mesh.faces].any(axis=1)]] = True
+        found &= ~doubted
+    return moved, found
 
 
 def _followed(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -79,13 +80,9 @@ def look_at_mannequin(
     count = max(int(area / SPACING**2), 1)
     points, normals, _ = sample_surface(mannequin, count, job.seed)
     seen_cloth, _ = submesh(garment, np.all(observed[garment.faces], axis=1))
-    at = {path.name: path for path in photos.paths}
-    usable = [k for k, name in enumerate(photos.cameras.names) if name in at]
-    chosen = np.unique(np.linspace(0, len(usable) - 1, min(len(usable), MAX_PHOTOS)).round().astype(int))
-    score, views, told = np.zeros(count), np.zeros(count, dtype=int), 0
-    for k in (usable[c] for c in chosen):
-        picture, camera = _small(at[photos.cameras.names[k]], photos.cameras.intrinsics[k])
-        pose = photos.cameras.world_from_cam[k]
+    score, views, told, read = np.zeros(count), np.zeros(count, dtype=int), 0, 0
+    for picture, camera, pose in small_photos(photos):
+        read += 1
         cam_from_world: FloatArray = np.asarray(np.linalg.inv(pose), dtype=np.float64)
         form = depth_picture(mannequin, camera, cam_from_world)
         cloth = depth_picture(garment, camera, cam_from_world)
@@ -105,8 +102,17 @@ def look_at_mannequin(
         return None
     enough = views >= LEAST_VIEWS
     mean = score[enough] / views[enough]
-    job.note(f"{told} of {len(chosen)} photos tell cloth from mannequin by colour")
+    job.note(f"{told} of {read} photos tell cloth from mannequin by colour")
     return Sightings(points[enough], mean > SURE, area / count)
+
+
+def small_photos(photos: PosedPhotos) -> Iterator[tuple[ByteArray, Intrinsics, FloatArray]]:
+    """Yield photos without distortion and of limited size, evenly chosen, with lens and pose (world_from_cam)."""
+    at = {path.name: path for path in photos.paths}
+    usable = [k for k, name in enumerate(photos.cameras.names) if name in at]
+    chosen = np.unique(np.linspace(0, len(usable) - 1, min(len(usable), MAX_PHOTOS)).round().astype(int))
+    for k in (usable[c] for c in chosen):
+        yield *_small(at[photos.cameras.names[k]], photos.cameras.intrinsics[k]), photos.cameras.world_from_cam[k]
 
 
 def _small(path: Path, lens: Intrinsics) -> tuple[ByteArray, Intrinsics]:

@@ -14,6 +14,8 @@ HISTOGRAM_SIGMA = 1.0
 """Standard deviation of the histogram's smoothing [bins]."""
 SURPRISE = 0.02
 """Share of each material that may have any colour: dirt, shadow, seams."""
+RARE = 0.05
+"""Share of a material's own vertices that have unusual colours for it."""
 MOST_MIXED = 0.9
 """With more of the pure material than this among the mixed, the two hardly differ in colour."""
 
@@ -43,6 +45,29 @@ def color_evidence(
     other = np.maximum(both - share * one, 0.0) / (1.0 - share)
     anything = SURPRISE / bins**3
     return np.log((1.0 - SURPRISE) * one + anything) - np.log((1.0 - SURPRISE) * other + anything)
+
+
+def usual_colors(
+    colors: ByteArray, one: NDArray[np.bool_], other: NDArray[np.bool_], bins: int, light: float, least: float
+) -> NDArray[np.bool_]:
+    """Return which colours are as usual among one set of vertices, and rarer among the other, shape (V,).
+
+    A colour that neither set has is of neither: cloth in a fold's shadow is not background because no cloth was seen
+    so dark.
+
+    Args:
+        colors: sRGB, shape (V, 3).
+        one, other: Of the two sets, shape (V,); at least one of each.
+        bins: Of the histograms of `color_evidence`, along each axis.
+        light: Standard deviation of the smoothing of the other set's along lightness [bins].
+        least: How much likelier among the one, as a logarithm.
+    """
+    cell = _cells(colors, bins)
+    ours = _density(cell, one, bins, HISTOGRAM_SIGMA)[cell]
+    theirs = _density(cell, other, bins, light)[cell]
+    anything = SURPRISE / bins**3
+    likelier = np.log(ours + anything) - np.log(theirs + anything) > least
+    return np.asarray(likelier & (ours >= np.quantile(ours[one], RARE)))
 
 
 def color_overlap(
