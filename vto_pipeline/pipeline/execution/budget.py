@@ -52,15 +52,17 @@ class TimeBudget:
 class Budget:
     """A time budget, shared out over the stages of one run, anew whenever one of them is about to run.
 
-    What a stage takes by default is known from earlier runs in the store, or else from the table of stages and how slow
-    this machine is. What this run's stages took against that corrects it.
+    What a stage takes by default is known from earlier runs of this build on this machine. Else the table of stages
+    says it, with how slow this machine is; where it does not, runs of other builds do. What this run's stages took
+    against that corrects it.
 
     Args:
         whole: Of the run.
         request: What is given.
         plan: Its stages. Settings that are stated stay as they are.
         store: Tells what stages take, by the cost model.
-        finals: Stage -> time [s] of final stages when they last ran in this folder; the store has none of them.
+        finals: Stage -> time [s] of final stages when this build last ran them in this folder; the store has none of
+            them.
         stored: Stages whose results by default are there.
     """
 
@@ -84,7 +86,7 @@ class Budget:
         self._chosen: dict[str, Level] = {}
         self._given: dict[str, float] = {}
         self._took = self._forecast = 0.0
-        self._warned = False
+        self._warned = self._refined = False
 
     def adapts(self, step: Step) -> bool:
         """Return whether what a stage does depends on the budget."""
@@ -101,11 +103,33 @@ class Budget:
         """Take note that a stage has to be run by default after all."""
         self._chosen[step.stage.section] = DEFAULT
 
-    @property
-    def coarser(self) -> str:
-        """What the budget made of the stages so far, in words; empty where all ran by default."""
-        names = ", ".join(name for name, level in self._chosen.items() if level.settings)
-        return names and f"give more time than {self.whole.seconds:g} s: for that, less was made of {names}"
+    def finer(self, names: Collection[str]) -> dict[str, str]:
+        """Take back what a budget made of stages, as it is too poor for a later one.
+
+        At first the one whose level adds most to the error gets the next level. The second time all are run by default.
+
+        Args:
+            names: Stages that the later one depends on.
+
+        Returns:
+            Those to be done again, each with what is done, in words; none where all ran by default.
+        """
+        sections = {name.rpartition(".")[2] for name in names}
+        coarse = {one: level for one, level in self._chosen.items() if one in sections and level.settings}
+        if coarse and not self._refined:
+            worst = max(coarse, key=lambda one: coarse[one].error)
+            less = [level for level in self._offers[worst] if level.error < coarse[worst].error]
+            coarse = {worst: max(less, key=lambda level: level.error)}
+        else:
+            coarse = dict.fromkeys(coarse, DEFAULT)
+        self._chosen |= coarse
+        self._refined = True
+        again = {name: coarse[section] for name in names if (section := name.rpartition(".")[2]) in coarse}
+        return {name: "done again " + ("finer" if level.settings else "by default") for name, level in again.items()}
+
+    def reopen(self, names: Collection[str]) -> None:
+        """Take note of stages that are to run, whether or not they have."""
+        self._open = [one.stage.name for one in self._plan.steps if one.stage.name in {*self._open, *names}]
 
     def share(self, step: Step, job: Job) -> Config:
         """Return a stage's settings, with what is left as its own budget if it can stop in time.
@@ -220,13 +244,15 @@ def _allowed(step: Step) -> list[Level]:
 
 def _usual_times(request: Request, plan: Plan, model: CostModel, finals: Mapping[str, float]) -> dict[str, float]:
     """Return stage -> what it takes by default [s]; 0 where nothing is known."""
-    found, pace = {}, machine_pace()
+    found, pace = dict[str, float](), machine_pace()
+    usual_times = {step.stage.name: step.stage.usual for step in plan.steps}
     for name, figures in step_figures(request, plan).items():
-        stage = next(step.stage for step in plan.steps if step.stage.name == name)
-        rough = stage.usual.of(_files(figures)) if stage.usual else 0.0
-        known = finals.get(name, model.seconds(name, figures))
-        found[name] = UNSURE * pace * rough if known is None else known
-    return found
+        usual = usual_times[name]
+        if usual is not None and not model.timed_here(name):
+            found[name] = UNSURE * pace * usual.of(_files(figures))
+        else:
+            found[name] = model.seconds(name, figures) or 0.0
+    return {**found, **finals}
 
 
 def _files(figures: Figures) -> dict[str, float]:
