@@ -18,6 +18,7 @@ from vto_pipeline.model.settings import Config
 from vto_pipeline.pipeline.catalogue import Catalogue
 from vto_pipeline.pipeline.execution import budget, key
 from vto_pipeline.pipeline.execution.budget import TimeBudget
+from vto_pipeline.pipeline.execution.listener import Listener
 from vto_pipeline.pipeline.execution.run import run
 from vto_pipeline.pipeline.levels import DEFAULT, Level, UsualTime
 from vto_pipeline.pipeline.plan import make_plan
@@ -58,7 +59,8 @@ class Machine:
 
     `pace` is how many times as long everything takes as was measured; `probed` how many times the
     probe tells, if that is something else; `slow` how much slower single stages are besides;
-    `ran` the stages that really ran, with settings; `too_poor` the pixels that a mesh fails on.
+    `ran` the stages that really ran, with settings; `too_poor` the pixels that a mesh fails on;
+    `told` what was said before a stage had ended, with when.
     """
 
     def __init__(self, folder, monkeypatch) -> None:
@@ -67,6 +69,7 @@ class Machine:
         self.too_poor: set[int] = set()
         self.slow: dict[str, float] = {}
         self.failures = 0
+        self.told: list[tuple[float, str]] = []
         monkeypatch.setattr(time, "perf_counter", lambda: self.now)
         monkeypatch.setattr(budget, "machine_pace", lambda: self.probed or self.pace)
         monkeypatch.setattr(budget, "UNSURE", 1.0)
@@ -114,7 +117,11 @@ class Machine:
         request = read_request(load_yaml(document), self.folder, self.tables, overrides)
         self.ran.clear()
         whole = None if seconds is None else TimeBudget(seconds, self.now)
-        return run(request, make_plan(request, self.tables), self.tables, self.folder / run_name, time_budget=whole)
+        self.told.clear()
+        listener = Listener()
+        listener.warned = lambda text: self.told.append((self.now, text))
+        plan, folder = make_plan(request, self.tables), self.folder / run_name
+        return run(request, plan, self.tables, folder, time_budget=whole, listener=listener)
 
 
 @pytest.fixture
@@ -272,10 +279,12 @@ def test_the_same_budget_finds_the_same_and_another_does_not(machine):
 
 
 def test_a_budget_that_cannot_be_kept_is_told_with_the_least(machine):
+    began = machine.now
     record = machine(15.0)
     told = [text for stage in record["stages"] for text in stage["warnings"] if "too short" in text]
     assert told == [f"the time budget of 15 s is too short: this run needs about {least(1.0):.0f} s"]
-    assert record["stages"][0]["warnings"] == told  # at once
+    assert record["stages"][0]["warnings"] == told
+    assert machine.told == [(began, *told)]  # before anything has run
     assert chosen(machine) == (250, 20)
     assert record["time_least_s"] == pytest.approx(least(1.0), abs=0.1)
 
@@ -310,7 +319,9 @@ def test_what_was_made_too_poor_for_a_later_stage_is_made_finer_and_told(machine
     assert chosen(machine) == (500, 10)  # the mesh by default, as that was tried before the scan was blamed
     scan, mesh = record["stages"][:2]
     assert scan["level"]["settings"] == {"pixels": 500}
-    assert "done again finer, as mesh failed: nothing to see with 250 pixels" in scan["warnings"]
+    reason = "done again finer, as mesh failed: nothing to see with 250 pixels"
+    assert reason in scan["warnings"]
+    assert reason in [text for _, text in machine.told]
     assert [stage["status"] for stage in record["stages"]] == ["ran"] * 4
     assert mesh["reason"] == ""
     assert record["time_spent_s"] > 40.0

@@ -180,12 +180,13 @@ class Budget:
         self._ended(name, by_default)
         return max(seconds, _AT_LEAST) / max(by_default, _AT_LEAST)
 
-    def warn_if_short(self, job: Job) -> None:
-        """Say once that the budget cannot be kept, and how much is needed at least."""
+    def shortage(self) -> str:
+        """Return in words that the budget cannot be kept, and how much is needed at least; once, else nothing."""
         least = self.whole.spent + share_out(self._times(), self._open_offers(), 0.0).seconds
         if least > self.whole.seconds and not self._warned:
             self._warned = True
-            job.warn(f"the time budget of {self.whole.seconds:g} s is too short: this run needs about {least:.0f} s")
+            return f"the time budget of {self.whole.seconds:g} s is too short: this run needs about {least:.0f} s"
+        return ""
 
     def summary(self) -> dict[str, Any]:
         """Return what run.json says of the whole: the least that it takes, and what another minute would buy.

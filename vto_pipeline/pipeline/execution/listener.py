@@ -15,5 +15,8 @@ class Listener:
     def progress(self, fraction: float, text: str) -> None:
         """The running stage has done a share of its work, 0 to 1, and now does `text`."""
 
+    def warned(self, text: str) -> None:
+        """The running stage's record will hold a warning that cannot wait until it has ended."""
+
     def ended(self, number: int, count: int, record: StageRecord) -> None:
         """A stage has ended, whichever way."""

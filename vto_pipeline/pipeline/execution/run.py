@@ -245,9 +245,9 @@ class _Run:
         """Outputs by artifact, and the reason if the stage was skipped."""
         if self.budget is None:
             return self._work(step, job)
-        self.budget.warn_if_short(job)
-        if step.stage.name in self.done_again:
-            job.warn(self.done_again[step.stage.name])
+        for text in filter(None, (self.done_again.get(step.stage.name), self.budget.shortage())):
+            job.warn(text)
+            self.listener.warned(text)
         level = self.budget.level(step)
         if level is DEFAULT:
             return self._work(step, job)
