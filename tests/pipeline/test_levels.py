@@ -235,6 +235,14 @@ def test_a_setting_that_is_stated_stays(machine):
     assert machine.ran["drape"].time_budget_s == 5.0
 
 
+def test_a_stated_setting_counts_as_the_levels_tell(machine):
+    """With 250 pixels all fits: by default it would not, and that is not said of it."""
+    record = machine(45.0, overrides=("scan.pixels=250",))
+    assert machine.told == []
+    assert chosen(machine) == (250, 20)
+    assert record["time_spent_s"] <= 45.0
+
+
 def test_a_stage_that_stops_in_time_gets_what_its_least_level_takes_though_nothing_is_left(machine):
     record = machine(20.0)  # the quickest levels of all take more
     assert chosen(machine) == (250, 20)

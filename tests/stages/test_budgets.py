@@ -121,7 +121,8 @@ def test_what_is_no_quantity_is_refused(text):
 def test_the_outcome_says_what_the_budget_bought():
     """The words are those of `report.budgets`, and its own test."""
     stages = [{"name": "drape", "status": "ran", "seconds": 31.5, "metrics": {}, "warnings": []}]
-    record = {"seconds": 55.0, "time_spent_s": 58.0, "wanted": ["draped"], "time_budget_s": 60.0, "stages": stages}
+    record = {"seconds": 55.0, "time_spent_s": 58.0, "time_budget_s": 60.0, "stages": stages}
+    record |= {"wanted": ["draped"], "given": {}}
     said = list(outcome_lines(Outcome(Path("nowhere"), record, catalogue())))
     assert "  time budget: 58.0 of 60 s used; drape 31.5 s" in said
 

@@ -16,7 +16,7 @@ from vto_pipeline.pipeline.execution.forecast import forecast
 from vto_pipeline.pipeline.execution.pace import machine_pace
 from vto_pipeline.pipeline.execution.sharing import Shares, factor, share_out
 from vto_pipeline.pipeline.execution.store import Store
-from vto_pipeline.pipeline.levels import DEFAULT, Level
+from vto_pipeline.pipeline.levels import DEFAULT, Level, shares_as_stated
 from vto_pipeline.pipeline.plan import Plan, Step
 from vto_pipeline.pipeline.request import Request
 
@@ -246,11 +246,13 @@ def _allowed(step: Step) -> list[Level]:
 def _usual_times(request: Request, plan: Plan, model: CostModel, finals: Mapping[str, float]) -> dict[str, float]:
     """Return stage -> what it takes by default [s]; 0 where nothing is known."""
     found, pace = dict[str, float](), machine_pace()
-    usual_times = {step.stage.name: step.stage.usual for step in plan.steps}
+    stages = {step.stage.name: step.stage for step in plan.steps}
+    stated = [shares_as_stated(step.stage.levels, step.settings) for step in plan.steps]
     for name, figures in step_figures(request, plan).items():
-        usual = usual_times[name]
+        usual, section = stages[name].usual, stages[name].section
         if usual is not None and not model.timed_here(name):
-            found[name] = UNSURE * pace * usual.of(_files(figures))
+            share = math.prod(shares.get(section, 1.0) for shares in stated)
+            found[name] = UNSURE * pace * share * usual.of(_files(figures))
         else:
             found[name] = model.seconds(name, figures) or 0.0
     return {**found, **finals}
