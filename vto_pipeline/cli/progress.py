@@ -65,8 +65,8 @@ class LineProgress(Listener):
 
     def warned(self, text: str) -> None:
         self._warned.add(text)
+        self._warn(text)  # first, as the log may lie on the disk that does not answer
         self._session.enter("warned", text=text)
-        self._warn(text)
 
     def _warn(self, text: str) -> None:
         self.say(f"         warning: {text}")

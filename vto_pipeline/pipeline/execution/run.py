@@ -11,6 +11,7 @@ from typing import Any
 
 from vto_pipeline.errors import ComputationError, ConfigError, InputError, VtoError
 from vto_pipeline.io.documents import suggest
+from vto_pipeline.io.stalls import told_if_stalled
 from vto_pipeline.model.job import Job
 from vto_pipeline.pipeline.catalogue import Catalogue
 from vto_pipeline.pipeline.execution.budget import Budget, TimeBudget, can_stop, check_memory
@@ -167,7 +168,8 @@ class _Run:
             raise
         finally:
             if record.status != "cached":  # of what takes no time the next record tells, or the last
-                self.record.save()
+                with told_if_stalled(self.out.folder.parent, self.listener.warned):
+                    self.record.save()
             self.listener.ended(number, len(self.plan.steps), record)
 
     def _finer(self, step: Step, error: ComputationError) -> frozenset[str]:
@@ -204,7 +206,8 @@ class _Run:
             record.status = "left_out"
         mine = [artifact for artifact in step.stage.makes if self.plan.makers.get(artifact) == name]
         self.results.update(dict.fromkeys(mine, result))
-        self.out.publish(result, mine)
+        with told_if_stalled(self.out.folder, self.listener.warned):
+            self.out.publish(result, mine)
 
     def _key(self, step: Step, digests: dict[str, str]) -> str:
         """Return the key of a stage's result: with the budget in it if that counts and no result is stored without."""
@@ -232,14 +235,15 @@ class _Run:
                     outputs, reason = self._call(step, job, record)
             finally:
                 record.take(job, meter)
-            for artifact in step.stage.makes:
-                write_value(self.catalogue.kind(artifact), outputs[artifact], unfinished)
-            record.take(job, meter)
-            if self.budget is not None:
-                record.share = self.budget.ran(step, record.seconds)
-            files = {artifact: self.catalogue.kind(artifact).filename for artifact in step.stage.makes}
-            told = asdict(record) | {"reason": reason, TIMED: time_key()}
-            return self.store.finish(unfinished, name, record.key, files, told)
+            with told_if_stalled(self.store.folder, self.listener.warned):
+                for artifact in step.stage.makes:
+                    write_value(self.catalogue.kind(artifact), outputs[artifact], unfinished)
+                record.take(job, meter)
+                if self.budget is not None:
+                    record.share = self.budget.ran(step, record.seconds)
+                files = {artifact: self.catalogue.kind(artifact).filename for artifact in step.stage.makes}
+                told = asdict(record) | {"reason": reason, TIMED: time_key()}
+                return self.store.finish(unfinished, name, record.key, files, told)
 
     def _call(self, step: Step, job: Job, record: StageRecord) -> tuple[dict[str, Any], str]:
         """Outputs by artifact, and the reason if the stage was skipped."""
