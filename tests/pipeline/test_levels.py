@@ -89,7 +89,7 @@ class Machine:
         def work(inputs, chosen, job):
             if name == "mesh" and (pixels := self.ran["scan"].pixels) in self.too_poor:
                 self.now, self.failures = self.now + 1.0, self.failures + 1
-                raise ComputationError(f"nothing to see with {pixels} pixels")
+                raise ComputationError(f"nothing to see with {pixels} pixels", partial={"meshed": 0})
             if (name, getattr(chosen, "pixels", None)) in self.broken:
                 self.now += 1.0
                 raise ComputationError("too few pixels")
@@ -333,6 +333,7 @@ def test_what_was_made_too_poor_for_a_later_stage_is_made_finer_and_told(machine
     assert [stage["status"] for stage in record["stages"]] == ["ran"] * 4
     assert mesh["reason"] == ""
     assert record["time_spent_s"] > 40.0
+    assert not (machine.folder / "run" / "out" / "partial").exists()  # it did not fail in the end
     again = machine(40.0)
     assert set(machine.ran) == {"page"}  # what was made for the same budget is found as it ended
     assert again["stages"][0]["level"] == scan["level"]
@@ -350,6 +351,7 @@ def test_a_failure_that_more_time_does_not_mend_ends_the_run_after_three_attempt
     machine.too_poor = {250, 500, 1000}
     with pytest.raises(ComputationError, match="nothing to see with 1000 pixels"):
         machine(40.0)
+    assert (machine.folder / "run" / "out" / "partial" / "meshed.txt").exists()
     assert machine.failures == 2 + 1 + 1  # at its own level, and by default on each scan
     machine.failures = 0
     with pytest.raises(ComputationError, match="nothing to see with 1000 pixels"):
@@ -364,9 +366,9 @@ def other_build(monkeypatch):
 
 
 def test_what_another_build_took_is_set_aside(machine, other_build):
-    """It was three times as slow in the scan, and quick in the drape; all as it was by the table now."""
+    """It was three times as slow in the scan, ten times in the page, and quick elsewhere; now all is as measured."""
     machine.pace = 0.1
-    machine.slow = {"scan": 30.0}
+    machine.slow = {"scan": 30.0, "page": 100.0}
     machine(run_name="known")
     machine.pace, machine.slow = 1.0, {}
     other_build()

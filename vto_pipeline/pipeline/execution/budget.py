@@ -127,10 +127,6 @@ class Budget:
         again = {name: coarse[section] for name in names if (section := name.rpartition(".")[2]) in coarse}
         return {name: "done again " + ("finer" if level.settings else "by default") for name, level in again.items()}
 
-    def reopen(self, names: Collection[str]) -> None:
-        """Take note of stages that are to run, whether or not they have."""
-        self._open = [one.stage.name for one in self._plan.steps if one.stage.name in {*self._open, *names}]
-
     def share(self, step: Step, job: Job) -> Config:
         """Return a stage's settings, with what is left as its own budget if it can stop in time.
 

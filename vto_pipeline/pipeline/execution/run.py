@@ -179,7 +179,6 @@ class _Run:
         name, names = step.stage.name, [one.stage.name for one in self.plan.steps]
         poor = self.budget.finer([one for one in names if one != name and name in _dependents(one, self.plan)])
         again = frozenset[str]().union(*(_dependents(one, self.plan) for one in poor))
-        self.budget.reopen(again)
         self.renewed |= poor.keys()
         self.done_again |= {one: f"{said}, as {name} failed: {error.problem}" for one, said in poor.items()}
         for one in again:
