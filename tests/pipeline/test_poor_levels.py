@@ -47,6 +47,14 @@ def test_what_is_still_too_poor_is_made_by_default(machine):
     assert "done again by default, as mesh failed: nothing to see with 500 pixels" in record["stages"][0]["warnings"]
 
 
+def test_what_several_stages_made_too_poor_is_made_by_default_the_second_time(machine):
+    machine.picky = True
+    record = machine(40.0)
+    assert chosen(machine) == (1000, 10)
+    assert machine.failures == 2  # on 250 pixels and 20 mm, then on 500 and 20
+    assert record["stages"][2]["status"] == "ran"
+
+
 def test_a_failure_that_more_time_does_not_mend_ends_the_run_after_three_attempts(machine):
     machine.too_poor = {250, 500, 1000}
     with pytest.raises(ComputationError, match="nothing to see with 1000 pixels"):

@@ -58,7 +58,8 @@ class Machine:
 
     `pace` is how many times as long everything takes as was measured; `probed` how many times the
     probe tells, if that is something else; `slow` how much slower single stages are besides;
-    `ran` the stages that really ran, with settings; `too_poor` the pixels that a mesh fails on;
+    `ran` the stages that really ran, with settings; `too_poor` the pixels that a mesh fails on,
+    `picky` whether a drape fails on anything but scan and mesh by default;
     `told` what was said before a stage had ended, with when.
     """
 
@@ -67,7 +68,7 @@ class Machine:
         self.probed: float | None = None
         self.too_poor: set[int] = set()
         self.slow: dict[str, float] = {}
-        self.failures = 0
+        self.failures, self.picky = 0, False
         self.told: list[tuple[float, str]] = []
         monkeypatch.setattr(time, "perf_counter", lambda: self.now)
         monkeypatch.setattr(budget, "machine_pace", lambda: self.probed or self.pace)
@@ -89,6 +90,9 @@ class Machine:
             if name == "mesh" and (pixels := self.ran["scan"].pixels) in self.too_poor:
                 self.now, self.failures = self.now + 1.0, self.failures + 1
                 raise ComputationError(f"nothing to see with {pixels} pixels", partial={"meshed": 0})
+            if name == "drape" and self.picky and (self.ran["scan"].pixels, self.ran["mesh"].edge) != (1000, 10):
+                self.failures += 1
+                raise ComputationError("too coarse to hang")
             if (name, getattr(chosen, "pixels", None)) in self.broken:
                 self.now += 1.0
                 raise ComputationError("too few pixels")
