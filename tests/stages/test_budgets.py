@@ -17,6 +17,7 @@ from vto_pipeline.cli.results import outcome_lines
 from vto_pipeline.cli.session import Session
 from vto_pipeline.errors import ConfigError
 from vto_pipeline.pipeline.execution.budget import TimeBudget
+from vto_pipeline.pipeline.levels import shares_as_stated
 from vto_pipeline.stages.entry import commands
 from vto_pipeline.stages.entry.documents import drape_order, fit_order, scan_order
 from vto_pipeline.stages.entry.outcome import Outcome
@@ -86,6 +87,18 @@ def test_every_level_is_a_valid_setting_and_each_coarser_one_saves_time_for_erro
             assert time_share < before[0]
             assert level.error > before[1]
             before = (time_share, level.error)
+
+
+def test_what_a_level_states_takes_as_long_as_the_level_where_it_is_one_number():
+    stages = {stage.section: stage for stage in catalogue().stages}
+    told = set()
+    for section, levels in LEVELS.items():
+        for level in levels:
+            shares = shares_as_stated(levels[: levels.index(level) + 1], stages[section].settings(**level.settings))
+            assert shares in ({}, pytest.approx(level.seconds, rel=1e-9))
+            told |= {section} if shares else set()
+        assert shares_as_stated(levels, stages[section].settings()) == {}
+    assert told == {"simulation_mesh"}
 
 
 def test_usual_times_are_those_of_the_results():

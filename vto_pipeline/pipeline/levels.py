@@ -55,13 +55,14 @@ def shares_as_stated(levels: Sequence[Level], settings: Config) -> dict[str, flo
     Time is taken as a power of it, the one that the coarsest level tells.
 
     Args:
-        levels: Of a stage. Those that change more than one setting tell of none.
+        levels: Of a stage. Those that change more than one setting, or what is no number, tell of none.
         settings: Of the stage, as stated.
     """
     found: dict[str, float] = {}
     for level in levels:
-        for name in level.settings.keys() & settings.model_fields_set if len(level.settings) == 1 else ():
+        for name, value in level.settings.items() if len(level.settings) == 1 else ():
             default = type(settings).model_fields[name].default
-            power = math.log(getattr(settings, name) / default) / math.log(level.settings[name] / default)
-            found = {section: share**power for section, share in level.seconds.items()}
+            if name in settings.model_fields_set and isinstance(value, int | float) and 0 not in (value, default):
+                power = math.log(getattr(settings, name) / default) / math.log(value / default)
+                found = {section: share**power for section, share in level.seconds.items()}
     return found
