@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from toy_tables import CALLS
 
 from vto_pipeline.io.arrays import Arrays
@@ -93,6 +94,9 @@ def test_a_read_only_disk_takes_no_run_and_shows_one(vto, disk):
         said = vto(*command)
         assert said.code == 2, said.err
         assert "cannot be made or written to: Read-only file system" in said.err
+    trimesh.creation.box().export("box.ply")
+    said = vto("render", "box.ply", "--views", "front", "--size", "64", "-o", disk / "pictures")
+    assert (said.code, "-o gives another folder" in said.err) == (3, True), said.err
     assert vto("plan", "toy.yaml", "-o", disk / "run").code == 0
     assert vto("info", disk / "run").code == 0
     assert sorted(disk.rglob("*")) == before

@@ -44,7 +44,12 @@ def test_a_run_is_described_by_its_record(vto):
     assert said.code == 0
     assert "stages: 7 ran" in said.out
     assert vto("run", "toy.yaml", "--set", "add.fail=true").code == 4
-    assert "FAILED in add" in vto("info", "runs/toy").out
+    said = vto("info", "runs/toy").out
+    assert "FAILED in add" in said
+    assert said.startswith("not done after ")
+    assert "1 failed, 3 not begun or not ended" in said
+    assert "not made" in said
+    assert "as given" not in said  # what is wanted was not
 
 
 def test_a_batch_is_described_by_its_rows(vto, tmp_path):

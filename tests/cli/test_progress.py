@@ -32,6 +32,15 @@ def test_plain_lines_are_throttled(monkeypatch, capsys):
     ]
 
 
+def test_what_cannot_wait_is_shown_at_once_and_only_once(capsys):
+    lines = LineProgress(Session())
+    lines.started(1, 2, STAGES[0])
+    lines.warned("too short")
+    assert capsys.readouterr().err.splitlines()[-1] == "         warning: too short"
+    lines.ended(1, 2, StageRecord("left.double", "ran", seconds=1.0, warnings=["too short", "poor"]))
+    assert capsys.readouterr().err.splitlines() == ["[1/2] left.double  done in 1.0 s", "         warning: poor"]
+
+
 def test_bars_leave_one_line_per_stage():
     page = io.StringIO()
     with Progress(console=Console(file=page, width=100, force_terminal=False), transient=True) as progress:

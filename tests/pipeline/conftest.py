@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from toy_levels import Machine
 from toy_tables import CALLS, TOY
 
 from vto_pipeline.io.documents import load_yaml
@@ -41,3 +42,9 @@ def go(ask: Callable[..., Request], tmp_path: Path) -> Callable[..., dict[str, A
         return run(request, make_plan(request, TOY), TOY, tmp_path / "run", force_all=force_all, listener=Listener())
 
     return go
+
+
+@pytest.fixture
+def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Machine:
+    """Runs the toy table of stages with levels, on a clock of its own."""
+    return Machine(tmp_path, monkeypatch)

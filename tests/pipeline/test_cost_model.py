@@ -15,7 +15,8 @@ from toy_tables import TOY
 from vto_pipeline.pipeline.batch import time_left
 from vto_pipeline.pipeline.batch.order import Row
 from vto_pipeline.pipeline.batch.time_left import TimeLeft
-from vto_pipeline.pipeline.execution.cost_model import CostModel, fit_cost
+from vto_pipeline.pipeline.execution import key
+from vto_pipeline.pipeline.execution.cost_model import TIMED, CostModel, fit_cost
 from vto_pipeline.pipeline.execution.forecast import forecast
 from vto_pipeline.pipeline.execution.store import MANIFEST, Store
 from vto_pipeline.pipeline.plan import make_plan
@@ -80,6 +81,17 @@ def test_a_power_law_with_effects_is_found() -> None:
     assert cost.terms["bytes"] == pytest.approx(1.3, abs=0.1)
 
 
+def test_other_builds_tell_how_time_grows_and_this_one_how_long_it_takes() -> None:
+    sizes = (1e4, 3e4, 1e5, 3e5)
+    for slower in (0.2, 5.0):
+        records = [({"bytes": math.log(n), TIMED: "other"}, slower * law(0, 0, n)) for n in sizes * 3]
+        cost = fit_cost([*records, ({"bytes": math.log(1e4), TIMED: "this"}, law(0, 0, 1e4))])
+        assert cost is not None
+        for n in sizes:
+            got = cost.expected({"bytes": math.log(n), TIMED: "this"})
+            assert got == pytest.approx(law(0, 0, n), rel=0.1)  # the power is drawn to 0 by its prior
+
+
 def test_few_records_give_their_median_and_none_nothing() -> None:
     assert fit_cost([]) is None
     few = fit_cost([({"bytes": 1.0}, 2.0), ({"bytes": 9.0}, 4.0), ({"bytes": 5.0}, 300.0)])
@@ -105,6 +117,27 @@ def test_a_plan_tells_what_its_stages_will_take(ask, go, tmp_path: Path) -> None
     expected = forecast(request, make_plan(request, TOY), Store(tmp_path / "run/cache"))
     assert expected["left.double"].stored
     assert expected["add"].seconds == pytest.approx(7.0)
+
+
+def test_of_few_records_only_those_of_this_build_count(go, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = "schema: 1\ngiven: {left: {number: left.txt}}\nwant: [squared]\n"
+    figures = {stage["name"]: stage["figures"] for stage in go(text)["stages"]}["add"]
+    take(tmp_path, "add", 70.0)
+    store = Store(tmp_path / "run/cache")
+    assert CostModel(store).timed_here("add")
+    monkeypatch.setattr(key, "code_identity", lambda: "another source")
+    other = CostModel(store)
+    assert not other.timed_here("add")
+    assert other.seconds("add", figures) == pytest.approx(70.0)  # better than nothing
+    before = set((store.folder / "add").glob(f"*/{MANIFEST}"))
+    go(text)
+    (made,) = set((store.folder / "add").glob(f"*/{MANIFEST}")) - before
+    manifest = json.loads(made.read_text())
+    manifest["record"]["seconds"] = 7.0
+    made.write_text(json.dumps(manifest))
+    both = CostModel(store)
+    assert both.timed_here("add")
+    assert both.seconds("add", figures) == pytest.approx(7.0)
 
 
 def test_what_rows_share_is_counted_once(go, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

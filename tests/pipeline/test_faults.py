@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import threading
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +14,9 @@ import toy_tables
 from toy_tables import CALLS, TOY
 
 from vto_pipeline.errors import ComputationError, InputError
+from vto_pipeline.io import stalls
 from vto_pipeline.pipeline.catalogue import Catalogue
+from vto_pipeline.pipeline.execution.listener import Listener
 from vto_pipeline.pipeline.execution.run import run
 from vto_pipeline.pipeline.execution.store import Store
 from vto_pipeline.pipeline.plan import make_plan
@@ -68,6 +72,35 @@ def test_a_file_that_vanishes_is_named(meanwhile, tmp_path):
     with pytest.raises(InputError, match="the file was there before and has vanished") as caught:
         meanwhile((tmp_path / "left.txt").unlink)
     assert caught.value.where == str(tmp_path / "left.txt")
+
+
+def test_a_folder_that_stalls_while_a_result_is_written_is_told_and_waited_for(ask, tmp_path, monkeypatch):
+    """Nothing is written until it has been told; were it not, that would take too long."""
+    monkeypatch.setattr(stalls, "_PATIENCE", 0.2)
+    told, said = threading.Event(), []
+
+    def stalled(path, value):
+        assert told.wait(60.0)
+        toy_tables.write_number(path, value)
+
+    kinds = tuple(replace(kind, write=stalled) if kind.name == "total" else kind for kind in toy_tables.KINDS)
+    tables = Catalogue(TOY.stages, kinds, toy_tables.GIVEN)
+    listener = Listener()
+    listener.warned = lambda text: (said.append(text), told.set())
+    request = ask(DOCUMENT)
+    run(request, make_plan(request, tables), tables, tmp_path / "run", listener=listener)
+    assert squared(tmp_path) == "196"
+    assert len(said) == 1
+    assert str(tmp_path / "run" / "cache") in said[0]
+
+
+def test_a_folder_that_answers_is_not_blamed(tmp_path, monkeypatch):
+    monkeypatch.setattr(stalls, "_PATIENCE", 0.2)
+    said = []
+    with stalls.told_if_stalled(tmp_path, said.append):
+        pass
+    time.sleep(0.6)
+    assert said == []
 
 
 def test_a_change_of_nothing_but_dates_is_none(meanwhile, tmp_path):

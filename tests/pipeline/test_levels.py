@@ -2,156 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
-import json
-import time
 from dataclasses import replace
 
 import pytest
-from pydantic import Field
-from toy_tables import read_number, write_number
+from toy_levels import USUAL, best, chosen, error_of, least
 
-from vto_pipeline.errors import ComputationError
-from vto_pipeline.io.documents import load_yaml
-from vto_pipeline.model.artifact import ArtifactKind
-from vto_pipeline.model.settings import Config
 from vto_pipeline.pipeline.catalogue import Catalogue
 from vto_pipeline.pipeline.execution import budget
-from vto_pipeline.pipeline.execution.budget import TimeBudget
-from vto_pipeline.pipeline.execution.run import run
-from vto_pipeline.pipeline.levels import DEFAULT, Level, UsualTime
-from vto_pipeline.pipeline.plan import make_plan
-from vto_pipeline.pipeline.request import read_request
-from vto_pipeline.pipeline.stage import Stage
-
-SCAN = (
-    Level({"pixels": 500}, {"scan": 0.5, "mesh": 0.8}, 1.5),
-    Level({"pixels": 250}, {"scan": 0.2, "mesh": 0.6}, 2.5),
-)
-MESH = (Level({"edge": 20}, {"mesh": 0.7, "drape": 0.4}, 1.4),)
-DRAPE = (Level({}, {"drape": 0.6}, 1.3), Level({}, {"drape": 0.3}, 4.0))
-USUAL = {"scan": 60.0, "mesh": 10.0, "drape": 40.0, "page": 2.0}
-"""What stages take by default, on the machine that all was measured on [s]."""
-
-
-class ScanConfig(Config):
-    """Settings of a toy scan."""
-
-    pixels: int = Field(1000, ge=1, description="of a photo")
-    other: int = Field(0, description="something else")
-
-
-class MeshConfig(Config):
-    """Settings of a toy mesh."""
-
-    edge: int = Field(10, ge=1, description="of a triangle")
-
-
-class DrapeConfig(Config):
-    """Settings of a toy drape."""
-
-    time_budget_s: float | None = Field(None, gt=0, description="wall time [s]")
-
-
-class Machine:
-    """Runs the toy document on a clock of its own.
-
-    `pace` is how many times as long everything takes as was measured; `probed` how many times the
-    probe tells, if that is something else; `ran` the stages that really ran, with settings.
-    """
-
-    def __init__(self, folder, monkeypatch) -> None:
-        self.folder, self.pace, self.ran, self.broken, self.now = folder, 1.0, {}, set(), 100.0
-        self.probed: float | None = None
-        monkeypatch.setattr(time, "perf_counter", lambda: self.now)
-        monkeypatch.setattr(budget, "machine_pace", lambda: self.probed or self.pace)
-        monkeypatch.setattr(budget, "UNSURE", 1.0)
-        (folder / "start.txt").write_text("3")
-        names = ("start", "seen", "meshed", "hung")
-        kinds = [ArtifactKind(name, f"{name}.txt", name, read_number, write_number) for name in names]
-        page = ArtifactKind("page", "page.json", "a page", lambda path: path.read_text(), write_number)
-        stages = (
-            self.stage("scan", ("start",), "seen", ScanConfig, SCAN),
-            self.stage("mesh", ("seen",), "meshed", MeshConfig, MESH),
-            self.stage("drape", ("meshed",), "hung", DrapeConfig, DRAPE),
-            replace(self.stage("page", (), "page", Config, ()), final=True, optional=("hung",)),
-        )
-        self.tables = Catalogue(stages, (*kinds, page), {"start": "start"})
-
-    def stage(self, name, needs, made, settings, levels) -> Stage:
-        def work(inputs, chosen, job):
-            if (name, getattr(chosen, "pixels", None)) in self.broken:
-                self.now += 1.0
-                raise ComputationError("too few pixels")
-            self.ran[name] = chosen
-            takes = self.takes(name)
-            given = getattr(chosen, "time_budget_s", None) or takes
-            self.now += min(takes, given)
-            return {made: json.dumps(inputs["run_record"]) if name == "page" else sum(inputs.values()) + 1}
-
-        return Stage(name, name, needs, (made,), work, settings, levels=levels, usual=UsualTime(USUAL[name]))
-
-    def takes(self, name) -> float:
-        """By the settings that stages before it, and it, were run with."""
-        taken = USUAL[name] * self.pace
-        for stage, levels in (("scan", SCAN), ("mesh", MESH)):
-            for level in levels:
-                (key, value), *_ = level.settings.items()
-                if stage in self.ran and getattr(self.ran[stage], key) == value:
-                    taken *= level.seconds.get(name, 1.0)
-        return taken
-
-    def __call__(self, seconds=None, overrides=(), run_name="run"):
-        document = self.folder / "toy.yaml"
-        document.write_text("schema: 1\ngiven: {start: start.txt}\nwant: [hung, page]\n")
-        request = read_request(load_yaml(document), self.folder, self.tables, overrides)
-        self.ran.clear()
-        whole = None if seconds is None else TimeBudget(seconds, self.now)
-        return run(request, make_plan(request, self.tables), self.tables, self.folder / run_name, time_budget=whole)
-
-
-@pytest.fixture
-def machine(tmp_path, monkeypatch) -> Machine:
-    return Machine(tmp_path, monkeypatch)
-
-
-def least(pace: float) -> float:
-    """Time of the quickest way through [s], of all combinations."""
-    return min(time_and_error(levels, pace)[0] for levels in every())
-
-
-def every():
-    return itertools.product((DEFAULT, *SCAN), (DEFAULT, *MESH), (DEFAULT, *DRAPE))
-
-
-def time_and_error(levels, pace: float = 1.0) -> tuple[float, float]:
-    total, error = 0.0, 1.0
-    for name, taken in USUAL.items():
-        for level in levels:
-            taken *= level.seconds.get(name, 1.0)
-        total += pace * taken
-    for level in levels:
-        error *= level.error
-    return total, error
-
-
-def chosen(machine) -> tuple[int, int]:
-    return machine.ran["scan"].pixels, machine.ran["mesh"].edge
-
-
-def best(seconds: float, pace: float = 1.0) -> tuple[int, int]:
-    """Of all combinations, tried one by one, that of the least error that fits with what is kept back."""
-    tried = [(*time_and_error(levels, pace), levels) for levels in every()]
-    _, _, (scan, mesh, _) = min((one for one in tried if one[0] <= 0.96 * seconds), key=lambda one: (one[1], one[0]))
-    return scan.settings.get("pixels", 1000), mesh.settings.get("edge", 10)
-
-
-def error_of(record) -> float:
-    """Product of what the record says of each stage."""
-    found = 1.0
-    for stage in record["stages"]:
-        found *= stage["level"].get("error", 1.0)
-    return found
 
 
 @pytest.mark.parametrize("seconds", [38.0, 50.0, 62.0, 75.0, 90.0, 105.0, 120.0, 300.0])
@@ -221,6 +78,14 @@ def test_a_setting_that_is_stated_stays(machine):
     assert machine.ran["drape"].time_budget_s == 5.0
 
 
+def test_a_stated_setting_counts_as_the_levels_tell(machine):
+    """With 250 pixels all fits: by default it would not, and that is not said of it."""
+    record = machine(45.0, overrides=("scan.pixels=250",))
+    assert machine.told == []
+    assert chosen(machine) == (250, 20)
+    assert record["time_spent_s"] <= 45.0
+
+
 def test_a_stage_that_stops_in_time_gets_what_its_least_level_takes_though_nothing_is_left(machine):
     record = machine(20.0)  # the quickest levels of all take more
     assert chosen(machine) == (250, 20)
@@ -265,10 +130,12 @@ def test_the_same_budget_finds_the_same_and_another_does_not(machine):
 
 
 def test_a_budget_that_cannot_be_kept_is_told_with_the_least(machine):
+    began = machine.now
     record = machine(15.0)
     told = [text for stage in record["stages"] for text in stage["warnings"] if "too short" in text]
     assert told == [f"the time budget of 15 s is too short: this run needs about {least(1.0):.0f} s"]
-    assert record["stages"][0]["warnings"] == told  # at once
+    assert record["stages"][0]["warnings"] == told
+    assert machine.told == [(began, *told)]  # before anything has run
     assert chosen(machine) == (250, 20)
     assert record["time_least_s"] == pytest.approx(least(1.0), abs=0.1)
 
@@ -282,26 +149,3 @@ def test_what_another_minute_would_buy_is_what_it_buys(machine):
     )
     assert record["another_minute"]["error"] == pytest.approx(error_of(more) / error_of(record), rel=1e-9)
     assert machine(300.0, run_name="most")["another_minute"] == {"levels": {}, "error": 1.0}
-
-
-def test_a_level_that_fails_is_done_by_default(machine):
-    machine.broken = {("scan", 250)}
-    record = machine(40.0)
-    assert machine.ran["scan"].pixels == 1000
-    scan = record["stages"][0]
-    assert scan["level"] == {}
-    assert "what would have saved time did not do: too few pixels" in scan["warnings"]
-    machine.broken = {("scan", 1000)}
-    with pytest.raises(ComputationError, match="too few pixels"):
-        machine(300.0, run_name="other")
-
-
-def test_a_failure_after_coarser_stages_is_told_with_them(machine):
-    """At more time it might not fail; where nothing was made coarser, time does not help."""
-    machine.broken = {("mesh", None)}
-    with pytest.raises(ComputationError) as hurried:
-        machine(40.0)
-    assert hurried.value.hint == "give more time than 40 s: for that, less was made of scan"
-    with pytest.raises(ComputationError) as calm:
-        machine(300.0, run_name="calm")
-    assert not calm.value.hint

@@ -17,6 +17,7 @@ from vto_pipeline.cli.results import outcome_lines
 from vto_pipeline.cli.session import Session
 from vto_pipeline.errors import ConfigError
 from vto_pipeline.pipeline.execution.budget import TimeBudget
+from vto_pipeline.pipeline.levels import shares_as_stated
 from vto_pipeline.stages.entry import commands
 from vto_pipeline.stages.entry.documents import drape_order, fit_order, scan_order
 from vto_pipeline.stages.entry.outcome import Outcome
@@ -88,6 +89,18 @@ def test_every_level_is_a_valid_setting_and_each_coarser_one_saves_time_for_erro
             before = (time_share, level.error)
 
 
+def test_what_a_level_states_takes_as_long_as_the_level_where_it_is_one_number():
+    stages = {stage.section: stage for stage in catalogue().stages}
+    told = set()
+    for section, levels in LEVELS.items():
+        for level in levels:
+            shares = shares_as_stated(levels[: levels.index(level) + 1], stages[section].settings(**level.settings))
+            assert shares in ({}, pytest.approx(level.seconds, rel=1e-9))
+            told |= {section} if shares else set()
+        assert shares_as_stated(levels, stages[section].settings()) == {}
+    assert told == {"simulation_mesh"}
+
+
 def test_usual_times_are_those_of_the_results():
     """Within a half of what the last measured run of the demo took, for all that takes long."""
     rows = json.loads((SAMPLES.parent / "docs" / "results" / "demo.json").read_text())["rows"]
@@ -121,7 +134,8 @@ def test_what_is_no_quantity_is_refused(text):
 def test_the_outcome_says_what_the_budget_bought():
     """The words are those of `report.budgets`, and its own test."""
     stages = [{"name": "drape", "status": "ran", "seconds": 31.5, "metrics": {}, "warnings": []}]
-    record = {"seconds": 55.0, "time_spent_s": 58.0, "wanted": ["draped"], "time_budget_s": 60.0, "stages": stages}
+    record = {"seconds": 55.0, "time_spent_s": 58.0, "time_budget_s": 60.0, "stages": stages}
+    record |= {"wanted": ["draped"], "given": {}}
     said = list(outcome_lines(Outcome(Path("nowhere"), record, catalogue())))
     assert "  time budget: 58.0 of 60 s used; drape 31.5 s" in said
 

@@ -50,7 +50,8 @@ COMMANDS = {
 INTERRUPTED = 130
 
 ADVICE = {
-    **dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS, errno.ELOOP, errno.ENAMETOOLONG), ""),
+    **dict.fromkeys((errno.EACCES, errno.EPERM, errno.ELOOP, errno.ENAMETOOLONG), ""),
+    errno.EROFS: "nothing can be written there; -o gives another folder",
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT), "make room; the same command again resumes where this one stopped"),
     **dict.fromkeys(
         (errno.EIO, errno.ESTALE, errno.ETIMEDOUT, errno.EHOSTDOWN, errno.ENOTCONN),

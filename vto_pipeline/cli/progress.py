@@ -47,6 +47,7 @@ class LineProgress(Listener):
     def __init__(self, session: Session) -> None:
         self._session = session
         self._head, self._began, self._last = "", 0.0, 0.0
+        self._warned: set[str] = set()
 
     def started(self, number: int, count: int, stage: Stage) -> None:
         self._head, self._began = head(number, count, stage.name), time.monotonic()
@@ -61,6 +62,14 @@ class LineProgress(Listener):
             left = (now - self._began) * (1 / fraction - 1) if fraction > _GUESSABLE else None
             self._session.enter("progress", fraction=round(fraction, 4), doing=text, left_s=left and round(left, 1))
             self.show_progress(fraction, text, left)
+
+    def warned(self, text: str) -> None:
+        self._warned.add(text)
+        self._warn(text)  # first, as the log may lie on the disk that does not answer
+        self._session.enter("warned", text=text)
+
+    def _warn(self, text: str) -> None:
+        self.say(f"         warning: {text}")
 
     def show_start(self, stage: Stage) -> None:
         """Show that a stage has started."""
@@ -78,7 +87,8 @@ class LineProgress(Listener):
         for text in record.notes if fresh or self._session.verbose else ():
             self.say(f"         note: {text}")
         for text in record.warnings:
-            self.say(f"         warning: {text}")
+            if text not in self._warned:
+                self._warn(text)
         for what, reason in record.left_out if self._session.verbose else ():
             self.say(f"         left out: {what}: {reason}")
 

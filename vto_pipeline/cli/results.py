@@ -44,10 +44,12 @@ def perform(session: Session, order: Order, time_budget: float | None = None, **
 def outcome_lines(outcome: Outcome) -> Iterator[str]:
     """Yield what became of the stages, where the wanted files are, and all warnings."""
     record = outcome.record
-    yield f"done in {outcome.seconds:.1f} s; {stage_counts(record)}"
+    ended = all(stage["status"] not in ("planned", "failed") for stage in record["stages"])
+    yield f"{'done in' if ended else 'not done after'} {outcome.seconds:.1f} s; {stage_counts(record)}"
     width = max(len(artifact) for artifact in record["wanted"])
     for artifact in record["wanted"]:
-        yield f"  {artifact:<{width}}  {outcome.path(artifact) if outcome.made(artifact) else 'as given'}"
+        absent = "as given" if artifact in record["given"] else "not made"
+        yield f"  {artifact:<{width}}  {outcome.path(artifact) if outcome.made(artifact) else absent}"
     trace = outcome.read("trace") if outcome.made("trace") else ()
     yield from (f"  {line}" for line in budget_lines(record, trace))
     for name, text in outcome.warnings:
@@ -58,6 +60,8 @@ def stage_counts(record: Mapping[str, Any]) -> str:
     """Return how many stages ended which way, in words."""
     states = [stage["status"] for stage in record["stages"]]
     words = {"ran": "ran", "cached": "from the cache", "left_out": "left out"}
+    others = {"failed": "failed", "planned": "not begun or not ended"}
+    words |= {state: text for state, text in others.items() if state in states}
     return "stages: " + ", ".join(f"{states.count(state)} {text}" for state, text in words.items())
 
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -57,6 +58,26 @@ def answered(path: Path, work: Callable[[Beat], Result]) -> Result:
     if raised:
         raise raised[0]
     return found[0]
+
+
+@contextmanager
+def told_if_stalled(path: Path, tell: Callable[[str], None]) -> Iterator[None]:
+    """Tell once if what is written to a file or folder takes longer than a minute.
+
+    It is let go on: when the folder answers again, nothing is lost.
+
+    Args:
+        path: For the message.
+        tell: Gets it, in a thread of its own, as the one that writes can only wait.
+    """
+    text = f"writing to {path} takes longer than {_PATIENCE:.0f} s: {STALLED} It goes on as soon as that answers"
+    timer = threading.Timer(_PATIENCE, tell, [text])
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 def check_answers(path: Path) -> None:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+from vto_pipeline.model.settings import Config
 
 
 @dataclass(frozen=True)
@@ -45,3 +47,22 @@ class UsualTime:
     def of(self, files: Mapping[str, float]) -> float:
         """Return the time, by the number of files of each kind [s]."""
         return self.seconds + self.per_file * math.pow(files.get(self.kind, 0.0), self.power)
+
+
+def shares_as_stated(levels: Sequence[Level], settings: Config) -> dict[str, float]:
+    """Return section -> its time as a share of that by default, where a number that levels change is stated.
+
+    Time is taken as a power of it, the one that the coarsest level tells.
+
+    Args:
+        levels: Of a stage. Those that change more than one setting, or what is no number, tell of none.
+        settings: Of the stage, as stated.
+    """
+    found: dict[str, float] = {}
+    for level in levels:
+        for name, value in level.settings.items() if len(level.settings) == 1 else ():
+            default = type(settings).model_fields[name].default
+            if name in settings.model_fields_set and isinstance(value, int | float) and 0 not in (value, default):
+                power = math.log(getattr(settings, name) / default) / math.log(value / default)
+                found = {section: share**power for section, share in level.seconds.items()}
+    return found

@@ -1,7 +1,8 @@
 """`python -m vto_pipeline.bench.scan.levels` measures what each level of a stage saves and costs, on the sample shirt.
 
 Each level runs alone against all defaults; what it leaves unchanged is taken from the store. Times are CPU time, so
-that a busy machine counts little. The levels are those of `stages.levels`.
+that a busy machine counts little. Shares are of the time by default, beside those of `stages.levels` in brackets; in a
+folder where the defaults have run before, they are not known.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from vto_pipeline.stages.entry.documents import Order
 from vto_pipeline.stages.levels import LEVELS
 
 _COLUMNS = (
-    *("section", "settings", "stage_cpu_s", "whole_cpu_s", "p95_mm", "back_p95_mm", "error", "table_error"),
+    *("section", "settings", "stage_cpu_s", "shares", "p95_mm", "back_p95_mm", "error", "table_error"),
     *("draped_off_median_mm", "draped_off_p95_mm"),
 )
 _DOCUMENT = Path("configs/demo.yaml")
@@ -81,13 +82,29 @@ def _row(section: str, level: Level, found: Mapping[str, Any], usual: Mapping[st
     return {
         "section": section,
         "settings": in_words(level.settings),
-        "stage_cpu_s": sum(seconds for name, seconds in found["cpu"].items() if name.rpartition(".")[2] == section),
-        "whole_cpu_s": sum(found["cpu"].values()),
+        "stage_cpu_s": _taken(found["cpu"], section) if level.settings else sum(found["cpu"].values()),
+        "shares": shares_in_words(level, found["cpu"], usual["cpu"]),
         "p95_mm": there,
         "back_p95_mm": back,
         "error": max(there / usual["to_truth_mm"]["p95"], back / usual["from_truth_mm"]["p95"]),
         "table_error": level.error,
     }
+
+
+def shares_in_words(level: Level, cpu: Mapping[str, float], usual: Mapping[str, float]) -> str:
+    """Return what stages took at a level as shares of what they take by default, each with that of the table.
+
+    Args:
+        level: Of the table.
+        cpu, usual: Stage -> CPU time [s] at the level, and by default.
+    """
+    shares = {one: (_taken(cpu, one), _taken(usual, one), known) for one, known in level.seconds.items()}
+    return ", ".join(f"{one} {now / then:.2f} ({known:g})" for one, (now, then, known) in shares.items() if then > 0.0)
+
+
+def _taken(cpu: Mapping[str, float], section: str) -> float:
+    """Return what the stages of a section took [s]."""
+    return sum(seconds for name, seconds in cpu.items() if name.rpartition(".")[2] == section)
 
 
 def _draped_off(run: Path, usual: Path) -> dict[str, Value]:

@@ -16,7 +16,7 @@ from vto_pipeline.pipeline.execution.forecast import forecast
 from vto_pipeline.pipeline.execution.pace import machine_pace
 from vto_pipeline.pipeline.execution.sharing import Shares, factor, share_out
 from vto_pipeline.pipeline.execution.store import Store
-from vto_pipeline.pipeline.levels import DEFAULT, Level
+from vto_pipeline.pipeline.levels import DEFAULT, Level, shares_as_stated
 from vto_pipeline.pipeline.plan import Plan, Step
 from vto_pipeline.pipeline.request import Request
 
@@ -52,15 +52,17 @@ class TimeBudget:
 class Budget:
     """A time budget, shared out over the stages of one run, anew whenever one of them is about to run.
 
-    What a stage takes by default is known from earlier runs in the store, or else from the table of stages and how slow
-    this machine is. What this run's stages took against that corrects it.
+    What a stage takes by default is known from earlier runs of this build on this machine. Else the table of stages
+    says it, with how slow this machine is; where it does not, runs of other builds do. What this run's stages took
+    against that corrects it.
 
     Args:
         whole: Of the run.
         request: What is given.
         plan: Its stages. Settings that are stated stay as they are.
         store: Tells what stages take, by the cost model.
-        finals: Stage -> time [s] of final stages when they last ran in this folder; the store has none of them.
+        finals: Stage -> time [s] of final stages when this build last ran them in this folder; the store has none of
+            them.
         stored: Stages whose results by default are there.
     """
 
@@ -84,7 +86,7 @@ class Budget:
         self._chosen: dict[str, Level] = {}
         self._given: dict[str, float] = {}
         self._took = self._forecast = 0.0
-        self._warned = False
+        self._warned = self._refined = False
 
     def adapts(self, step: Step) -> bool:
         """Return whether what a stage does depends on the budget."""
@@ -101,11 +103,29 @@ class Budget:
         """Take note that a stage has to be run by default after all."""
         self._chosen[step.stage.section] = DEFAULT
 
-    @property
-    def coarser(self) -> str:
-        """What the budget made of the stages so far, in words; empty where all ran by default."""
-        names = ", ".join(name for name, level in self._chosen.items() if level.settings)
-        return names and f"give more time than {self.whole.seconds:g} s: for that, less was made of {names}"
+    def finer(self, names: Collection[str]) -> dict[str, str]:
+        """Take back what a budget made of stages, as it is too poor for a later one.
+
+        At first the one whose level adds most to the error gets the next level. The second time all are run by default.
+
+        Args:
+            names: Stages that the later one depends on.
+
+        Returns:
+            Those to be done again, each with what is done, in words; none where all ran by default.
+        """
+        sections = {name.rpartition(".")[2] for name in names}
+        coarse = {one: level for one, level in self._chosen.items() if one in sections and level.settings}
+        if coarse and not self._refined:
+            worst = max(coarse, key=lambda one: coarse[one].error)
+            less = [level for level in self._offers[worst] if level.error < coarse[worst].error]
+            coarse = {worst: max(less, key=lambda level: level.error)}
+        else:
+            coarse = dict.fromkeys(coarse, DEFAULT)
+        self._chosen |= coarse
+        self._refined = True
+        again = {name: coarse[section] for name in names if (section := name.rpartition(".")[2]) in coarse}
+        return {name: "done again " + ("finer" if level.settings else "by default") for name, level in again.items()}
 
     def share(self, step: Step, job: Job) -> Config:
         """Return a stage's settings, with what is left as its own budget if it can stop in time.
@@ -156,12 +176,13 @@ class Budget:
         self._ended(name, by_default)
         return max(seconds, _AT_LEAST) / max(by_default, _AT_LEAST)
 
-    def warn_if_short(self, job: Job) -> None:
-        """Say once that the budget cannot be kept, and how much is needed at least."""
+    def shortage(self) -> str:
+        """Return in words that the budget cannot be kept, and how much is needed at least; once, else nothing."""
         least = self.whole.spent + share_out(self._times(), self._open_offers(), 0.0).seconds
         if least > self.whole.seconds and not self._warned:
             self._warned = True
-            job.warn(f"the time budget of {self.whole.seconds:g} s is too short: this run needs about {least:.0f} s")
+            return f"the time budget of {self.whole.seconds:g} s is too short: this run needs about {least:.0f} s"
+        return ""
 
     def summary(self) -> dict[str, Any]:
         """Return what run.json says of the whole: the least that it takes, and what another minute would buy.
@@ -220,13 +241,17 @@ def _allowed(step: Step) -> list[Level]:
 
 def _usual_times(request: Request, plan: Plan, model: CostModel, finals: Mapping[str, float]) -> dict[str, float]:
     """Return stage -> what it takes by default [s]; 0 where nothing is known."""
-    found, pace = {}, machine_pace()
+    found, pace = dict[str, float](), machine_pace()
+    stages = {step.stage.name: step.stage for step in plan.steps}
+    stated = [shares_as_stated(step.stage.levels, step.settings) for step in plan.steps]
     for name, figures in step_figures(request, plan).items():
-        stage = next(step.stage for step in plan.steps if step.stage.name == name)
-        rough = stage.usual.of(_files(figures)) if stage.usual else 0.0
-        known = finals.get(name, model.seconds(name, figures))
-        found[name] = UNSURE * pace * rough if known is None else known
-    return found
+        usual, section = stages[name].usual, stages[name].section
+        if usual is not None and not model.timed_here(name):
+            share = math.prod(shares.get(section, 1.0) for shares in stated)
+            found[name] = UNSURE * pace * share * usual.of(_files(figures))
+        else:
+            found[name] = model.seconds(name, figures) or 0.0
+    return {**found, **finals}
 
 
 def _files(figures: Figures) -> dict[str, float]:

@@ -3,7 +3,8 @@
 The logarithm of a stage's time, or of its peak memory, is a sum: a constant, a multiple of the logarithm of each size
 and of each setting, and an effect of each thing that was given, such as one body under many garments. All are
 estimated together with normal priors (ridge regression), so that few records give no wild exponents, and with Huber's
-weights, so that a run that compiled its kernels, or met a busy machine, counts as one and not as ten.
+weights, so that a run that compiled its kernels, or met a busy machine, counts as one and not as ten. What another
+build, or another machine, took tells how time grows with size; how long it takes here is for this one's own to tell.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from vto_pipeline.pipeline.execution.key import time_key
 from vto_pipeline.pipeline.execution.store import MANIFEST, Store
 from vto_pipeline.pipeline.given import Given
 from vto_pipeline.pipeline.plan import Plan, Step
@@ -29,9 +31,12 @@ Figures = Mapping[str, float | str]
 
 FILES = " files"
 """What follows the key of something given in the name of the number of its files."""
+TIMED = "timed"
+"""Key of a record's `time_key`; as one of its figures, the name of what it was timed on."""
 _NOISE = 0.3  # of the logarithm of a time: one run against the next
 _EXPONENT = 1.0  # prior of the power of a size; work is rarely more than quadratic
 _EFFECT = 0.5  # prior of what one garment or body adds to the logarithm
+_TIMED_EFFECT = 3.0  # what another build or machine may add: anything
 _HUBER = 1.345  # of the noise: 95 % efficient where nothing is an outlier
 _LEAST_RECORDS = 4  # of a stage; below them the median
 _LATEST = 200  # records of a stage that are read
@@ -145,7 +150,7 @@ def fit_cost(records: Iterable[tuple[Figures, float]]) -> StageCost | None:
         return StageCost(middle, {}, {})
     means = {name: float(column.mean()) for name, (column, is_size) in columns.items() if is_size}
     matrix = np.column_stack([column - means.get(name, 0.0) for name, (column, _) in columns.items()])
-    priors = np.array([_EXPONENT if is_size else _EFFECT for _, is_size in columns.values()])
+    priors = np.array([_prior(name, is_size) for name, (_, is_size) in columns.items()])
     penalty = np.diag(np.concatenate([[0.0], (_NOISE / priors) ** 2]))
     design = np.column_stack([np.ones(len(rows)), matrix])
     found = np.concatenate([[middle], np.zeros(matrix.shape[1])])
@@ -154,6 +159,12 @@ def fit_cost(records: Iterable[tuple[Figures, float]]) -> StageCost | None:
         weights = np.minimum(1.0, _HUBER * _NOISE / np.maximum(away, 1e-12))
         found = np.linalg.solve(design.T @ (weights[:, None] * design) + penalty, design.T @ (weights * logs))
     return StageCost(float(found[0]), means, dict(zip(columns, map(float, found[1:]), strict=True)))
+
+
+def _prior(name: str, is_size: bool) -> float:
+    if name.startswith(f"{TIMED} = "):
+        return _TIMED_EFFECT
+    return _EXPONENT if is_size else _EFFECT
 
 
 def _columns(figures: list[Figures]) -> dict[str, tuple[np.ndarray[Any, np.dtype[np.float64]], bool]]:
@@ -179,21 +190,31 @@ class CostModel:
     def __init__(self, store: Store) -> None:
         stages = sorted(path.name for path in store.folder.glob("*/") if not path.name.startswith("."))
         records = {stage: list(_records(store, stage)) for stage in stages}
+        self._timed = {TIMED: time_key()}
+        own = {stage: [row for row in of if row[0][TIMED] == self._timed[TIMED]] for stage, of in records.items()}
+        self._own = {stage for stage, of in own.items() if of}
+        for stage in self._own:
+            if len(records[stage]) < _LEAST_RECORDS:  # too few to tell what is due to this build
+                records[stage] = own[stage]
         self._seconds = {stage: fit_cost((one, seconds) for one, seconds, _ in of) for stage, of in records.items()}
         self._peaks = {stage: fit_cost((one, peak) for one, _, peak in of) for stage, of in records.items()}
 
     def __bool__(self) -> bool:
         return any(cost is not None for cost in self._seconds.values())
 
+    def timed_here(self, stage: str) -> bool:
+        """Return whether a stage has run as it would now: this build of it, on this machine."""
+        return stage in self._own
+
     def seconds(self, stage: str, figures: Figures) -> float | None:
         """Return how long a stage will take [s]; None where it has never run."""
         cost = self._seconds.get(stage)
-        return None if cost is None else cost.expected(figures)
+        return None if cost is None else cost.expected({**figures, **self._timed})
 
     def peak_mb(self, stage: str, figures: Figures) -> float | None:
         """Return how much memory the process will take while a stage runs [MB]; None where it has never run."""
         cost = self._peaks.get(stage)
-        return None if cost is None else cost.expected(figures)
+        return None if cost is None else cost.expected({**figures, **self._timed})
 
 
 def _records(store: Store, stage: str) -> Iterator[tuple[Figures, float, float]]:
@@ -210,4 +231,5 @@ def _records(store: Store, stage: str) -> Iterator[tuple[Figures, float, float]]
             record = json.loads(manifest.read_text(encoding="utf-8"))["record"]
             if not record["reason"]:
                 by_default = float(record["seconds"]) / float(record.get("share", 1.0))
-                yield record["figures"], by_default, float(record["peak_mb"])
+                figures = {**record["figures"], TIMED: record.get(TIMED, "")}
+                yield figures, by_default, float(record["peak_mb"])

@@ -1,4 +1,4 @@
-"""The keys of a result and of a whole run: everything that decides their bytes, and nothing else."""
+"""The keys of a result, of a whole run and of a measured time: everything that decides them, and nothing else."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from importlib import metadata
 from typing import Any
 
 from vto_pipeline.errors import MissingDependencyError
+from vto_pipeline.pipeline.execution.cost import machine, thread_count
 from vto_pipeline.pipeline.execution.digest import OfPath, code_identity, digest_given, digest_path, digest_value
 from vto_pipeline.pipeline.plan import Plan, Step
 from vto_pipeline.pipeline.request import Request
@@ -48,6 +49,11 @@ def run_key(request: Request, plan: Plan, force_all: bool, of_path: OfPath = dig
         **_of_run(request.seed, force_all),
     }
     return digest_value(parts)[:32]
+
+
+def time_key() -> str:
+    """Digest of what a measured time holds for: this code, this machine, this many threads."""
+    return digest_value({"code": code_identity(), "machine": machine(), "threads": thread_count()})[:32]
 
 
 def _of_step(step: Step) -> dict[str, Any]:

@@ -15,5 +15,8 @@ class Listener:
     def progress(self, fraction: float, text: str) -> None:
         """The running stage has done a share of its work, 0 to 1, and now does `text`."""
 
+    def warned(self, text: str) -> None:
+        """Something is said that cannot wait until the stage has ended. It may come from another thread."""
+
     def ended(self, number: int, count: int, record: StageRecord) -> None:
         """A stage has ended, whichever way."""

@@ -16,8 +16,8 @@ from vto_pipeline.io.documents import read_json, write_json
 from vto_pipeline.model.job import Job
 from vto_pipeline.pipeline.execution.budget import TimeBudget
 from vto_pipeline.pipeline.execution.cost import Meter, machine, thread_count
-from vto_pipeline.pipeline.execution.cost_model import step_figures
-from vto_pipeline.pipeline.execution.key import versions
+from vto_pipeline.pipeline.execution.cost_model import TIMED, step_figures
+from vto_pipeline.pipeline.execution.key import time_key, versions
 from vto_pipeline.pipeline.given import Given
 from vto_pipeline.pipeline.plan import Plan
 from vto_pipeline.pipeline.request import Request
@@ -91,6 +91,7 @@ class RunRecord:
             "versions": {"vto-pipeline": vto_pipeline.__version__, **versions(uses)},
             "machine": machine(),
             "threads": thread_count(),
+            TIMED: time_key(),
             "wanted": list(request.want),
             "given": {artifact: _given(one) for artifact, one in request.given.items()},
             "seed": request.seed,
@@ -116,11 +117,12 @@ class RunRecord:
 
 
 def final_seconds(path: Path, plan: Plan) -> dict[str, float]:
-    """Return what the final stages of a plan took when they last ran [s], as far as run.json tells."""
+    """Return what the final stages of a plan took when this build last ran them here [s], as far as run.json tells."""
     names = {step.stage.name for step in plan.steps if step.stage.final}
     try:
-        stages = read_json(path)["stages"]
-        return {one["name"]: float(one["seconds"]) for one in stages if one["name"] in names and one["status"] == "ran"}
+        record = read_json(path)
+        ran = [one for one in record["stages"] if one["name"] in names and one["status"] == "ran"]
+        return {one["name"]: float(one["seconds"]) for one in ran} if record[TIMED] == time_key() else {}
     except (InputError, KeyError, TypeError, ValueError):  # none yet, or not ours
         return {}
 

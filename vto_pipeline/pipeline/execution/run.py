@@ -11,15 +11,17 @@ from typing import Any
 
 from vto_pipeline.errors import ComputationError, ConfigError, InputError, VtoError
 from vto_pipeline.io.documents import suggest
+from vto_pipeline.io.stalls import told_if_stalled
 from vto_pipeline.model.job import Job
 from vto_pipeline.pipeline.catalogue import Catalogue
 from vto_pipeline.pipeline.execution.budget import Budget, TimeBudget, can_stop, check_memory
 from vto_pipeline.pipeline.execution.cost import Meter
+from vto_pipeline.pipeline.execution.cost_model import TIMED
 from vto_pipeline.pipeline.execution.digest import digest_given
 from vto_pipeline.pipeline.execution.final import make_final
 from vto_pipeline.pipeline.execution.folder import RECORD, locked_run_folder
 from vto_pipeline.pipeline.execution.forecast import stored_results
-from vto_pipeline.pipeline.execution.key import result_key
+from vto_pipeline.pipeline.execution.key import result_key, time_key
 from vto_pipeline.pipeline.execution.listener import Listener
 from vto_pipeline.pipeline.execution.out import OutputFolder, write_value
 from vto_pipeline.pipeline.execution.record import RunRecord, StageRecord, final_seconds
@@ -119,18 +121,31 @@ class _Run:
         self.record = RunRecord(folder / RECORD, request, plan, None if budget is None else budget.whole, memory)
         self.results: dict[str, Result] = {}
         self.given_digests: dict[str, str] = {}
+        self.done_again: dict[str, str] = {}
 
     def run_all(self) -> dict[str, Any]:
-        """Run all stages in order; the final ones also after a failure, so that there is a page."""
+        """Run all stages in order; the final ones also after a failure, so that there is a page.
+
+        Where a stage fails on what a time budget made of those before it, these are done again.
+        """
         self.store.sweep()
         self.out.open()
         self.record.save()
         steps = list(enumerate(self.plan.steps, start=1))
+        waiting = [(n, s) for n, s in steps if not s.stage.final]
         try:
-            for number, step in steps:
-                if not step.stage.final:
+            while waiting:
+                number, step = waiting.pop(0)
+                try:
                     self._guard(number, step)
-        except ComputationError:
+                except ComputationError as error:
+                    again = self._finer(step, error)
+                    if not again:
+                        raise
+                    waiting = [(n, s) for n, s in steps[:number] if s.stage.name in again] + waiting
+        except ComputationError as error:
+            if error.partial:
+                self.out.put_partial(error.partial)
             self._finals([(n, s) for n, s in steps if s.stage.final and not s.stage.needs])
             raise
         else:
@@ -147,18 +162,28 @@ class _Run:
         except VtoError as error:
             error.where = error.where or f"stage {step.stage.name}"
             record.status, record.reason = "failed", error.problem
-            if isinstance(error, ComputationError) and error.partial:
-                self.out.put_partial(error.partial)
-            if isinstance(error, ComputationError) and self.budget is not None:
-                error.hint = "; ".join(filter(None, [self.budget.coarser, error.hint]))
             raise
         except OSError as error:  # a full disk, say; what can no longer be recorded is still told
             record.status, record.reason = "failed", str(error.strerror)
             raise
         finally:
             if record.status != "cached":  # of what takes no time the next record tells, or the last
-                self.record.save()
+                with told_if_stalled(self.out.folder.parent, self.listener.warned):
+                    self.record.save()
             self.listener.ended(number, len(self.plan.steps), record)
+
+    def _finer(self, step: Step, error: ComputationError) -> frozenset[str]:
+        """Return the stages to do again, as one failed on what was made for it in haste; maybe none."""
+        if self.budget is None:
+            return frozenset()
+        name, names = step.stage.name, [one.stage.name for one in self.plan.steps]
+        poor = self.budget.finer([one for one in names if one != name and name in _dependents(one, self.plan)])
+        again = frozenset[str]().union(*(_dependents(one, self.plan) for one in poor))
+        self.renewed |= poor.keys()
+        self.done_again |= {one: f"{said}, as {name} failed: {error.problem}" for one, said in poor.items()}
+        for one in again:
+            self.record.stages[one] = StageRecord(one, figures=self.record.stages[one].figures)
+        return again
 
     def _do(self, number: int, step: Step, record: StageRecord) -> None:
         name = step.stage.name
@@ -180,7 +205,8 @@ class _Run:
             record.status = "left_out"
         mine = [artifact for artifact in step.stage.makes if self.plan.makers.get(artifact) == name]
         self.results.update(dict.fromkeys(mine, result))
-        self.out.publish(result, mine)
+        with told_if_stalled(self.out.folder, self.listener.warned):
+            self.out.publish(result, mine)
 
     def _key(self, step: Step, digests: dict[str, str]) -> str:
         """Return the key of a stage's result: with the budget in it if that counts and no result is stored without."""
@@ -208,19 +234,23 @@ class _Run:
                     outputs, reason = self._call(step, job, record)
             finally:
                 record.take(job, meter)
-            for artifact in step.stage.makes:
-                write_value(self.catalogue.kind(artifact), outputs[artifact], unfinished)
-            record.take(job, meter)
-            if self.budget is not None:
-                record.share = self.budget.ran(step, record.seconds)
-            files = {artifact: self.catalogue.kind(artifact).filename for artifact in step.stage.makes}
-            return self.store.finish(unfinished, name, record.key, files, asdict(record) | {"reason": reason})
+            with told_if_stalled(self.store.folder, self.listener.warned):
+                for artifact in step.stage.makes:
+                    write_value(self.catalogue.kind(artifact), outputs[artifact], unfinished)
+                record.take(job, meter)
+                if self.budget is not None:
+                    record.share = self.budget.ran(step, record.seconds)
+                files = {artifact: self.catalogue.kind(artifact).filename for artifact in step.stage.makes}
+                told = asdict(record) | {"reason": reason, TIMED: time_key()}
+                return self.store.finish(unfinished, name, record.key, files, told)
 
     def _call(self, step: Step, job: Job, record: StageRecord) -> tuple[dict[str, Any], str]:
         """Outputs by artifact, and the reason if the stage was skipped."""
         if self.budget is None:
             return self._work(step, job)
-        self.budget.warn_if_short(job)
+        for text in filter(None, (self.done_again.get(step.stage.name), self.budget.shortage())):
+            job.warn(text)
+            self.listener.warned(text)
         level = self.budget.level(step)
         if level is DEFAULT:
             return self._work(step, job)
