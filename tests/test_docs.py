@@ -10,8 +10,9 @@ import pytest
 
 from vto_pipeline.bench import BENCHES
 from vto_pipeline.bench.docs.__main__ import faults
+from vto_pipeline.bench.docs.chosen import CHOSEN, PACKAGE
 from vto_pipeline.bench.docs.pages import FIGURES, RESULTS, SOURCES, render_pages
-from vto_pipeline.bench.docs.prose import LONGEST, count_words, long_sentences, typed_figures
+from vto_pipeline.bench.docs.prose import LONGEST, count_words, figures_in, long_sentences, typed_figures
 from vto_pipeline.bench.docs.results import Results
 from vto_pipeline.bench.sample_runs import SAMPLES
 from vto_pipeline.errors import ConfigError, InputError
@@ -178,6 +179,65 @@ def test_a_figure_typed_by_hand_is_found():
 )
 def test_figures_hidden_in_a_template_are_found(typed, found):
     assert sorted(fault.problem.split(": ")[1] for fault in typed_figures(typed)) == sorted(found)
+
+
+@pytest.mark.parametrize(
+    ("typed", "found"),
+    [
+        ("| clip | frames |\n|---|---|\n| 131_01 | 994 | 39 to 53 | **23.8** |", ["23.8", "994", "39 to 53"]),
+        ("| a | 0 |\n| a | – |\n| 4 | top | sides |\n| 0.5 | of a scale |", ["0", "0.5"]),
+        ("in 26 of 40 frames, of 100 pairs, 97 of them", ["26 of 40"]),
+        ("26.6 whole frames a second, 30 a second, after a second", ["26.6 whole frames a second", "30 a second"]),
+        ("at least 26 dB and 0.85, 16 degrees, 30°, in 11 frames", ["0.85", "11 frames", "16 degrees", "26 dB", "30°"]),
+        ("`--fps 30 a second`, figure 3, ISO 8559-1, 33 of MediaPipe, [ten](a/1.5/b.md), ![x](0.5.png)", []),
+    ],
+)
+def test_what_looks_measured_is_found(typed, found):
+    assert sorted(fault.problem.split(": ")[1].strip("*") for fault in figures_in(typed)) == sorted(found)
+
+
+@pytest.fixture
+def by_hand(project):
+    """Write a page by hand, what was chosen in it, and a line of code; return what is wrong."""
+
+    def found(page: str, chosen: str = "", code: str = "") -> list[str]:
+        (project / "docs" / "hand.md").write_text(page)
+        (project / CHOSEN).write_text(chosen or "{}\n")
+        (project / PACKAGE).mkdir(exist_ok=True)
+        (project / PACKAGE / "setting.py").write_text(code)
+        return list(faults(project))
+
+    return found
+
+
+def test_a_figure_typed_into_a_page_by_hand_is_found(by_hand):
+    (fault,) = by_hand("# By hand\n\nIt takes 12 s, and no\nlonger.\n")
+    assert fault.startswith("docs/hand.md:3: typed by hand: 12 s")
+    assert by_hand("# By hand\n\nIt takes a while: see `vto bench`.\n") == []
+
+
+def test_what_was_chosen_may_be_typed_while_it_is_so(by_hand):
+    page, code = "It waits for 12\ns. It ends after 112 s.\n", "WAIT_S = 12.0  # of a server\n"
+    (fault,) = by_hand(page, 'hand.md:\n  12 s: "setting.py: WAIT_S = 12.0"\n', code)
+    assert fault.startswith("docs/hand.md:2: typed by hand: 112 s")
+    allowed = 'hand.md:\n  waits for 12 s: "setting.py: WAIT_S = 12.0"\n  after 112 s: an example\n'
+    assert by_hand(page, allowed, code) == []
+    (fault,) = by_hand(page, allowed, "WAIT_S = 13.0\n")
+    assert fault.startswith(f"{CHOSEN}: setting.py does not hold 'WAIT_S = 12.0'")
+
+
+@pytest.mark.parametrize(
+    ("chosen", "problem"),
+    [
+        ("hand.md: {12 s: an example}", "hand.md does not say '12 s'"),
+        ("lost.md: {12 s: an example}", "lost.md is not a page written by hand"),
+        ("benchmarks/toy.md: {0.35 s: an example}", "benchmarks/toy.md is not a page written by hand"),
+        ('hand.md: {3 s: "gone.py: WAIT_S = 3"}', "gone.py does not hold 'WAIT_S = 3'"),
+    ],
+)
+def test_what_is_allowed_for_nothing_is_found(by_hand, chosen, problem):
+    (fault,) = by_hand("It waits for 3 s.\n" if "gone" in chosen else "It waits.\n", chosen)
+    assert fault.startswith(f"{CHOSEN}: {problem}")
 
 
 def test_long_sentences_are_found_where_they_begin():

@@ -34,12 +34,23 @@ def test_holds_and_slides_half_a_percent_from_the_limit(method, friction):
 @pytest.mark.parametrize("method", EULER)
 @pytest.mark.parametrize("friction", [0.1, 0.6])
 def test_slides_as_far_as_the_closed_form(method, friction):
-    slid, steps = incline({"solver": method}, 1.2 * friction, friction)
+    slid, steps = incline(
+        {"solver": method, **({"substeps": 1} if method == "newton" else {})}, 1.2 * friction, friction
+    )
     wanted = slide(friction, np.arctan(1.2 * friction), GRAVITY, 1.0 / steps, steps)
     assert_allclose(slid, wanted, rtol=1e-5)
     tilt = np.arctan(1.2 * friction)
     continuous = 0.5 * GRAVITY * (np.sin(tilt) - friction * np.cos(tilt))
     assert_allclose(wanted / continuous, 1.0 + 1.0 / steps, rtol=1e-9)  # the textbook's, and the error of the steps
+
+
+@pytest.mark.parametrize("friction", [0.1, 0.6])
+def test_slides_as_far_at_its_own_pace_but_for_what_free_fall_loses(friction):
+    slid, steps = incline(DEFAULT, 1.2 * friction, friction)
+    tilt = np.arctan(1.2 * friction)
+    continuous = 0.5 * GRAVITY * (np.sin(tilt) - friction * np.cos(tilt))
+    assert steps < 30  # of 60
+    assert abs(slid - continuous) < 1.1 * 0.5 * GRAVITY / 60.0
 
 
 def test_the_strip_of_the_capstan_slips_and_holds_where_it_is_far_from_the_limit():

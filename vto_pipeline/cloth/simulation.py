@@ -15,6 +15,7 @@ from vto_pipeline.cloth.collision.contacts import Collider
 from vto_pipeline.cloth.collision.shapes.colliders import Box, Capsule, Ellipsoid, MeshCollider, Plane, Sphere
 from vto_pipeline.cloth.collision.shapes.moving import Moving
 from vto_pipeline.cloth.dynamics.residual import elastic_energy
+from vto_pipeline.cloth.dynamics.step_length import run_at_own_pace
 from vto_pipeline.cloth.dynamics.step_refinement import refine_time_step
 from vto_pipeline.cloth.dynamics.stepper import Pins, StepConfig, Stepper
 from vto_pipeline.cloth.model.build import at_rest, build_cloth
@@ -76,7 +77,7 @@ class Trajectory:
     Args:
         positions: [m], shape (V, 3).
         velocities: [m/s], shape (V, 3).
-        report: seconds (wall), prepare_s (what the method made before), method, reason, substeps, steps,
+        report: seconds (wall), prepare_s (what the method made before), method, reason, substeps (usual), steps,
             contact_rounds, simulated_s, energy_j, residual; with "rest" settled; error_mm where it is known; where the
             cloth is kept from itself start_pairs (of triangles that met), start_left (that still did after untangling)
             and self_contact (see `collision.self_collision.counters.CollisionCounters`); warnings, where anything is
@@ -173,7 +174,7 @@ def simulate(
             state, trace = settling.state, settling.trace
             report.update(settled=settling.settled, error_mm=1e3 * settling.error)
         elif config.target_error_mm is None and config.time_budget_s is None:
-            state = stepper.run(state, seconds)
+            state = run_at_own_pace(stepper, state, seconds)
         else:
             error = 0.0 if config.target_error_mm is None else 1e-3 * config.target_error_mm
             refined = refine_time_step(make, state, seconds, error=error, finest=config.finest, deadline=deadline)

@@ -3,4 +3,5 @@
 results: figures from results files
 pages: templates to Markdown
 prose: plain prose, checked
+chosen: numbers in hand-written pages
 """

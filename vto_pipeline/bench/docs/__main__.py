@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from vto_pipeline.bench.docs.chosen import page_faults
 from vto_pipeline.bench.docs.pages import SOURCES, render_pages
 from vto_pipeline.bench.docs.prose import README_WORDS, count_words, long_sentences, typed_figures
 from vto_pipeline.errors import VtoError
@@ -19,7 +20,8 @@ def faults(root: Path) -> Iterator[str]:
     Raises:
         ConfigError: a template asks for a figure that no results file has.
     """
-    for name, text in render_pages(root).items():
+    generated = render_pages(root)
+    for name, text in generated.items():
         page = root / name
         if not page.is_file() or page.read_text(encoding="utf-8") != text:
             yield f"{name}: not what its source and results say; run `make docs`"
@@ -32,6 +34,7 @@ def faults(root: Path) -> Iterator[str]:
     for source in sorted((root / SOURCES).rglob("*.md.j2")):
         found = typed_figures(source.read_text(encoding="utf-8"))
         yield from (f"{source.relative_to(root)}:{fault.line}: {fault.problem}" for fault in found)
+    yield from page_faults(root, generated)
 
 
 def main() -> int:

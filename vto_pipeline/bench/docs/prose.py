@@ -22,8 +22,21 @@ _ABBREVIATION = re.compile(r"\b(e\.g|i\.e|vs|cf|approx|Fig|No|et al)\.", re.I)
 _WORD = re.compile(r"[^\W_]")
 
 _TEMPLATE = re.compile(r"\{\{.*?\}\}|\{%.*?%\}|\{#.*?#\}", re.S)
-_UNITS = r"nm|mm|cm|km|m|ms|s|min|h|kg|g|N|Pa|GB|MB|kB|Hz|W|points?|percent|times|seconds?|minutes?|hours?|%"
-_FIGURE = re.compile(rf"(?<![\w.^/-])\d[\d.,]*(?:e-?\d+)?\s?(?:{_UNITS})(?![\w/²³])|(?<![\w.^/-])\d[\d.]*e-?\d+\b")
+_UNITS = (
+    r"nm|mm|cm|km|m|ms|s|min|h|kg|g|N|Pa|GB|MB|kB|Hz|W|dB|px|pixels?|fps|points?|percent|times|seconds?|minutes?|hours?|%|"
+    r"°|degrees?|frames?|vertices|triangles|million"
+)
+_NUMBER = r"(?<![\w.^/-])\d(?:[\d.,]*\d)?"
+_FIGURE = re.compile(
+    rf"{_NUMBER}(?:e-?\d+)?\s?(?:{_UNITS})(?![\w/²³])"
+    rf"|{_NUMBER}e-?\d+\b"
+    rf"|{_NUMBER} of (?:the )?\d[\d,]*"
+    rf"|{_NUMBER} (?:[a-z]+ ){{0,3}}an? (?:second|minute|hour|frame|row|step)\b"
+    r"|(?<![\w.^/-])\d+\.\d+(?![\w.])"
+)
+"""A number with a unit or an exponent, a share of a count, a rate, or a number with decimals."""
+_CELL = re.compile(r"(?<=\|)\s*\**[±–-]?[\d.,]*\d(?:(?: to |, |/| ± )\d[\d.,]*)*\**\s*(?=\|)")
+"""A cell of a table that holds bare numbers."""
 
 
 @dataclass(frozen=True)
@@ -56,17 +69,32 @@ def count_words(text: str) -> int:
 
 
 def typed_figures(template: str) -> list[Fault]:
-    """Return the figures with a unit, or with an exponent, in a page's source that no results file stands behind.
+    """Return the figures in a page's source that no results file stands behind: `figures_in`, and what templates hide.
 
     What was chosen rather than measured, such as a setting or a size, is written `chosen("2 s")` in a template. Numbers
     that the template itself holds and shows count too, with a unit or without.
     """
     found = [Fault(line, f"typed by hand: {value}") for line, value in _shown_constants(template)]
-    template = _FENCE.sub(_remarks, template)
-    for blank in (_COMMENT, _TEMPLATE, _CODE):
-        template = blank.sub(_emptied, template)
-    for number, line in enumerate(template.splitlines(), start=1):
-        found += [Fault(number, f"typed by hand: {hit[0]}") for hit in _FIGURE.finditer(line)]
+    return found + figures_in(_TEMPLATE.sub(_emptied, template))
+
+
+def figures_in(text: str) -> list[Fault]:
+    """Return what looks like a measured figure in a Markdown text: with a unit, an exponent, decimals, or in a table.
+
+    Code does not count, but for the remarks in it; neither does the first column of a table, which says what a row is.
+    Numbers in words are not found.
+    """
+    text = _FENCE.sub(_remarks, text)
+    for blank in (_COMMENT, _CODE, _IMAGE):
+        text = blank.sub(_emptied, text)
+    found = []
+    for number, line in enumerate(_LINK.sub(r"\1", text).splitlines(), start=1):
+        hits = [hit[0] for hit in _FIGURE.finditer(line)]
+        if line.startswith("|"):
+            named = line.index("|", 1) if line.count("|") > 1 else 0
+            bare = (hit[0].strip() for hit in _CELL.finditer(line, named))
+            hits += [cell for cell in bare if not _FIGURE.search(cell)]
+        found += [Fault(number, f"typed by hand: {hit}") for hit in hits]
     return found
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from math import ceil
+from math import ceil, exp
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +25,7 @@ from vto_pipeline.cloth.collision.response.penalty import FREQUENCY, Penalty
 from vto_pipeline.cloth.collision.response.projected_gauss_seidel import separate_pairs
 from vto_pipeline.cloth.collision.self_collision.pairs import no_pairs
 from vto_pipeline.cloth.collision.self_collision.self_contact import SelfContact
+from vto_pipeline.cloth.collision.shapes.moving import Moving
 from vto_pipeline.cloth.dynamics.methods import FRAME, METHODS, Method, MethodChoice, choose_method
 from vto_pipeline.cloth.dynamics.residual import relative_residual
 from vto_pipeline.cloth.integrators import INTEGRATORS
@@ -230,6 +231,24 @@ class Stepper:
         return FRAME / self.substeps
 
     @property
+    def may_lengthen_steps(self) -> bool:
+        """Whether steps may be longer than usual: none were asked for, and only the cloth moves; after `prepare`."""
+        if not isinstance(self._method, Newton) or self._config.substeps is not None or self._pins is not None:
+            return False
+        tangled = self.self_contact is not None and self.self_contact.tangled
+        return not tangled and not any(_moves(collider) for collider in self._colliders)
+
+    def driven(self, before: ClothState, after: ClothState) -> FloatArray:
+        """Return by how much what is not damping changed the speed of each vertex in a step [m/s], shape (V,)."""
+        kept = exp(-self._damping * (after.time - before.time))
+        return np.asarray(np.linalg.norm(after.velocities - kept * before.velocities, axis=1))
+
+    @property
+    def free_fall(self) -> float:
+        """Acceleration of what falls freely [m/s²]."""
+        return float(np.linalg.norm(self._model.gravity))
+
+    @property
     def can_use_exact_stiffness(self) -> bool:
         """Whether the method can use the exact stiffness; after `prepare`."""
         return isinstance(self._method, Newton) and self._method.can_use_exact_stiffness
@@ -318,3 +337,7 @@ class Stepper:
         positions, _ = self.self_contact.collision_free(state.positions, positions)
         velocities = after.velocities + (positions - after.positions) / seconds
         return replace(after, positions=positions, velocities=velocities)
+
+
+def _moves(collider: Collider) -> bool:
+    return isinstance(collider, Moving) or (isinstance(collider, BodyCollider) and collider.moves)

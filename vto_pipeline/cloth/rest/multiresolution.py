@@ -22,7 +22,7 @@ from vto_pipeline.cloth.dynamics.stepper import Stepper
 from vto_pipeline.cloth.model.build import ClothModel, ClothState, at_rest, build_cloth
 from vto_pipeline.cloth.model.coarsening import CoarseGarment, coarsen
 from vto_pipeline.cloth.rest.convergence import SettlingResult, rms
-from vto_pipeline.cloth.rest.phases import PLACED, ROUGH, Phases
+from vto_pipeline.cloth.rest.phases import ROUGH, Phases
 from vto_pipeline.cloth.rest.softened import softened
 from vto_pipeline.cloth.rest.true_distance import some_positions, with_true_distances
 from vto_pipeline.cloth.simulation import default_skin
@@ -262,7 +262,7 @@ def _by_softer_threads(
         deadline: `time.perf_counter` at which to stop.
     """
     began = time.perf_counter()
-    nearly = phases.settle_and_clear(state, softer, body, began + _FIRST * (deadline - began), (PLACED,))
+    nearly = phases.settle(state, softer, body, began + _FIRST * (deadline - began))
     stepper.steps += softer.steps
     if nearly.jammed or nearly.caught:
         return nearly

@@ -160,6 +160,50 @@ class Phases:
         )
         return self.resolve_crossings(state, body)
 
+    def settle(
+        self,
+        state: ClothState,
+        stepper: Stepper,
+        body: TriangleMesh,
+        deadline: float,
+        nearly: tuple[float, float] = PLACED,
+    ) -> SettlingResult:
+        """Return the cloth at rest, or as near to it as allowed; it may cross the body.
+
+        Args:
+            state: Where to begin.
+            stepper: The cloth among its colliders.
+            body: Where it is now.
+            deadline: `time.perf_counter` at which to stop.
+            nearly: How nearly.
+        """
+
+        def watch(done: float, error: float) -> None:
+            known = f"{1e3 * error:.2f} mm of motion predicted" if np.isfinite(error) else "falling into place"
+            self._job.progress(0.5 + 0.4 * done, f"settling: {known}")
+
+        error, times = nearly
+        limits = SettleLimits(
+            error=max(error, 1e-3 * self._config.target_error_mm),
+            residual=times * self._config.target_residual,
+            seconds=self._config.settle_seconds,
+            finest=self._config.finest,
+            deadline=deadline,
+            lowest=_lowest_hold(body, state.positions),
+        )
+
+        def is_caught(positions: FloatArray) -> bool:
+            """Return whether what never came free of the body is stretched about it as no cloth can be."""
+            faces = self._model.faces
+            if self.crossings_left == 0 or longest_stretch(positions, self._rest.positions, faces) < OVERSTRETCHED:
+                return False
+            return len(intersecting_faces(TriangleMesh(positions, faces), body)) > 0
+
+        stepper.prepare(state.positions)
+        if self._config.substeps is None and stepper.has_exact_rest:
+            stepper.substeps = min(stepper.substeps, _LONG)
+        return relax_to_rest(stepper, state, limits, watch, is_caught, self.some)
+
     def settle_and_clear(
         self,
         state: ClothState,
@@ -177,38 +221,12 @@ class Phases:
             deadline: `time.perf_counter` at which to stop.
             passes: How nearly, for each coming to rest; what was pushed off the body does so again.
         """
-
-        def watch(done: float, error: float) -> None:
-            known = f"{1e3 * error:.2f} mm of motion predicted" if np.isfinite(error) else "falling into place"
-            self._job.progress(0.5 + 0.4 * done, f"settling: {known}")
-
-        limits = SettleLimits(
-            error=1e-3 * self._config.target_error_mm,
-            residual=self._config.target_residual,
-            seconds=self._config.settle_seconds,
-            finest=self._config.finest,
-            deadline=deadline,
-            lowest=_lowest_hold(body, state.positions),
-        )
-        faces, rest = self._model.faces, self._rest.positions
-
-        def is_caught(positions: FloatArray) -> bool:
-            """Return whether what never came free of the body is stretched about it as no cloth can be."""
-            if self.crossings_left == 0 or longest_stretch(positions, rest, faces) < OVERSTRETCHED:
-                return False
-            return len(intersecting_faces(TriangleMesh(positions, faces), body)) > 0
-
-        stepper.prepare(state.positions)
-        if self._config.substeps is None and stepper.has_exact_rest:
-            stepper.substeps = min(stepper.substeps, _LONG)
         trace: list[TraceRow] = []
         looks: list[FloatArray] = []
         began = time.perf_counter()
         for turn in range(_TURNS):
-            error, times = passes[min(turn, len(passes) - 1)]
-            enough = replace(limits, error=max(error, limits.error), residual=times * limits.residual)
             spent = time.perf_counter() - began
-            settling = relax_to_rest(stepper, state, enough, watch, is_caught, self.some)
+            settling = self.settle(state, stepper, body, deadline, passes[min(turn, len(passes) - 1)])
             trace += [replace(row, seconds=spent + row.seconds) for row in settling.trace]
             looks += settling.looks
             settling.trace, settling.looks = trace, looks
@@ -216,7 +234,7 @@ class Phases:
                 break
             self._job.progress(0.9, "clearing the body")
             state, crossing = clear_body_crossings(
-                stepper, settling.state, rest, faces, body, self._config.clear_rounds
+                stepper, settling.state, self._rest.positions, self._model.faces, body, self._config.clear_rounds
             )
             lies_clear = state is settling.state
             settling.state = state

@@ -118,6 +118,11 @@ class BodyCollider:
         return len(self._frames) > 1 and bool(np.ptp(self._frames, axis=0).any())
 
     @property
+    def moves(self) -> bool:
+        """Whether it ever does."""
+        return not self._at_rest
+
+    @property
     def faces(self) -> IntArray:
         """Its faces after cleaning, shape (F, 3)."""
         return self._clean.faces

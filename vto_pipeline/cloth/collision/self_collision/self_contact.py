@@ -106,6 +106,11 @@ class SelfContact:
         self._passed: _VerifiedMove | None = None
         self._failed = self._wait = 0  # proofs since the last that was one; how often not to try
 
+    @property
+    def tangled(self) -> bool:
+        """Whether cloth crosses itself, as it did from the start."""
+        return bool(self._crossed.any())
+
     def set_time_span(self, begin: float, end: float) -> None:
         """Take the bodies to a step between these times [s]; what is asked next is about it."""
         self._passed = None
