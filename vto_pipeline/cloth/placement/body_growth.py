@@ -23,7 +23,7 @@ from vto_pipeline.cloth.placement.limbs import Limbs
 from vto_pipeline.cloth.placement.rigid_escape import escape_rigidly
 from vto_pipeline.cloth.placement.voxel_fit import close_openings
 from vto_pipeline.errors import GarmentError, InputError, IntersectingError
-from vto_pipeline.geometry.intersections import intersecting_faces
+from vto_pipeline.geometry.intersections import intersecting_faces, self_intersections
 from vto_pipeline.geometry.laplace import laplacian
 from vto_pipeline.geometry.remeshing.rims import perimeter
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
@@ -50,6 +50,7 @@ class BodyGrowth(NamedTuple):
         garment: Where it is when the body begins to grow.
         body: From thin to full.
         crossing: Pairs of triangles of both that meet at the begin.
+        tangled: Pairs of its own triangles that meet there.
         pieces: Of the garment, with what the limbs do there.
         names: Of the limbs.
     """
@@ -57,13 +58,14 @@ class BodyGrowth(NamedTuple):
     garment: TriangleMesh
     body: MovingBody
     crossing: int
+    tangled: int
     pieces: list[Piece]
     names: list[str]
 
     @property
     def fault(self) -> tuple[int, int]:
         """What is wrong with the begin: pairs that cross, and limbs that go where they are not meant to."""
-        return self.crossing, sum(len(piece.astray()) for piece in self.pieces)
+        return self.crossing + self.tangled, sum(len(piece.astray()) for piece in self.pieces)
 
     @property
     def thinned(self) -> int:
@@ -74,6 +76,21 @@ class BodyGrowth(NamedTuple):
     def pierced(self) -> int:
         """How many limbs go through cloth."""
         return sum(len(places) > 0 for piece in self.pieces for places in piece.pierced)
+
+    def from_smaller(self, times: float) -> BodyGrowth:
+        """Return it with garment and body so many times smaller at the begin: the body grows in size, too.
+
+        All lies as before, but a garment that was enlarged is not stretched. It would snap together about a thin body,
+        and jam there.
+
+        Args:
+            times: How much larger than it is the garment starts, at least 1.
+        """
+        frames = self.body.keyframes if self.thinned > 0 else np.repeat(self.body.keyframes, 2, axis=0)
+        middle = self.garment.vertices.mean(axis=0)
+        size = np.linspace(1.0 / times, 1.0, len(frames))[:, None, None]
+        garment = TriangleMesh(middle + (self.garment.vertices - middle) / times, self.garment.faces)
+        return self._replace(garment=garment, body=MovingBody(middle + size * (frames - middle), self.body.faces))
 
     def refuse_pierced(self) -> None:
         """Raise an error if a limb goes through cloth: nothing that moves cloth a little can free it.
@@ -241,7 +258,8 @@ class Thinning:
         least = int(np.argmin(crossing))
         grown = MovingBody(np.stack(self._frames[least::-1]), self._faces)
         pieces = pieces_with_limbs(garment, self.limbs, self.after(least))
-        return BodyGrowth(garment, grown, crossing[least], pieces, [limb.name for limb in self.limbs.limbs])
+        tangled = len(self_intersections(garment))
+        return BodyGrowth(garment, grown, crossing[least], tangled, pieces, [limb.name for limb in self.limbs.limbs])
 
     def limbs_astray(self, garment: TriangleMesh) -> int:
         """Return how many limbs go through cloth or another opening than their own, here and with sleeves on arms.
