@@ -19,14 +19,14 @@ from vto_pipeline.cloth.model.coarsening import CoarseGarment, coarsen
 from vto_pipeline.cloth.placement.flexible_escape import escape_flexibly
 from vto_pipeline.cloth.placement.limb_lead import lead_onto_limbs
 from vto_pipeline.cloth.placement.limb_openings import Piece, pieces_with_limbs
-from vto_pipeline.cloth.placement.limbs import Limbs
+from vto_pipeline.cloth.placement.limbs import Limb, Limbs
 from vto_pipeline.cloth.placement.rigid_escape import escape_rigidly
 from vto_pipeline.cloth.placement.voxel_fit import close_openings
 from vto_pipeline.errors import GarmentError, InputError, IntersectingError
 from vto_pipeline.geometry.intersections import intersecting_faces, self_intersections
 from vto_pipeline.geometry.laplace import laplacian
-from vto_pipeline.geometry.remeshing.rims import perimeter
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.garment import Garment, RestShape
 from vto_pipeline.model.job import Job
@@ -40,6 +40,8 @@ _LED_BY = (0, 3, 6)  # steps of thinning after which the garment is led about th
 _STILL_WORN = 0.5  # of the body's surface that was in the garment: with less, it is led to another part of the body
 _LARGER = (1.1, 1.2, 1.35, 1.5)  # times: so much it may start larger than it is
 _OVER, _UNDER = 0.05, 0.1  # of the stature: no opening is so far above where its limb joins, no neckline so far below
+_UNDER_ARMS = 0.02  # of the stature: so far above where arms join the body may hang what is held by a chest
+_SHOULDER, _STEEP = 0.06, 0.75  # of the stature: from neck to shoulder; T-shirts and ponchos fall by 0.5 to 0.65 of that
 _LED_LARGER = 1.2  # times, to be led: small enough for sleeves to stay near their arms
 
 
@@ -278,21 +280,43 @@ class Thinning:
     def limbs_out_of_place(self, garment: TriangleMesh) -> int:
         """Return how many limbs tell that a garment is not worn at this height.
 
-        These are arms in the way of a skirt, which has one opening for both, wide enough for the waist: they go through
-        its cloth, or join the body below that opening. And a head whose own opening is far from the neck.
+        These are arms in the way of what hangs: they go through its cloth, or join the body below its upper opening.
+        And a head whose own opening is far from the neck.
         """
-        limbs, tall = self.limbs.limbs, float(np.ptp(self.after(0).vertices[:, 1]))
-        arms = [number for number, limb in enumerate(limbs) if limb.name.endswith("arm")]
         count = 0
         for piece in pieces_with_limbs(garment, self.limbs, self.after(_LINES)):
-            for number, limb in enumerate(limbs):
-                if piece.meant[number] < 0:
-                    continue
-                opening = piece.openings[piece.meant[number]]
-                over = (piece.mesh.vertices[opening, 1] - limb.root[1]) / tall
-                if number in arms and len({piece.meant[arm] for arm in arms}) == 1:
-                    in_the_way = len(piece.pierced[number]) > 0 or over.min() > _OVER
-                    count += in_the_way and perimeter(piece.mesh, opening) > self.limbs.waist
-                elif limb.name == "head" and piece.meant.count(piece.meant[number]) == 1:
+            above = self._hangs_from(piece)
+            for number, limb in enumerate(self.limbs.limbs):
+                if above is not None and limb.name.endswith("arm"):
+                    count += len(piece.pierced[number]) > 0 or self._over(piece, above, limb).max() > _UNDER_ARMS
+                elif limb.name == "head" and piece.meant.count(piece.meant[number]) == 1 and piece.meant[number] >= 0:
+                    over = self._over(piece, piece.meant[number], limb)
                     count += over.min() > _OVER or over.max() < -_UNDER
         return count
+
+    def hangs(self, garment: TriangleMesh) -> bool:
+        """Return whether a garment is a skirt or what else hangs about the trunk, upright as it stands here."""
+        pieces = pieces_with_limbs(garment, self.limbs, self.after(_LINES))
+        return any(self._hangs_from(piece) is not None for piece in pieces)
+
+    def is_below_arms(self, garment: TriangleMesh) -> bool:
+        """Return whether all of a garment is below where the arms join the body."""
+        roots = [limb.root[1] for limb in self.limbs.limbs if limb.name.endswith("arm")]
+        return bool(garment.vertices[:, 1].max() - min(roots) <= _UNDER_ARMS * self._stature)
+
+    @property
+    def _stature(self) -> float:
+        return float(np.ptp(self.after(0).vertices[:, 1]))
+
+    def _over(self, piece: Piece, opening: int, limb: Limb) -> FloatArray:
+        """Return how far above where a limb joins the body an opening is, as shares of the stature, shape (N,)."""
+        return np.asarray((piece.mesh.vertices[piece.openings[opening], 1] - limb.root[1]) / self._stature)
+
+    def _hangs_from(self, piece: Piece) -> int | None:
+        """Return the upper opening of what has none for one arm and falls steeply from there, as no poncho does."""
+        names = [limb.name for limb in self.limbs.limbs]
+        ways = {way for name, way in zip(names, piece.meant, strict=True) if name.endswith("arm")}
+        if len(ways) != 1 or -1 in ways or "head" not in names:
+            return None
+        above = piece.meant[names.index("head")]
+        return above if piece.falls_from(above, _SHOULDER * self._stature) > _STEEP else None

@@ -16,12 +16,14 @@ from scipy.spatial.distance import cdist
 
 from vto_pipeline.cloth.placement.limbs import Limb, Limbs
 from vto_pipeline.cloth.placement.voxel_fit import close_openings
+from vto_pipeline.geometry.geodesic import distance_from
 from vto_pipeline.geometry.topology import boundary_loops, face_components, submesh
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 
 _MOST_OPENINGS = 7  # of a piece: more are slits and lace, and which limb is whose is anybody's guess
 _PASSES = 0.1  # m: round an opening that a hand gets through
+_RING = 0.2  # of the way that tells how steeply cloth falls: half the width of the ring that is looked at
 _IDLE = 10.0  # m: as far as that may a limb be from an opening that had none
 
 
@@ -61,6 +63,20 @@ class Piece(NamedTuple):
     def _alone(self) -> set[int]:
         """Return the limbs that have an opening to themselves."""
         return {limb for limb, opening in enumerate(self.meant) if opening >= 0 and self.meant.count(opening) == 1}
+
+    def falls_from(self, opening: int, reach: float) -> float:
+        """Return how far cloth falls on its way from an opening, as a share of that way.
+
+        What hangs from a waist falls steeply; what lies on shoulders goes outward first.
+
+        Args:
+            opening: Its index.
+            reach: How far from it to look, over the cloth [m].
+        """
+        loop, height = self.openings[opening], self.mesh.vertices[:, 1]
+        away = distance_from(self.mesh, loop, np.inf)
+        ring = np.abs(away - reach) < _RING * reach
+        return float((height[loop].mean() - height[ring].mean()) / away[ring].mean()) if ring.any() else 0.0
 
     def missed(self, limb: int) -> str:
         """Return in words how far from its opening a limb goes through cloth; nothing where that is unknown."""

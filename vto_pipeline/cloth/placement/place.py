@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +29,7 @@ _CLOSE = 0.9  # of the best coarse worth: these are looked at again with fine cu
 _ALIKE = 0.98  # as good, but for where the cubes happen to lie
 _LARGER, _STEPS = 1.2, 4  # a garment may start up to twice as large as it is
 _FALLING = 0.85  # of the best worth yet: larger garments need not be tried
+_FAR_BETTER = 1.25  # times the worth of its own size: a garment that fits gains less by being larger
 _DEEP = 0.01  # m
 _HEIGHTS, _ALL_HEIGHTS = 6, 24  # tried where limbs are astray: where that takes long to tell, and where it does not
 _WORTH_A_TRY = 0.5  # of the score of the first place: less is beside the body
@@ -143,13 +145,11 @@ def find_placement(
             f"{_relative_score(stands.score, best.score):.0%} of the best"
         )
     stretch, best = _enlarge_until_body_inside(metres, cubes, best, config)
-    if config.place == "auto":
-        best = _where_limbs_are_in_place(
-            TriangleMesh(stretch * metres.vertices, metres.faces), cubes, best, config, job
-        )
     job.metrics["needs_larger_share"] = stretch - 1.0
     if stretch > 1.0:
-        job.warn(f"too small: this body needs it {stretch - 1:.0%} larger; it starts stretched by that much")
+        job.warn(f"too small: this body needs it {stretch - 1:.0%} larger")
+    if config.place == "auto":
+        stretch, best = _where_limbs_are_in_place(metres, cubes, stretch, best, config, job)
     share = _relative_score(best.score_in_place, best.score)
     if config.place == "auto" and best is stands and scale == 1.0 and share >= config.stands_well:
         job.note(f"garment left where it stands: its place scores {share:.0%} of the best")
@@ -211,19 +211,33 @@ def _as_laid_out(garment: TriangleMesh, body: BodyCubes, config: PlaceConfig, jo
 
 
 def _where_limbs_are_in_place(
-    garment: TriangleMesh, body: BodyCubes, best: VoxelPlacement, config: PlaceConfig, job: Job
-) -> VoxelPlacement:
-    """Return the best place, or the next best height at which fewer limbs are out of place.
+    garment: TriangleMesh, body: BodyCubes, stretch: float, best: VoxelPlacement, config: PlaceConfig, job: Job
+) -> tuple[float, VoxelPlacement]:
+    """Return how much larger the garment starts, and the best height at which the fewest limbs are out of place.
 
     A trunk may fill a loose skirt better than the hips do, but there its arms go through the cloth; and hips a tight
     blouse better than the chest does, but there its neck is at the waist.
+
+    What hangs from one opening for both arms goes below them. Where it is out of place, or too small, it goes to the
+    lowest of the heights that are as good to it, were it large enough: it slides. There it starts in its own size.
     """
-
-    def at_other_heights() -> list[VoxelPlacement]:
-        fit = VoxelFit(garment, body, 1e-3 * config.cube_mm, config.cloth_in_body)
-        return fit.best_placements(best.turn, _ALL_HEIGHTS)
-
-    return _least_pierced(best, at_other_heights, garment, Thinning(body.mesh).limbs_out_of_place, job)
+    thinning, cube = Thinning(body.mesh), 1e-3 * config.cube_mm
+    larger = TriangleMesh(stretch * garment.vertices, garment.faces)
+    there, fit = best.placed(larger), VoxelFit(larger, body, cube, config.cloth_in_body)
+    heights = partial(fit.best_placements, best.turn, _ALL_HEIGHTS)
+    if not thinning.hangs(there):
+        return stretch, _least_pierced(best, heights, larger, thinning.limbs_out_of_place, job)
+    if stretch > 1.0 or thinning.limbs_out_of_place(there) > 0:
+        below = [way for way in heights() if thinning.is_below_arms(way.placed(larger))]
+        good = [way for way in below if way.score >= _FALLING * below[0].score]
+        own, turned = VoxelFit(garment, body, cube, config.cloth_in_body), garment.vertices @ best.turn.T
+        ways = []
+        for way in sorted(good, key=lambda way: float(way.shift[1])):
+            rise = way.placed(larger).vertices[:, 1].max() - turned[:, 1].max()
+            ways += own.best_placements(best.turn, 1, np.array([0.0, rise, 0.0]), (np.inf, cube, np.inf))
+        if ways:
+            best = _least_pierced(ways[0], lambda: ways[1:], garment, thinning.limbs_out_of_place, job)
+    return 1.0, best
 
 
 def _least_pierced(
@@ -244,7 +258,7 @@ def _least_pierced(
     """
 
     def count(way: VoxelPlacement) -> int:
-        return astray(TriangleMesh(garment.vertices @ way.turn.T + way.shift, garment.faces))
+        return astray(way.placed(garment))
 
     best, fewest = first, count(first)
     if fewest == 0:
@@ -320,15 +334,15 @@ def _enlarge_until_body_inside(
 ) -> tuple[float, VoxelPlacement]:
     """Return by how much the garment must start larger for the body to be inside it, and its place then.
 
+    So it must where much of it is buried; or where a body fills it far better if it is larger, and maybe elsewhere: a
+    wide skirt on a tight bodice is never buried, and a skirt that no hips get into is best filled by a head.
+
     Args:
         garment: As large as it is [m].
         body: To be inside.
         own: Its best place at its own size, with the turn to keep.
         config: Search and thresholds.
     """
-    depth = -SurfaceDistance(body.mesh).signed(garment.vertices @ own.turn.T + own.shift).distance
-    if (depth > _DEEP).mean() <= config.buried:
-        return 1.0, own
     ways = [own]
     for step in range(1, _STEPS + 1):
         larger = TriangleMesh(_LARGER**step * garment.vertices, garment.faces)
@@ -336,6 +350,10 @@ def _enlarge_until_body_inside(
         if ways[-1].score < _FALLING * max(way.score for way in ways):
             break
     best = max(range(len(ways)), key=lambda step: ways[step].score)
+    if ways[best].score < _FAR_BETTER * own.score:
+        depth = -SurfaceDistance(body.mesh).signed(garment.vertices @ own.turn.T + own.shift).distance
+        if (depth > _DEEP).mean() <= config.buried:
+            return 1.0, own
     return _LARGER**best, ways[best]
 
 
