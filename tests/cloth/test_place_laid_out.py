@@ -68,14 +68,34 @@ def test_a_mesh_whose_best_place_has_arms_through_it_goes_to_another_height():
     assert find_placement(loose, figure(1.5), PlaceConfig(), Job()).shift[1] == 0.0
 
 
-def test_what_is_too_narrow_for_the_waist_is_no_skirt_and_stays_about_the_shoulders():
-    """A poncho: arms that hang go through its cloth there, too."""
-    poncho = tube(RADIUS, 0.6, 48, 21, base=0.75)
-    share = (1.35 - poncho.vertices[:, 1:2]) / 0.6
-    wider = (0.12 + 0.2 * share) / RADIUS  # at the top as wide as a neck with room, and less than the waist
-    poncho = TriangleMesh(poncho.vertices * np.hstack([wider, np.ones_like(wider), 0.6 * wider]), poncho.faces)
+def cone(radius, slope, length, top):
+    """Cloth from an oval opening outward and down, its flank so steep at the sides [rad]; as long all around [m]."""
+    mesh = tube(1.0, length, 48, 31, base=0.0)
+    along = length - mesh.vertices[:, 1:2]
+    wide = radius + along * np.cos(slope)
+    return TriangleMesh(
+        np.hstack([wide * mesh.vertices[:, :1], top - along * np.sin(slope), 0.6 * wide * mesh.vertices[:, 2:]]), mesh.faces
+    )
+
+
+@pytest.mark.parametrize("radius", [0.1, 0.14, 0.18])
+def test_what_lies_on_shoulders_stays_there_though_it_is_wide_enough_for_the_waist(radius):
+    """A poncho: arms that hang go through its cloth there, too. The figure's trunk has a radius of 0.14 m."""
+    poncho = cone(radius, 0.6, 0.5, 1.45)
     found = find_placement(poncho, figure(BELOW), PlaceConfig(), Job())
     assert top_and_bottom(found, poncho)[0] > SHOULDER[1]
+
+
+@pytest.mark.parametrize("radius", [0.06, 0.09, 0.15])
+def test_what_hangs_goes_below_the_arms_though_it_is_too_narrow_for_the_waist(radius):
+    """The head fills the narrow ones best, and the chest the wide one."""
+    skirt, job = cone(radius, 1.3, 0.4, 1.6), Job()
+    found = find_placement(skirt, figure(BELOW), PlaceConfig(), job)
+    top, bottom = top_and_bottom(found, skirt)
+    assert 0.9 < top < SHOULDER[1]
+    assert bottom > 0.4
+    assert (job.metrics["needs_larger_share"] > 0.1) == (radius < 0.12)
+    assert found.stretch == 1.0
 
 
 @pytest.mark.parametrize("top", [2.35, 3.0])

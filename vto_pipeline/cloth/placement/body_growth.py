@@ -41,7 +41,7 @@ _STILL_WORN = 0.5  # of the body's surface that was in the garment: with less, i
 _LARGER = (1.1, 1.2, 1.35, 1.5)  # times: so much it may start larger than it is
 _OVER, _UNDER = 0.05, 0.1  # of the stature: no opening is so far above where its limb joins, no neckline so far below
 _UNDER_ARMS = 0.02  # of the stature: so far above where arms join the body may hang what is held by a chest
-_SHOULDER, _STEEP = 0.06, 0.75  # of the stature: from neck to shoulder; T-shirts and ponchos fall by 0.5 to 0.65 of that
+_SHOULDER, _STEEP = 0.06, 0.8  # of the stature, from neck to shoulder; waists are at 0.9, necks and ponchos at 0.5 to 0.7
 _LED_LARGER = 1.2  # times, to be led: small enough for sleeves to stay near their arms
 
 
@@ -295,9 +295,9 @@ class Thinning:
         return count
 
     def hangs(self, garment: TriangleMesh) -> bool:
-        """Return whether a garment is a skirt or what else hangs about the trunk, upright as it stands here."""
+        """Return whether a garment hangs about the trunk as a tube, and may slide: trousers and sleeves hold others."""
         pieces = pieces_with_limbs(garment, self.limbs, self.after(_LINES))
-        return any(self._hangs_from(piece) is not None for piece in pieces)
+        return all(self._hangs_from(piece) is not None and len(set(piece.meant)) == 2 for piece in pieces)
 
     def is_below_arms(self, garment: TriangleMesh) -> bool:
         """Return whether all of a garment is below where the arms join the body."""
@@ -313,10 +313,10 @@ class Thinning:
         return np.asarray((piece.mesh.vertices[piece.openings[opening], 1] - limb.root[1]) / self._stature)
 
     def _hangs_from(self, piece: Piece) -> int | None:
-        """Return the upper opening of what has none for one arm and falls steeply from there, as no poncho does."""
+        """Return the upper opening of what has none for one arm and is steep there, as no poncho is."""
         names = [limb.name for limb in self.limbs.limbs]
         ways = {way for name, way in zip(names, piece.meant, strict=True) if name.endswith("arm")}
         if len(ways) != 1 or -1 in ways or "head" not in names:
             return None
         above = piece.meant[names.index("head")]
-        return above if piece.falls_from(above, _SHOULDER * self._stature) > _STEEP else None
+        return above if piece.steepness(above, _SHOULDER * self._stature) > _STEEP else None

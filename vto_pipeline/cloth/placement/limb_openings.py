@@ -23,7 +23,6 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 _MOST_OPENINGS = 7  # of a piece: more are slits and lace, and which limb is whose is anybody's guess
 _PASSES = 0.1  # m: round an opening that a hand gets through
-_RING = 0.2  # of the way that tells how steeply cloth falls: half the width of the ring that is looked at
 _IDLE = 10.0  # m: as far as that may a limb be from an opening that had none
 
 
@@ -64,19 +63,20 @@ class Piece(NamedTuple):
         """Return the limbs that have an opening to themselves."""
         return {limb for limb, opening in enumerate(self.meant) if opening >= 0 and self.meant.count(opening) == 1}
 
-    def falls_from(self, opening: int, reach: float) -> float:
-        """Return how far cloth falls on its way from an opening, as a share of that way.
+    def steepness(self, opening: int, reach: float) -> float:
+        """Return the mean sine of the slope of cloth about an opening, by area: 1 is upright, 0 level.
 
-        What hangs from a waist falls steeply; what lies on shoulders goes outward first.
+        What hangs from a waist is steep; what lies on shoulders goes outward first.
 
         Args:
             opening: Its index.
             reach: How far from it to look, over the cloth [m].
         """
-        loop, height = self.openings[opening], self.mesh.vertices[:, 1]
-        away = distance_from(self.mesh, loop, np.inf)
-        ring = np.abs(away - reach) < _RING * reach
-        return float((height[loop].mean() - height[ring].mean()) / away[ring].mean()) if ring.any() else 0.0
+        near = distance_from(self.mesh, self.openings[opening], reach) <= reach
+        a, b, c = self.mesh.vertices[self.mesh.faces[near[self.mesh.faces].all(axis=1)]].transpose(1, 0, 2)
+        double = np.cross(b - a, c - a)
+        size = np.linalg.norm(double, axis=1).sum()
+        return float(np.hypot(double[:, 0], double[:, 2]).sum() / size) if size > 0.0 else 0.0
 
     def missed(self, limb: int) -> str:
         """Return in words how far from its opening a limb goes through cloth; nothing where that is unknown."""

@@ -124,7 +124,7 @@ def find_placement(
     if round(fullest.score, 6) <= 0.0:  # but for what the transforms round
         raise InputError(
             "the body fills this garment nowhere: it goes around nothing of the body",
-            hint="give it as it is worn, sewn and open; drape.place=as_it_stands drapes it from where it lies",
+            hint="give it as it is worn, sewn and open; drape.place=as_it_stands leaves it where it lies",
         )
     best = ways[_preferred([way.turn for way in ways], np.array([way.score for way in ways]), config)]
     if not _as_files_have_it(best.turn):
@@ -133,12 +133,9 @@ def find_placement(
             turns = [turn for turn in turns if _is_upright(turn)]
         best = _best_orientation_if_larger(metres, cubes, config, turns)
     if (best.turn == stands.turn).all():
-        best = stands
-        gain = fullest.score / max(stands.score, 1e-9)
-        if gain * _ALIKE > 1.0:
-            job.note(
-                f"garment not turned, though ({_axis_names(fullest)}) as (x, y, z) would score {gain - 1.0:.1%} better"
-            )
+        best, gain = stands, fullest.score / max(stands.score, 1e-9) - 1.0
+        if (gain + 1.0) * _ALIKE > 1.0:
+            job.note(f"garment not turned, though ({_axis_names(fullest)}) as (x, y, z) would score {gain:.1%} better")
     else:
         job.note(
             f"garment turned: its ({_axis_names(best)}) is the body's (x, y, z); as it stood, it scored "
@@ -237,7 +234,10 @@ def _where_limbs_are_in_place(
             ways += own.best_placements(best.turn, 1, np.array([0.0, rise, 0.0]), (np.inf, cube, np.inf))
         if ways:
             best = _least_pierced(ways[0], lambda: ways[1:], garment, thinning.limbs_out_of_place, job)
-    return 1.0, best
+            rise = best.placed(garment).vertices[:, 1].max() - there.vertices[:, 1].max()
+            job.note(f"it hangs: put {1e3 * rise:+.0f} mm from where it fits best, with fewer limbs in the way")
+            return 1.0, best
+    return stretch, best
 
 
 def _least_pierced(
@@ -318,8 +318,7 @@ def _best_orientation_if_larger(
     """
     scores: list[FloatArray] = []
     for step in range(_STEPS + 1):
-        larger = TriangleMesh(_LARGER**step * garment.vertices, garment.faces)
-        cubes = VoxelFit(larger, body, 1e-3 * _TELLING * config.cube_mm, config.cloth_in_body)
+        cubes = VoxelFit(_times(garment, step), body, 1e-3 * _TELLING * config.cube_mm, config.cloth_in_body)
         scores.append(np.array([cubes.best_placement(turn).score for turn in turns]))
         if scores[-1].max() < _FALLING * max(one.max() for one in scores):
             break
@@ -334,8 +333,8 @@ def _enlarge_until_body_inside(
 ) -> tuple[float, VoxelPlacement]:
     """Return by how much the garment must start larger for the body to be inside it, and its place then.
 
-    So it must where much of it is buried; or where a body fills it far better if it is larger, and maybe elsewhere: a
-    wide skirt on a tight bodice is never buried, and a skirt that no hips get into is best filled by a head.
+    So it must where much of it is buried; or where a body fills it far better then, and maybe elsewhere: a skirt that no
+    hips get into is best filled by a head.
 
     Args:
         garment: As large as it is [m].
@@ -343,18 +342,25 @@ def _enlarge_until_body_inside(
         own: Its best place at its own size, with the turn to keep.
         config: Search and thresholds.
     """
-    ways = [own]
-    for step in range(1, _STEPS + 1):
-        larger = TriangleMesh(_LARGER**step * garment.vertices, garment.faces)
-        ways.append(VoxelFit(larger, body, 1e-3 * config.cube_mm, config.cloth_in_body).best_placement(own.turn))
-        if ways[-1].score < _FALLING * max(way.score for way in ways):
+    scores: list[float] = []
+    for step in range(_STEPS + 1):
+        cubes = VoxelFit(_times(garment, step), body, 1e-3 * _TELLING * config.cube_mm, config.cloth_in_body)
+        scores.append(cubes.best_placement(own.turn).score)
+        if scores[-1] < _FALLING * max(scores):
             break
-    best = max(range(len(ways)), key=lambda step: ways[step].score)
-    if ways[best].score < _FAR_BETTER * own.score:
-        depth = -SurfaceDistance(body.mesh).signed(garment.vertices @ own.turn.T + own.shift).distance
+    best = int(np.argmax(scores))
+    if best == 0:
+        return 1.0, own
+    if scores[best] < _FAR_BETTER * scores[0]:
+        depth = -SurfaceDistance(body.mesh).signed(own.placed(garment).vertices).distance
         if (depth > _DEEP).mean() <= config.buried:
             return 1.0, own
-    return _LARGER**best, ways[best]
+    cubes = VoxelFit(_times(garment, best), body, 1e-3 * config.cube_mm, config.cloth_in_body)
+    return _LARGER**best, cubes.best_placement(own.turn)
+
+
+def _times(garment: TriangleMesh, step: int) -> TriangleMesh:
+    return TriangleMesh(_LARGER**step * garment.vertices, garment.faces)
 
 
 def _scale(garment: TriangleMesh, body: BodyCubes, config: PlaceConfig, job: Job) -> float:
