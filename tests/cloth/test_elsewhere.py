@@ -29,7 +29,9 @@ def bottle():
     return TriangleMesh(np.vstack([part.vertices for part in parts]), np.vstack(faces).astype(np.int32))
 
 
-@pytest.mark.parametrize(("place", "radius"), [((0.0, 0.7, 0.0), 0.2), ((0.02, 1.45, 0.0), 0.05), ((0.37, 0.7, 0.1), 0.04)])
+@pytest.mark.parametrize(
+    ("place", "radius"), [((0.0, 0.7, 0.0), 0.2), ((0.02, 1.45, 0.0), 0.05), ((0.37, 0.7, 0.1), 0.04)]
+)
 def test_the_girth_is_that_of_the_part_which_is_nearest(place, radius):
     assert_allclose(girth_at(bottle(), np.array(place)), round_a_circle(radius), rtol=1e-9)
 
@@ -46,10 +48,9 @@ def test_what_ends_elsewhere_is_told_with_girths(risen, told):
     assert bool(told) == bool(job.warnings)
     if told:
         there = 0.05 if risen > 0.5 else 0.2
-        said = [f"{100 * round_a_circle(radius):.0f} cm" for radius in (0.1, there, 0.2)]
+        own, ended, began = (f"{100 * round_a_circle(radius):.0f} cm" for radius in (0.1, there, 0.2))
         assert told in job.warnings[0]
-        assert [part for part in job.warnings[0].replace(",", "").split("opening is ")[1].split(" cm")[:1]] == [said[0][:-3]]
-        assert f"the body {said[1]} there, {said[2]} where" in job.warnings[0]
+        assert f"Its upper opening is {own} around, and the body {ended} there, {began} where" in job.warnings[0]
 
 
 def test_where_nothing_is_open_nothing_is_told():

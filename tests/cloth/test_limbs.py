@@ -124,7 +124,11 @@ def test_how_steep_cloth_is_about_an_opening(slope):
     steps = np.where(along < 0.5, along, 0.5), np.maximum(along - 0.5, 0.0)
     radius = 0.1 + steps[0] * np.cos(slope) + steps[1] * np.cos(0.5)
     height = 1.0 - steps[0] * np.sin(slope) - steps[1] * np.sin(0.5)
-    cone = TriangleMesh(np.hstack([radius, np.ones_like(radius), radius]) * np.hstack([cone.vertices[:, :1], height, cone.vertices[:, 2:]]), cone.faces)
+    cone = TriangleMesh(
+        np.hstack([radius, np.ones_like(radius), radius])
+        * np.hstack([cone.vertices[:, :1], height, cone.vertices[:, 2:]]),
+        cone.faces,
+    )
     (piece,) = pieces_with_limbs(cone, Limbs(figure(0.9)), figure(0.9))
     low, high = np.argsort([cone.vertices[loop, 1].mean() for loop in piece.openings])
     assert_allclose(piece.steepness(high, 0.15), np.sin(slope), rtol=0.01)  # 48 corners for a circle

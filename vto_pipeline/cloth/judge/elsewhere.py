@@ -38,10 +38,11 @@ def warn_if_elsewhere(
     began, ended = (mesh.vertices[top].mean(axis=0) for mesh in (start, draped))
     risen = float(ended[1] - began[1])
     if abs(risen) > _FAR * float(np.ptp(body.vertices[:, 1])):
+        way, own = "above" if risen > 0 else "below", _length(rest.positions[top])
         job.warn(
-            f"it is worn elsewhere: it ended {100 * abs(risen):.0f} cm {'above' if risen > 0 else 'below'} where it was "
-            f"put on. Its upper opening is {100 * _length(rest.positions[top]):.0f} cm around, and the body "
-            f"{100 * girth_at(body, ended):.0f} cm there, {100 * girth_at(body, began):.0f} cm where it was put on"
+            f"it is worn elsewhere: it ended {100 * abs(risen):.0f} cm {way} where it was put on. Its upper opening is "
+            f"{100 * own:.0f} cm around, and the body {100 * girth_at(body, ended):.0f} cm there, "
+            f"{100 * girth_at(body, began):.0f} cm where it was put on"
         )
     return {"risen_mm": 1e3 * risen}
 

@@ -41,7 +41,10 @@ _STILL_WORN = 0.5  # of the body's surface that was in the garment: with less, i
 _LARGER = (1.1, 1.2, 1.35, 1.5)  # times: so much it may start larger than it is
 _OVER, _UNDER = 0.05, 0.1  # of the stature: no opening is so far above where its limb joins, no neckline so far below
 _UNDER_ARMS = 0.02  # of the stature: so far above where arms join the body may hang what is held by a chest
-_SHOULDER, _STEEP = 0.06, 0.8  # of the stature, from neck to shoulder; waists are at 0.9, necks and ponchos at 0.5 to 0.7
+_SHOULDER, _STEEP = (
+    0.06,
+    0.8,
+)  # of the stature, from neck to shoulder; waists are at 0.9, necks and ponchos at 0.5 to 0.7
 _LED_LARGER = 1.2  # times, to be led: small enough for sleeves to stay near their arms
 
 

@@ -333,8 +333,8 @@ def _enlarge_until_body_inside(
 ) -> tuple[float, VoxelPlacement]:
     """Return by how much the garment must start larger for the body to be inside it, and its place then.
 
-    So it must where much of it is buried; or where a body fills it far better then, and maybe elsewhere: a skirt that no
-    hips get into is best filled by a head.
+    So it must where much of it is buried; or where a body fills it far better then, and maybe elsewhere: a head fills a
+    skirt best that no hips get into.
 
     Args:
         garment: As large as it is [m].

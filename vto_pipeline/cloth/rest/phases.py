@@ -243,8 +243,10 @@ class Phases:
 
 def _times_larger(garment: TriangleMesh, rest: FloatArray) -> float:
     """Return how many times as long as at rest an edge of the garment is (median)."""
-    length, natural = (np.linalg.norm(x[garment.faces] - np.roll(x[garment.faces], 1, axis=1), axis=2)
-                       for x in (garment.vertices, rest))
+    length, natural = (
+        np.linalg.norm(x[garment.faces] - np.roll(x[garment.faces], 1, axis=1), axis=2)
+        for x in (garment.vertices, rest)
+    )
     return float(np.median(length / np.maximum(natural, np.finfo(float).tiny)))
 
 
