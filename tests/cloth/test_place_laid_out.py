@@ -69,7 +69,7 @@ def test_a_mesh_whose_best_place_has_arms_through_it_goes_to_another_height():
 
 
 def cone(radius, slope, top, length=0.5, shoulder=0.13):
-    """Cloth from an oval opening outward and down: of one slope [rad] at first, steep from there; as long all around."""
+    """Cloth from an oval opening outward and down: of one slope [rad] at first, then steep; as long all around."""
     mesh = tube(1.0, length, 48, 31)
     along = length - mesh.vertices[:, 1:2]
     first, later = np.minimum(along, shoulder), np.maximum(along - shoulder, 0.0)
