@@ -356,7 +356,8 @@ def _enlarge_until_body_inside(
         if (depth > _DEEP).mean() <= config.buried:
             return 1.0, own
     cubes = VoxelFit(_times(garment, best), body, 1e-3 * config.cube_mm, config.cloth_in_body)
-    return _LARGER**best, cubes.best_placement(own.turn)
+    larger = cubes.best_placement(own.turn)
+    return (_LARGER**best, larger) if larger.score > own.score else (1.0, own)
 
 
 def _times(garment: TriangleMesh, step: int) -> TriangleMesh:
