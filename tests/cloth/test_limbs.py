@@ -2,18 +2,16 @@
 
 import numpy as np
 import pytest
-from cloth_scenes import moved
+from cloth_scenes import moved, tube
 from figures import ARM, SHOULDER, arm_end, figure, tunic
 from numpy.testing import assert_allclose
 
-from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.cloth.placement.body_growth import Thinning, _least_faulty, plan_body_growth
 from vto_pipeline.cloth.placement.limb_openings import pieces_with_limbs
 from vto_pipeline.cloth.placement.limbs import Limbs
 from vto_pipeline.errors import IntersectingError
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import boundary_loops
-from vto_pipeline.model.body import Measurements
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -118,7 +116,21 @@ def test_what_is_too_small_for_arms_to_find_its_sleeves_starts_larger():
     assert any("20% larger" in warning for warning in job.warnings)
 
 
-@pytest.mark.parametrize(("sex", "waist"), [("female", 0.66), ("male", 0.82), ("male", 1.12)])
-def test_the_waist_of_a_body_is_that_of_its_tape(sex, waist):
-    tape = Measurements({"stature": 1.75, "waist_girth": waist}, sex=sex)
-    assert Limbs(fit_measurements(tape).mesh).waist == pytest.approx(waist, rel=0.03)
+@pytest.mark.parametrize("slope", [0.3, 0.8, 1.4])
+def test_how_steep_cloth_is_about_an_opening(slope):
+    """A cone of one slope [rad] above, and of another below: each opening sees its own."""
+    cone = tube(1.0, 1.0, 48, 41)
+    along = 1.0 - cone.vertices[:, 1:2]
+    steps = np.where(along < 0.5, along, 0.5), np.maximum(along - 0.5, 0.0)
+    radius = 0.1 + steps[0] * np.cos(slope) + steps[1] * np.cos(0.5)
+    height = 1.0 - steps[0] * np.sin(slope) - steps[1] * np.sin(0.5)
+    cone = TriangleMesh(
+        np.hstack([radius, np.ones_like(radius), radius])
+        * np.hstack([cone.vertices[:, :1], height, cone.vertices[:, 2:]]),
+        cone.faces,
+    )
+    (piece,) = pieces_with_limbs(cone, Limbs(figure(0.9)), figure(0.9))
+    low, high = np.argsort([cone.vertices[loop, 1].mean() for loop in piece.openings])
+    assert_allclose(piece.steepness(high, 0.15), np.sin(slope), rtol=0.01)  # 48 corners for a circle
+    assert_allclose(piece.steepness(low, 0.15), np.sin(0.5), rtol=0.01)
+    assert piece.steepness(high, 0.0) == 0.0

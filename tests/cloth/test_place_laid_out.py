@@ -68,14 +68,34 @@ def test_a_mesh_whose_best_place_has_arms_through_it_goes_to_another_height():
     assert find_placement(loose, figure(1.5), PlaceConfig(), Job()).shift[1] == 0.0
 
 
-def test_what_is_too_narrow_for_the_waist_is_no_skirt_and_stays_about_the_shoulders():
-    """A poncho: arms that hang go through its cloth there, too."""
-    poncho = tube(RADIUS, 0.6, 48, 21, base=0.75)
-    share = (1.35 - poncho.vertices[:, 1:2]) / 0.6
-    wider = (0.12 + 0.2 * share) / RADIUS  # at the top as wide as a neck with room, and less than the waist
-    poncho = TriangleMesh(poncho.vertices * np.hstack([wider, np.ones_like(wider), 0.6 * wider]), poncho.faces)
+def cone(radius, slope, top, length=0.5, shoulder=0.13):
+    """Cloth from an oval opening outward and down: of one slope [rad] at first, then steep; as long all around."""
+    mesh = tube(1.0, length, 48, 31)
+    along = length - mesh.vertices[:, 1:2]
+    first, later = np.minimum(along, shoulder), np.maximum(along - shoulder, 0.0)
+    wide = radius + first * np.cos(slope) + later * np.cos(1.35)
+    height = top - first * np.sin(slope) - later * np.sin(1.35)
+    return TriangleMesh(np.hstack([wide * mesh.vertices[:, :1], height, 0.7 * wide * mesh.vertices[:, 2:]]), mesh.faces)
+
+
+@pytest.mark.parametrize("radius", [0.1, 0.14, 0.17])
+def test_what_lies_on_shoulders_stays_there_though_it_is_wide_enough_for_the_waist(radius):
+    """A poncho: arms that hang go through its cloth there, too. The figure's trunk has a radius of 0.14 m."""
+    poncho = cone(radius, 0.5, 1.45)
     found = find_placement(poncho, figure(BELOW), PlaceConfig(), Job())
     assert top_and_bottom(found, poncho)[0] > SHOULDER[1]
+
+
+@pytest.mark.parametrize("radius", [0.06, 0.09, 0.15])
+def test_what_hangs_goes_below_the_arms_though_it_is_too_narrow_for_the_waist(radius):
+    """The head fills the narrow ones best, and the chest the wide one."""
+    skirt, job = cone(radius, 1.35, 1.6), Job()
+    found = find_placement(skirt, figure(BELOW), PlaceConfig(), job)
+    top, bottom = top_and_bottom(found, skirt)
+    assert 0.9 < top < SHOULDER[1]
+    assert bottom > 0.3
+    assert radius > 0.12 or job.metrics["needs_larger_share"] > 0.1
+    assert found.stretch == 1.0
 
 
 @pytest.mark.parametrize("top", [2.35, 3.0])

@@ -85,3 +85,17 @@ def test_a_real_shirt_badly_put(name, body, tmp_path):
         assert audit["too_small"] is True
         assert audit["over_limit_share"] > 0.02
         assert "too small" in said.stdout + said.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "body"), [("blouse-short", "mh_female_maxweight"), ("dress3", "mh_male_averageweight")]
+)
+def test_what_has_to_be_led_or_is_far_too_small_is_put_on(name, body, tmp_path):
+    """A blouse that was led into a tangle jammed; a dress that should be 44 % larger was pierced by both arms."""
+    garment, person = DATA / "garments" / "berkeley" / name / f"{name}-iso.obj", DATA / "bodies" / f"{body}.ply"
+    said = drape(garment, person, tmp_path / "run", "--set", "simulation_mesh.edge_mm=20")
+    assert said.returncode == 0, said.stderr[-2000:]
+    draped, wearer = read_mesh(tmp_path / "run" / "out" / "draped.ply"), read_mesh(person)
+    assert not crosses(draped, wearer)
+    nape = (draped.vertices[:, 1].max() - wearer.vertices[:, 1].min()) / np.ptp(wearer.vertices[:, 1])
+    assert nape == pytest.approx(0.865, abs=0.07)  # ANSUR II

@@ -12,6 +12,7 @@ from vto_pipeline.cloth.dynamics.body_motion import body_travel
 from vto_pipeline.cloth.dynamics.residual import elastic_energy
 from vto_pipeline.cloth.dynamics.warm_up import warm_up
 from vto_pipeline.cloth.judge.audit import audit
+from vto_pipeline.cloth.judge.elsewhere import warn_if_elsewhere
 from vto_pipeline.cloth.judge.residual import covers_all_energies
 from vto_pipeline.cloth.judge.too_small import warn_if_too_small
 from vto_pipeline.cloth.model.settings import checked
@@ -101,6 +102,7 @@ def drape(
             skin=stepper.skin,
         ),
         **warn_if_too_small(draped, garment.rest, config.stretch_limit, job),
+        **(warn_if_elsewhere(mesh, draped, garment.rest, body.final, job) if len(body.keyframes) == 1 else {}),
     }
     judged = findings.get("judged_residual")
     if settling.settled and isinstance(judged, float) and judged > _AGREES * config.target_residual:

@@ -19,14 +19,14 @@ from vto_pipeline.cloth.model.coarsening import CoarseGarment, coarsen
 from vto_pipeline.cloth.placement.flexible_escape import escape_flexibly
 from vto_pipeline.cloth.placement.limb_lead import lead_onto_limbs
 from vto_pipeline.cloth.placement.limb_openings import Piece, pieces_with_limbs
-from vto_pipeline.cloth.placement.limbs import Limbs
+from vto_pipeline.cloth.placement.limbs import Limb, Limbs
 from vto_pipeline.cloth.placement.rigid_escape import escape_rigidly
 from vto_pipeline.cloth.placement.voxel_fit import close_openings
 from vto_pipeline.errors import GarmentError, InputError, IntersectingError
-from vto_pipeline.geometry.intersections import intersecting_faces
+from vto_pipeline.geometry.intersections import intersecting_faces, self_intersections
 from vto_pipeline.geometry.laplace import laplacian
-from vto_pipeline.geometry.remeshing.rims import perimeter
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.garment import Garment, RestShape
 from vto_pipeline.model.job import Job
@@ -40,6 +40,9 @@ _LED_BY = (0, 3, 6)  # steps of thinning after which the garment is led about th
 _STILL_WORN = 0.5  # of the body's surface that was in the garment: with less, it is led to another part of the body
 _LARGER = (1.1, 1.2, 1.35, 1.5)  # times: so much it may start larger than it is
 _OVER, _UNDER = 0.05, 0.1  # of the stature: no opening is so far above where its limb joins, no neckline so far below
+_UNDER_ARMS = 0.02  # of the stature: so far above where arms join the body may hang what is held by a chest
+_SHOULDER = 0.06  # of the stature, from neck to shoulder
+_STEEP = 0.8  # sine of the slope of what hangs, within that of its opening: waists have 0.9, necks and ponchos 0.5 to 0.7
 _LED_LARGER = 1.2  # times, to be led: small enough for sleeves to stay near their arms
 
 
@@ -50,6 +53,7 @@ class BodyGrowth(NamedTuple):
         garment: Where it is when the body begins to grow.
         body: From thin to full.
         crossing: Pairs of triangles of both that meet at the begin.
+        tangled: Pairs of its own triangles that meet there.
         pieces: Of the garment, with what the limbs do there.
         names: Of the limbs.
     """
@@ -57,13 +61,14 @@ class BodyGrowth(NamedTuple):
     garment: TriangleMesh
     body: MovingBody
     crossing: int
+    tangled: int
     pieces: list[Piece]
     names: list[str]
 
     @property
     def fault(self) -> tuple[int, int]:
         """What is wrong with the begin: pairs that cross, and limbs that go where they are not meant to."""
-        return self.crossing, sum(len(piece.astray()) for piece in self.pieces)
+        return self.crossing + self.tangled, sum(len(piece.astray()) for piece in self.pieces)
 
     @property
     def thinned(self) -> int:
@@ -74,6 +79,21 @@ class BodyGrowth(NamedTuple):
     def pierced(self) -> int:
         """How many limbs go through cloth."""
         return sum(len(places) > 0 for piece in self.pieces for places in piece.pierced)
+
+    def from_smaller(self, times: float) -> BodyGrowth:
+        """Return it with garment and body so many times smaller at the begin: the body grows in size, too.
+
+        All lies as before, but a garment that was enlarged is not stretched. It would snap together about a thin body,
+        and jam there.
+
+        Args:
+            times: How much larger than it is the garment starts, at least 1.
+        """
+        frames = self.body.keyframes if self.thinned > 0 else np.repeat(self.body.keyframes, 2, axis=0)
+        middle = self.garment.vertices.mean(axis=0)
+        size = np.linspace(1.0 / times, 1.0, len(frames))[:, None, None]
+        garment = TriangleMesh(middle + (self.garment.vertices - middle) / times, self.garment.faces)
+        return self._replace(garment=garment, body=MovingBody(middle + size * (frames - middle), self.body.faces))
 
     def refuse_pierced(self) -> None:
         """Raise an error if a limb goes through cloth: nothing that moves cloth a little can free it.
@@ -241,7 +261,8 @@ class Thinning:
         least = int(np.argmin(crossing))
         grown = MovingBody(np.stack(self._frames[least::-1]), self._faces)
         pieces = pieces_with_limbs(garment, self.limbs, self.after(least))
-        return BodyGrowth(garment, grown, crossing[least], pieces, [limb.name for limb in self.limbs.limbs])
+        tangled = len(self_intersections(garment))
+        return BodyGrowth(garment, grown, crossing[least], tangled, pieces, [limb.name for limb in self.limbs.limbs])
 
     def limbs_astray(self, garment: TriangleMesh) -> int:
         """Return how many limbs go through cloth or another opening than their own, here and with sleeves on arms.
@@ -260,21 +281,43 @@ class Thinning:
     def limbs_out_of_place(self, garment: TriangleMesh) -> int:
         """Return how many limbs tell that a garment is not worn at this height.
 
-        These are arms in the way of a skirt, which has one opening for both, wide enough for the waist: they go through
-        its cloth, or join the body below that opening. And a head whose own opening is far from the neck.
+        These are arms in the way of what hangs: they go through its cloth, or join the body below its upper opening.
+        And a head whose own opening is far from the neck.
         """
-        limbs, tall = self.limbs.limbs, float(np.ptp(self.after(0).vertices[:, 1]))
-        arms = [number for number, limb in enumerate(limbs) if limb.name.endswith("arm")]
         count = 0
         for piece in pieces_with_limbs(garment, self.limbs, self.after(_LINES)):
-            for number, limb in enumerate(limbs):
-                if piece.meant[number] < 0:
-                    continue
-                opening = piece.openings[piece.meant[number]]
-                over = (piece.mesh.vertices[opening, 1] - limb.root[1]) / tall
-                if number in arms and len({piece.meant[arm] for arm in arms}) == 1:
-                    in_the_way = len(piece.pierced[number]) > 0 or over.min() > _OVER
-                    count += in_the_way and perimeter(piece.mesh, opening) > self.limbs.waist
-                elif limb.name == "head" and piece.meant.count(piece.meant[number]) == 1:
+            above = self._hangs_from(piece)
+            for number, limb in enumerate(self.limbs.limbs):
+                if above is not None and limb.name.endswith("arm"):
+                    count += len(piece.pierced[number]) > 0 or self._over(piece, above, limb).max() > _UNDER_ARMS
+                elif limb.name == "head" and piece.meant.count(piece.meant[number]) == 1 and piece.meant[number] >= 0:
+                    over = self._over(piece, piece.meant[number], limb)
                     count += over.min() > _OVER or over.max() < -_UNDER
         return count
+
+    def hangs(self, garment: TriangleMesh) -> bool:
+        """Return whether a garment hangs about the trunk as a tube, and may slide: trousers and sleeves hold others."""
+        pieces = pieces_with_limbs(garment, self.limbs, self.after(_LINES))
+        return all(self._hangs_from(piece) is not None and len(set(piece.meant)) == 2 for piece in pieces)
+
+    def is_below_arms(self, garment: TriangleMesh) -> bool:
+        """Return whether all of a garment is below where the arms join the body."""
+        roots = [limb.root[1] for limb in self.limbs.limbs if limb.name.endswith("arm")]
+        return bool(garment.vertices[:, 1].max() - min(roots) <= _UNDER_ARMS * self._stature)
+
+    @property
+    def _stature(self) -> float:
+        return float(np.ptp(self.after(0).vertices[:, 1]))
+
+    def _over(self, piece: Piece, opening: int, limb: Limb) -> FloatArray:
+        """Return how far above where a limb joins the body an opening is, as shares of the stature, shape (N,)."""
+        return np.asarray((piece.mesh.vertices[piece.openings[opening], 1] - limb.root[1]) / self._stature)
+
+    def _hangs_from(self, piece: Piece) -> int | None:
+        """Return the upper opening of what has none for one arm and is steep there, as no poncho is."""
+        names = [limb.name for limb in self.limbs.limbs]
+        ways = {way for name, way in zip(names, piece.meant, strict=True) if name.endswith("arm")}
+        if len(ways) != 1 or -1 in ways or "head" not in names:
+            return None
+        above = piece.meant[names.index("head")]
+        return above if piece.steepness(above, _SHOULDER * self._stature) > _STEEP else None

@@ -16,6 +16,7 @@ from scipy.spatial.distance import cdist
 
 from vto_pipeline.cloth.placement.limbs import Limb, Limbs
 from vto_pipeline.cloth.placement.voxel_fit import close_openings
+from vto_pipeline.geometry.geodesic import distance_from
 from vto_pipeline.geometry.topology import boundary_loops, face_components, submesh
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
@@ -61,6 +62,21 @@ class Piece(NamedTuple):
     def _alone(self) -> set[int]:
         """Return the limbs that have an opening to themselves."""
         return {limb for limb, opening in enumerate(self.meant) if opening >= 0 and self.meant.count(opening) == 1}
+
+    def steepness(self, opening: int, reach: float) -> float:
+        """Return the mean sine of the slope of cloth about an opening, by area: 1 is upright, 0 level.
+
+        What hangs from a waist is steep; what lies on shoulders goes outward first.
+
+        Args:
+            opening: Its index.
+            reach: How far from it to look, over the cloth [m].
+        """
+        near = distance_from(self.mesh, self.openings[opening], reach) <= reach
+        a, b, c = self.mesh.vertices[self.mesh.faces[near[self.mesh.faces].all(axis=1)]].transpose(1, 0, 2)
+        double = np.cross(b - a, c - a)
+        size = np.linalg.norm(double, axis=1).sum()
+        return float(np.hypot(double[:, 0], double[:, 2]).sum() / size) if size > 0.0 else 0.0
 
     def missed(self, limb: int) -> str:
         """Return in words how far from its opening a limb goes through cloth; nothing where that is unknown."""

@@ -9,18 +9,15 @@ runs along that line, and on inside the trunk. No landmark and no template is ne
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
-from scipy.spatial import ConvexHull
 
 from vto_pipeline.geometry.geodesic import distance_from
 from vto_pipeline.geometry.laplace import laplacian
-from vto_pipeline.geometry.section import plane_section
 from vto_pipeline.geometry.topology import edges
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
@@ -29,7 +26,6 @@ _BAND = 0.015  # of the body's height: distance between levels, and between the 
 _STANDS_OUT = 0.1  # of the body's height: shorter ones are fingers, a nose, a bun
 _ROOT = 0.08  # of the body's height: how far a shoulder or a hip goes on within the trunk
 _STRAIGHT = 5  # bands at the end of a limb that tell its direction there
-_LEVELS = 12  # at which a waist is looked for
 _BELT = 0.02  # of the body's height: half of the belt's width
 
 
@@ -66,7 +62,6 @@ class Limbs:
     """
 
     def __init__(self, body: TriangleMesh) -> None:
-        self._body = body
         height = float(np.ptp(body.vertices[:, 1]))
         self._graph, self._band = _graph(body), _BAND * height
         self._area = laplacian(body)[1]
@@ -112,19 +107,6 @@ class Limbs:
         legs = [limb for limb in self.limbs if limb.name.endswith("leg")]
         tops = [float(limb.root[1]) for limb in legs]
         return sum(tops) / len(tops) if tops else -np.inf
-
-    @cached_property
-    def waist(self) -> float:
-        """Girth of the trunk where it is thinnest between arms and legs [m]; infinity if unknown."""
-        arms = [float(limb.root[1]) for limb in self.limbs if limb.name.endswith("arm")]
-        if not arms or not np.isfinite(self.parting):
-            return np.inf
-        girths = []
-        hips = self.parting + _ROOT * float(np.ptp(self._body.vertices[:, 1]))  # a leg's last ring is below the crotch
-        for height in np.linspace(hips, min(arms), _LEVELS):
-            section = plane_section(self._body, np.array([0.0, height, 0.0]), np.array([0.0, 1.0, 0.0]))
-            girths.append(max(float(ConvexHull(section.points[part][:, [0, 2]]).area) for part in section.parts()))
-        return min(girths)
 
     def ways_in(self, thin: TriangleMesh) -> list[FloatArray]:
         """Return the shortest ways over the skin from the end of each limb to the belt [m], shape (N, 3) each.

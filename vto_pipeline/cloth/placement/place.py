@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +29,7 @@ _CLOSE = 0.9  # of the best coarse worth: these are looked at again with fine cu
 _ALIKE = 0.98  # as good, but for where the cubes happen to lie
 _LARGER, _STEPS = 1.2, 4  # a garment may start up to twice as large as it is
 _FALLING = 0.85  # of the best worth yet: larger garments need not be tried
+_FAR_BETTER = 1.25  # times the worth of its own size: a garment that fits gains less by being larger
 _DEEP = 0.01  # m
 _HEIGHTS, _ALL_HEIGHTS = 6, 24  # tried where limbs are astray: where that takes long to tell, and where it does not
 _WORTH_A_TRY = 0.5  # of the score of the first place: less is beside the body
@@ -122,7 +124,7 @@ def find_placement(
     if round(fullest.score, 6) <= 0.0:  # but for what the transforms round
         raise InputError(
             "the body fills this garment nowhere: it goes around nothing of the body",
-            hint="give it as it is worn, sewn and open; drape.place=as_it_stands drapes it from where it lies",
+            hint="give it as it is worn, sewn and open; drape.place=as_it_stands leaves it where it lies",
         )
     best = ways[_preferred([way.turn for way in ways], np.array([way.score for way in ways]), config)]
     if not _as_files_have_it(best.turn):
@@ -131,25 +133,20 @@ def find_placement(
             turns = [turn for turn in turns if _is_upright(turn)]
         best = _best_orientation_if_larger(metres, cubes, config, turns)
     if (best.turn == stands.turn).all():
-        best = stands
-        gain = fullest.score / max(stands.score, 1e-9)
-        if gain * _ALIKE > 1.0:
-            job.note(
-                f"garment not turned, though ({_axis_names(fullest)}) as (x, y, z) would score {gain - 1.0:.1%} better"
-            )
+        best, gain = stands, fullest.score / max(stands.score, 1e-9) - 1.0
+        if (gain + 1.0) * _ALIKE > 1.0:
+            job.note(f"garment not turned, though ({_axis_names(fullest)}) as (x, y, z) would score {gain:.1%} better")
     else:
         job.note(
             f"garment turned: its ({_axis_names(best)}) is the body's (x, y, z); as it stood, it scored "
             f"{_relative_score(stands.score, best.score):.0%} of the best"
         )
     stretch, best = _enlarge_until_body_inside(metres, cubes, best, config)
-    if config.place == "auto":
-        best = _where_limbs_are_in_place(
-            TriangleMesh(stretch * metres.vertices, metres.faces), cubes, best, config, job
-        )
     job.metrics["needs_larger_share"] = stretch - 1.0
     if stretch > 1.0:
-        job.warn(f"too small: this body needs it {stretch - 1:.0%} larger; it starts stretched by that much")
+        job.warn(f"too small: this body needs it {stretch - 1:.0%} larger")
+    if config.place == "auto":
+        stretch, best = _where_limbs_are_in_place(metres, cubes, stretch, best, config, job)
     share = _relative_score(best.score_in_place, best.score)
     if config.place == "auto" and best is stands and scale == 1.0 and share >= config.stands_well:
         job.note(f"garment left where it stands: its place scores {share:.0%} of the best")
@@ -211,19 +208,36 @@ def _as_laid_out(garment: TriangleMesh, body: BodyCubes, config: PlaceConfig, jo
 
 
 def _where_limbs_are_in_place(
-    garment: TriangleMesh, body: BodyCubes, best: VoxelPlacement, config: PlaceConfig, job: Job
-) -> VoxelPlacement:
-    """Return the best place, or the next best height at which fewer limbs are out of place.
+    garment: TriangleMesh, body: BodyCubes, stretch: float, best: VoxelPlacement, config: PlaceConfig, job: Job
+) -> tuple[float, VoxelPlacement]:
+    """Return how much larger the garment starts, and the best height at which the fewest limbs are out of place.
 
     A trunk may fill a loose skirt better than the hips do, but there its arms go through the cloth; and hips a tight
     blouse better than the chest does, but there its neck is at the waist.
+
+    What hangs from one opening for both arms goes below them. Where it is out of place, or too small, it goes to the
+    lowest of the heights that are as good to it, were it large enough: it slides. There it starts in its own size.
     """
-
-    def at_other_heights() -> list[VoxelPlacement]:
-        fit = VoxelFit(garment, body, 1e-3 * config.cube_mm, config.cloth_in_body)
-        return fit.best_placements(best.turn, _ALL_HEIGHTS)
-
-    return _least_pierced(best, at_other_heights, garment, Thinning(body.mesh).limbs_out_of_place, job)
+    thinning, cube = Thinning(body.mesh), 1e-3 * config.cube_mm
+    larger = TriangleMesh(stretch * garment.vertices, garment.faces)
+    there, fit = best.placed(larger), VoxelFit(larger, body, cube, config.cloth_in_body)
+    heights = partial(fit.best_placements, best.turn, _ALL_HEIGHTS)
+    if not thinning.hangs(there):
+        return stretch, _least_pierced(best, heights, larger, thinning.limbs_out_of_place, job)
+    if stretch > 1.0 or thinning.limbs_out_of_place(there) > 0:
+        below = [way for way in heights() if thinning.is_below_arms(way.placed(larger))]
+        good = [way for way in below if way.score >= _FALLING * below[0].score]
+        own, turned = VoxelFit(garment, body, cube, config.cloth_in_body), garment.vertices @ best.turn.T
+        ways = []
+        for way in sorted(good, key=lambda way: float(way.shift[1])):
+            rise = way.placed(larger).vertices[:, 1].max() - turned[:, 1].max()
+            ways += own.best_placements(best.turn, 1, np.array([0.0, rise, 0.0]), (np.inf, cube, np.inf))
+        if ways:
+            best = _least_pierced(ways[0], lambda: ways[1:], garment, thinning.limbs_out_of_place, job)
+            rise = best.placed(garment).vertices[:, 1].max() - there.vertices[:, 1].max()
+            job.note(f"it hangs: put {1e3 * rise:+.0f} mm from where it fits best, with fewer limbs in the way")
+            return 1.0, best
+    return stretch, best
 
 
 def _least_pierced(
@@ -244,7 +258,7 @@ def _least_pierced(
     """
 
     def count(way: VoxelPlacement) -> int:
-        return astray(TriangleMesh(garment.vertices @ way.turn.T + way.shift, garment.faces))
+        return astray(way.placed(garment))
 
     best, fewest = first, count(first)
     if fewest == 0:
@@ -304,8 +318,7 @@ def _best_orientation_if_larger(
     """
     scores: list[FloatArray] = []
     for step in range(_STEPS + 1):
-        larger = TriangleMesh(_LARGER**step * garment.vertices, garment.faces)
-        cubes = VoxelFit(larger, body, 1e-3 * _TELLING * config.cube_mm, config.cloth_in_body)
+        cubes = VoxelFit(_times(garment, step), body, 1e-3 * _TELLING * config.cube_mm, config.cloth_in_body)
         scores.append(np.array([cubes.best_placement(turn).score for turn in turns]))
         if scores[-1].max() < _FALLING * max(one.max() for one in scores):
             break
@@ -320,23 +333,35 @@ def _enlarge_until_body_inside(
 ) -> tuple[float, VoxelPlacement]:
     """Return by how much the garment must start larger for the body to be inside it, and its place then.
 
+    So it must where much of it is buried; or where a body fills it far better then, and maybe elsewhere: a head fills a
+    skirt best that no hips get into.
+
     Args:
         garment: As large as it is [m].
         body: To be inside.
         own: Its best place at its own size, with the turn to keep.
         config: Search and thresholds.
     """
-    depth = -SurfaceDistance(body.mesh).signed(garment.vertices @ own.turn.T + own.shift).distance
-    if (depth > _DEEP).mean() <= config.buried:
-        return 1.0, own
-    ways = [own]
-    for step in range(1, _STEPS + 1):
-        larger = TriangleMesh(_LARGER**step * garment.vertices, garment.faces)
-        ways.append(VoxelFit(larger, body, 1e-3 * config.cube_mm, config.cloth_in_body).best_placement(own.turn))
-        if ways[-1].score < _FALLING * max(way.score for way in ways):
+    scores: list[float] = []
+    for step in range(_STEPS + 1):
+        cubes = VoxelFit(_times(garment, step), body, 1e-3 * _TELLING * config.cube_mm, config.cloth_in_body)
+        scores.append(cubes.best_placement(own.turn).score)
+        if scores[-1] < _FALLING * max(scores):
             break
-    best = max(range(len(ways)), key=lambda step: ways[step].score)
-    return _LARGER**best, ways[best]
+    best = int(np.argmax(scores))
+    if best == 0:
+        return 1.0, own
+    if scores[best] < _FAR_BETTER * scores[0]:
+        depth = -SurfaceDistance(body.mesh).signed(own.placed(garment).vertices).distance
+        if (depth > _DEEP).mean() <= config.buried:
+            return 1.0, own
+    cubes = VoxelFit(_times(garment, best), body, 1e-3 * config.cube_mm, config.cloth_in_body)
+    larger = cubes.best_placement(own.turn)
+    return (_LARGER**best, larger) if larger.score > own.score else (1.0, own)
+
+
+def _times(garment: TriangleMesh, step: int) -> TriangleMesh:
+    return TriangleMesh(_LARGER**step * garment.vertices, garment.faces)
 
 
 def _scale(garment: TriangleMesh, body: BodyCubes, config: PlaceConfig, job: Job) -> float:

@@ -36,6 +36,10 @@ class VoxelPlacement(NamedTuple):
     score: float
     score_in_place: float
 
+    def placed(self, garment: TriangleMesh) -> TriangleMesh:
+        """Return a garment there."""
+        return TriangleMesh(garment.vertices @ self.turn.T + self.shift, garment.faces)
+
 
 def quarter_turns() -> list[FloatArray]:
     """Return the 24 rotations that map the axes on each other, the identity first; each of shape (3, 3)."""

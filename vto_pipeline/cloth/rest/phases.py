@@ -39,6 +39,7 @@ What is in place has forces of ten times its weight while wrinkles snap here and
 steps is faster at ending that."""
 
 _TURNS = 5  # of coming to rest and being cleared
+_LARGER = 1.02  # times its size: what starts so was enlarged, not just bent
 _LONG = 0.5  # steps per 1/60 s on the way to rest: backward Euler takes the more motion out, the longer they are
 _CALM = 20.0  # 1/s: velocities fade this fast while the body grows, where the way does not matter
 
@@ -130,7 +131,11 @@ class Phases:
         self._job.progress(0.05, what)
         growth = plan_body_growth(body, mesh, self._job)
         growth.refuse_pierced()
-        state = at_rest(growth.garment.vertices)
+        times = _times_larger(growth.garment, self._rest.positions)
+        if times > _LARGER:
+            growth = growth.from_smaller(times)
+        thin = TriangleMesh(growth.body.keyframes[0], body.faces)
+        state = self.resolve_crossings(at_rest(growth.garment.vertices), thin)
         collider = self.collider(growth.body, growth.garment)
         stepper = self.stepper(without_gravity(self._model), collider, _CALM)
         grown = run_body_motion(
@@ -252,6 +257,15 @@ class Phases:
         every = (*before, self)
         counters = [count for one in every for count in one._counters]
         report_counters(counters, [collider for one in every for collider in one._colliders], self._job)
+
+
+def _times_larger(garment: TriangleMesh, rest: FloatArray) -> float:
+    """Return how many times as long as at rest an edge of the garment is (median)."""
+    length, natural = (
+        np.linalg.norm(x[garment.faces] - np.roll(x[garment.faces], 1, axis=1), axis=2)
+        for x in (garment.vertices, rest)
+    )
+    return float(np.median(length / np.maximum(natural, np.finfo(float).tiny)))
 
 
 def _lowest_hold(body: TriangleMesh, positions: FloatArray) -> float:
