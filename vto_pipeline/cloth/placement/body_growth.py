@@ -42,7 +42,7 @@ _LARGER = (1.1, 1.2, 1.35, 1.5)  # times: so much it may start larger than it is
 _OVER, _UNDER = 0.05, 0.1  # of the stature: no opening is so far above where its limb joins, no neckline so far below
 _UNDER_ARMS = 0.02  # of the stature: so far above where arms join the body may hang what is held by a chest
 _SHOULDER = 0.06  # of the stature, from neck to shoulder
-_STEEP = 0.8  # sine of the slope of what hangs, within that of its opening: waists have 0.9, necks and ponchos 0.5 to 0.7
+_STEEP = 0.8  # sine of the slope of what hangs, beside its opening: waists have 0.9, necks and ponchos 0.5 to 0.7
 _LED_LARGER = 1.2  # times, to be led: small enough for sleeves to stay near their arms
 
 
