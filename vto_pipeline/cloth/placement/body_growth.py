@@ -300,6 +300,12 @@ class Thinning:
         pieces = pieces_with_limbs(garment, self.limbs, self.after(_LINES))
         return all(self._hangs_from(piece) is not None and len(set(piece.meant)) == 2 for piece in pieces)
 
+    def tells_too_small(self, garment: TriangleMesh) -> bool:
+        """Return whether a garment that a person fills better when larger may be too small to be worn where it is."""
+        if all(limb.name != "head" for limb in self.limbs.limbs):
+            return False
+        return self.hangs(garment) or self.limbs_out_of_place(garment) > 0 or self.limbs_astray(garment) > 0
+
     def is_below_arms(self, garment: TriangleMesh) -> bool:
         """Return whether all of a garment is below where the arms join the body."""
         roots = [limb.root[1] for limb in self.limbs.limbs if limb.name.endswith("arm")]

@@ -333,8 +333,8 @@ def _enlarge_until_body_inside(
 ) -> tuple[float, VoxelPlacement]:
     """Return by how much the garment must start larger for the body to be inside it, and its place then.
 
-    So it must where much of it is buried; or where a body fills it far better then, and maybe elsewhere: a head fills a
-    skirt best that no hips get into.
+    So it must where much of it is buried; or where a person fills it far better then, and limbs are in its way or it
+    hangs: a head fills a skirt best that no hips get into. What fits tightly as it is worn is filled better then, too.
 
     Args:
         garment: As large as it is [m].
@@ -351,7 +351,7 @@ def _enlarge_until_body_inside(
     best = int(np.argmax(scores))
     if best == 0:
         return 1.0, own
-    if scores[best] < _FAR_BETTER * scores[0]:
+    if scores[best] < _FAR_BETTER * scores[0] or not Thinning(body.mesh).tells_too_small(own.placed(garment)):
         depth = -SurfaceDistance(body.mesh).signed(own.placed(garment).vertices).distance
         if (depth > _DEEP).mean() <= config.buried:
             return 1.0, own
