@@ -53,6 +53,20 @@ def test_what_ends_elsewhere_is_told_with_girths(risen, told):
         assert f"Its upper opening is {own} around, and the body {ended} there, {began} where" in job.warnings[0]
 
 
+def test_the_girth_of_a_garment_with_panels_is_theirs():
+    """Sewn, it lay half as large as it is cut."""
+    garment, job = tube(0.1, 0.3, CORNERS, 7, base=0.5), Job()
+    a, b, c = garment.vertices[garment.faces].transpose(1, 0, 2)
+    far, near = np.linalg.norm(b - a, axis=1), c - a
+    along = np.einsum("fi,fi->f", near, b - a) / far
+    aside = np.sqrt((near**2).sum(axis=1) - along**2)
+    none = np.zeros_like(far)
+    panels = 2.0 * np.stack([np.stack([none, none], 1), np.stack([far, none], 1), np.stack([along, aside], 1)], 1)
+    rest = RestShape(garment.vertices, mode="panels", panels=panels)
+    warn_if_elsewhere(garment, moved(garment, 0.0, 0.7, 0.0), rest, bottle(), job)
+    assert f"Its upper opening is {200 * round_a_circle(0.1):.0f} cm around" in job.warnings[0]
+
+
 def test_where_nothing_is_open_nothing_is_told():
     sheet = TriangleMesh(np.array([[0.0, 0, 0], [0.01, 0, 0], [0, 0.01, 0]]), np.array([[0, 1, 2]], np.int32))
     assert warn_if_elsewhere(sheet, moved(sheet, 0, 1.0, 0), RestShape(sheet.vertices), bottle(), Job()) == {}

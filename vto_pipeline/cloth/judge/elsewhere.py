@@ -6,8 +6,8 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from vto_pipeline.geometry.section import plane_section
-from vto_pipeline.geometry.topology import boundary_loops
-from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.geometry.topology import boundary_loops, edge_faces, edges, laid_edge_lengths
+from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -31,14 +31,15 @@ def warn_if_elsewhere(
     Returns:
         risen_mm: how far that opening went up; nothing where there is none.
     """
-    loops = [loop for loop in boundary_loops(draped) if _length(rest.positions[loop]) > _AROUND]
-    if not loops:
+    around = [(loop, _laid_length(draped, rest, loop)) for loop in boundary_loops(draped)]
+    around = [(loop, length) for loop, length in around if length > _AROUND]
+    if not around:
         return {}
-    top = max(loops, key=lambda loop: float(start.vertices[loop, 1].mean()))
+    top, own = max(around, key=lambda one: float(start.vertices[one[0], 1].mean()))
     began, ended = (mesh.vertices[top].mean(axis=0) for mesh in (start, draped))
     risen = float(ended[1] - began[1])
     if abs(risen) > _FAR * float(np.ptp(body.vertices[:, 1])):
-        way, own = "above" if risen > 0 else "below", _length(rest.positions[top])
+        way = "above" if risen > 0 else "below"
         job.warn(
             f"it is worn elsewhere: it ended {100 * abs(risen):.0f} cm {way} where it was put on. Its upper opening is "
             f"{100 * own:.0f} cm around, and the body {100 * girth_at(body, ended):.0f} cm there, "
@@ -63,5 +64,7 @@ def girth_at(body: TriangleMesh, place: FloatArray) -> float:
     return float(ConvexHull(nearest).area)
 
 
-def _length(loop: FloatArray) -> float:
-    return float(np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1).sum())
+def _laid_length(mesh: TriangleMesh, rest: RestShape, loop: IntArray) -> float:
+    """Return how long a loop of a mesh's boundary is in the rest shape, panels or not [m]."""
+    ours = np.isin(edges(mesh), loop).all(axis=1) & (edge_faces(mesh)[:, 1] < 0)
+    return float(laid_edge_lengths(mesh, rest.corners(mesh.faces))[ours].sum())

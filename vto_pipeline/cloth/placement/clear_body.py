@@ -52,15 +52,15 @@ def clear_body_crossings(
     return cleared, pairs
 
 
-def longest_stretch(positions: FloatArray, rest: FloatArray, faces: IntArray) -> float:
-    """Return the greatest length of an edge of the faces, as a multiple of that at rest.
+def edge_stretches(positions: FloatArray, rest: FloatArray, faces: IntArray) -> FloatArray:
+    """Return the length of each side of the faces as a multiple of that at rest, 0 where that is none, shape (F, 3).
 
     Args:
         positions, rest: [m], shape (V, 3).
         faces: Shape (F, 3).
     """
     now, before = (np.linalg.norm(x[faces] - np.roll(x[faces], 1, axis=1), axis=2) for x in (positions, rest))
-    return float(np.divide(now, before, out=np.zeros_like(now), where=before > 0.0).max(initial=0.0))
+    return np.divide(now, before, out=np.zeros_like(now), where=before > 0.0)
 
 
 def _thicken(
@@ -76,7 +76,11 @@ def _thicken(
     """Return the state after thickening, and what still meets; as it began, where all that grows is the stretch."""
     pairs = intersecting_faces(TriangleMesh(state.positions, faces), body)
     begin, skin, known = (state, pairs), stepper.skin.copy(), stepper.contact_memory
-    most = OVERSTRETCHED * max(1.0, longest_stretch(state.positions, rest, faces)) if len(pairs) > 0 else np.inf
+    most = (
+        OVERSTRETCHED * max(1.0, edge_stretches(state.positions, rest, faces).max(initial=0.0))
+        if len(pairs) > 0
+        else np.inf
+    )
     fewest, since = len(pairs), 0
     for _ in range(rounds):
         if len(pairs) == 0 or since == _PATIENCE:
@@ -86,7 +90,7 @@ def _thicken(
         stepper.loose[about] = slides
         state = stepper.run(state, _RELAX)
         pairs = intersecting_faces(TriangleMesh(state.positions, faces), body)
-        if len(pairs) > 0 and longest_stretch(state.positions, rest, faces) > most:
+        if len(pairs) > 0 and edge_stretches(state.positions, rest, faces).max(initial=0.0) > most:
             (state, pairs), stepper.skin, stepper.contact_memory = begin, skin, known
             break
         fewest, since = min(fewest, len(pairs)), 0 if len(pairs) < fewest else since + 1

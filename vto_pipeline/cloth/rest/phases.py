@@ -15,7 +15,7 @@ from vto_pipeline.cloth.dynamics.body_motion import VariableSpeedBody, beside, b
 from vto_pipeline.cloth.dynamics.stepper import Stepper
 from vto_pipeline.cloth.model.build import ClothModel, ClothState, at_rest, without_gravity
 from vto_pipeline.cloth.placement.body_growth import plan_body_growth
-from vto_pipeline.cloth.placement.clear_body import OVERSTRETCHED, clear_body_crossings, longest_stretch
+from vto_pipeline.cloth.placement.clear_body import OVERSTRETCHED, clear_body_crossings, edge_stretches
 from vto_pipeline.cloth.placement.collision_free_start import find_collision_free_start
 from vto_pipeline.cloth.placement.limbs import Limbs
 from vto_pipeline.cloth.rest.convergence import SettleLimits, SettlingResult, relax_to_rest
@@ -131,7 +131,7 @@ class Phases:
         self._job.progress(0.05, what)
         growth = plan_body_growth(body, mesh, self._job)
         growth.refuse_pierced()
-        times = _times_larger(growth.garment, self._rest.positions)
+        times = float(np.median(edge_stretches(growth.garment.vertices, self._rest.positions, mesh.faces)))
         if times > _LARGER:
             growth = growth.from_smaller(times)
         thin = TriangleMesh(growth.body.keyframes[0], body.faces)
@@ -200,7 +200,9 @@ class Phases:
         def is_caught(positions: FloatArray) -> bool:
             """Return whether what never came free of the body is stretched about it as no cloth can be."""
             faces = self._model.faces
-            if self.crossings_left == 0 or longest_stretch(positions, self._rest.positions, faces) < OVERSTRETCHED:
+            if self.crossings_left == 0:
+                return False
+            if edge_stretches(positions, self._rest.positions, faces).max(initial=0.0) < OVERSTRETCHED:
                 return False
             return len(intersecting_faces(TriangleMesh(positions, faces), body)) > 0
 
@@ -257,15 +259,6 @@ class Phases:
         every = (*before, self)
         counters = [count for one in every for count in one._counters]
         report_counters(counters, [collider for one in every for collider in one._colliders], self._job)
-
-
-def _times_larger(garment: TriangleMesh, rest: FloatArray) -> float:
-    """Return how many times as long as at rest an edge of the garment is (median)."""
-    length, natural = (
-        np.linalg.norm(x[garment.faces] - np.roll(x[garment.faces], 1, axis=1), axis=2)
-        for x in (garment.vertices, rest)
-    )
-    return float(np.median(length / np.maximum(natural, np.finfo(float).tiny)))
 
 
 def _lowest_hold(body: TriangleMesh, positions: FloatArray) -> float:
