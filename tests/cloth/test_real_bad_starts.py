@@ -24,7 +24,7 @@ STARTS = {  # name -> start from the shirt in its place, further words, exit cod
     "forwards into the body": (lambda shirt: shifted(shirt, 0.0, 0.0, 0.05), STAYS, 0),
     "sideways into the body": (lambda shirt: shifted(shirt, 0.05, 0.0, 0.0), STAYS, 0),
     "down into the shoulders": (lambda shirt: shifted(shirt, 0.0, -0.05, 0.0), STAYS, 0),
-    "arms through the sleeves": (sleeves_up, STAYS, 4),
+    "arms through the sleeves": (sleeves_up, STAYS, 0),
     "too small": (lambda shirt: TriangleMesh(shirt.vertices / LARGER, shirt.faces), (), 0),
     "in centimetres": (lambda shirt: TriangleMesh(100.0 * shirt.vertices, shirt.faces), (), 0),
     "upside down": (upside_down, (), 0),
@@ -67,8 +67,12 @@ def test_a_real_shirt_badly_put(name, body, tmp_path):
     said = drape(garment, DATA / "bodies" / f"{body}.ply", tmp_path / "run", *words)
     assert said.returncode == code, said.stderr[-2000:]
     out = tmp_path / "run" / "out" / ("partial" if code == 4 else "")
-    audit = json.loads((out / "audit.json").read_text())
     draped = read_mesh(out / "draped.ply")
+    if code == 4 and not (out / "audit.json").is_file():  # refused where it starts
+        assert "cannot be put on: the" in said.stderr
+        assert "arm goes through the cloth at (" in said.stderr
+        return
+    audit = json.loads((out / "audit.json").read_text())
     assert audit["finite"] is True
     assert np.isfinite(draped.vertices).all()
     if code == 0:
