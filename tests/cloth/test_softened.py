@@ -75,13 +75,17 @@ def test_shear_and_fabric_stay_as_they_are():
 
 
 def settlings(monkeypatch, jams=False):
-    """When each settling of a vest began, on a body that grows under it [s], and when the body had grown."""
+    """When each settling of a vest began, on a body that grows under it [s], and when the body had grown.
+
+    And the forces of its contacts as it knew them at its begin, and at its end [N].
+    """
     settle, began = multiresolution.Phases.settle, []
 
     def noted(self, state, stepper, *rest):
-        began.append((state.time, stepper._colliders[0].ends))
+        known = stepper.contact_memory.force
         found = settle(self, state, stepper, *rest)
         found.jammed = jams
+        began.append((state.time, stepper._colliders[0].ends, known, stepper.contact_memory.force))
         return found
 
     monkeypatch.setattr(multiresolution.Phases, "settle", noted)
@@ -91,9 +95,15 @@ def settlings(monkeypatch, jams=False):
 
 
 def test_the_body_does_not_move_again_for_the_cloth_as_it_is(monkeypatch):
-    (soft, ends), (own, _), *_ = settlings(monkeypatch)
+    (soft, ends, *_), (own, *_), *_ = settlings(monkeypatch)
     assert ends > 0.01
     assert own >= soft >= ends - 1e-9
+
+
+def test_contacts_are_known_when_it_goes_on_as_it_is(monkeypatch):
+    (*_, left), (_, _, known, _), *_ = settlings(monkeypatch)
+    assert (left > 0.0).sum() > 10
+    np.testing.assert_array_equal(known, left)
 
 
 def test_what_jams_with_softer_threads_is_not_tried_as_it_is(monkeypatch):

@@ -266,6 +266,7 @@ def _by_softer_threads(
     stepper.steps += softer.steps
     if nearly.jammed or nearly.caught:
         return nearly
+    stepper.contact_memory = softer.contact_memory  # what pushes now pushes still
     spent = time.perf_counter() - began
     start = replace(at_rest(nearly.state.positions), time=nearly.state.time)
     settling = phases.settle_and_clear(start, stepper, body, deadline)
