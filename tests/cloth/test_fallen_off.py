@@ -7,7 +7,7 @@ from figures import bones, capsules, surface
 
 from vto_pipeline.cloth.drape import drape
 from vto_pipeline.cloth.dynamics.stepper import Stepper
-from vto_pipeline.cloth.placement.limbs import Limbs
+from vto_pipeline.cloth.placement.limbs.limbs import Limbs
 from vto_pipeline.errors import FallenError
 from vto_pipeline.io.fabrics import read_fabric
 

@@ -7,8 +7,8 @@ from figures import ARM, SHOULDER, arm_end, figure, tunic
 from numpy.testing import assert_allclose
 
 from vto_pipeline.cloth.placement.body_growth import Thinning, _least_faulty, plan_body_growth
-from vto_pipeline.cloth.placement.limb_openings import pieces_with_limbs
-from vto_pipeline.cloth.placement.limbs import Limbs
+from vto_pipeline.cloth.placement.limbs.limbs import Limbs
+from vto_pipeline.cloth.placement.limbs.openings import pieces_with_limbs
 from vto_pipeline.errors import IntersectingError
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import boundary_loops

@@ -5,11 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cloth_scenes import moved, tube
+from figures import figure, tunic
 from numpy.testing import assert_allclose
 
 from vto_pipeline.avatar.from_measurements import fit_measurements
-from vto_pipeline.cloth.placement.place import PlaceConfig, _as_files_have_it, find_placement
-from vto_pipeline.cloth.placement.voxel_fit import BodyCubes, VoxelFit, quarter_turns
+from vto_pipeline.cloth.placement.orientation import as_files_have_it
+from vto_pipeline.cloth.placement.place import PlaceConfig, find_placement
+from vto_pipeline.cloth.placement.voxel_fit import BodyCubes, quarter_turns
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.remeshing.remesh import RemeshConfig, remesh
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
@@ -133,14 +135,14 @@ def test_quarter_turns_are_the_rotations_of_a_cube_and_cubes_turn_like_meshes():
     for turn in turns:
         assert_allclose(turn @ turn.T, np.eye(3), rtol=0, atol=0)
         assert np.linalg.det(turn) == pytest.approx(1.0)
-    usual = [turn for turn in turns if _as_files_have_it(turn)]
+    usual = [turn for turn in turns if as_files_have_it(turn)]
     assert_allclose(usual, [np.eye(3), Z_UP.T], rtol=0, atol=0)
     worn = moved(skirt(), 0.037, 0.0, 0.021)
-    cubes = VoxelFit(worn, BodyCubes(pear()), 0.02, 2.0)
+    cubes = BodyCubes(pear(), 0.02, 2.0).fit(worn)
     for turn in turns[5::6]:
         found = cubes.best_placement(turn)
         turned = TriangleMesh(worn.vertices @ turn.T + found.shift, worn.faces)
-        anew = VoxelFit(turned, BodyCubes(pear()), 0.02, 2.0).best_placement(np.eye(3))
+        anew = BodyCubes(pear(), 0.02, 2.0).fit(turned).best_placement(np.eye(3))
         assert_allclose(anew.shift, 0.0, rtol=0, atol=0.021)  # a cube: the lattices differ by part of one
         assert_allclose(anew.score, found.score, rtol=0, atol=0.05)
 
@@ -191,7 +193,7 @@ def test_a_loose_skirt_is_not_put_on_upside_down_though_the_body_fills_it_better
     body, loose = pear(), tube(1.0, 0.3, 48, 21, base=0.3)
     radius = 0.17 + 0.03 * (loose.vertices[:, 1:2] - 0.3) / 0.3  # a little wider above, where the body is narrower
     worn = TriangleMesh(loose.vertices * np.hstack([radius, np.ones_like(radius), radius]), loose.faces)
-    cubes = VoxelFit(worn, BodyCubes(body), 0.01, 2.0)
+    cubes = BodyCubes(body, 0.01, 2.0).fit(worn)
     down, up = (cubes.best_placement(turn).score for turn in (DOWN, np.eye(3)))
     assert up < 0.99 * down
     assert_allclose(find_placement(worn, body, FINE, Job()).turn, np.eye(3), rtol=0, atol=0)
@@ -211,6 +213,24 @@ def test_necklines_are_deeper_in_front(name, sex):
 def test_a_garment_on_its_head_is_turned_where_that_fits_far_better():
     lying = TriangleMesh(skirt().vertices @ DOWN.T, skirt().faces)
     found = find_placement(lying, pear(), FINE, Job())
+    assert_allclose(found.turn[1], [0.0, -1.0, 0.0], rtol=0, atol=0)
+
+
+def test_a_tunic_on_its_head_is_turned_for_its_sleeves():
+    body, worn = figure(0.3), tunic(0.3)
+    lying = TriangleMesh(worn.vertices @ DOWN.T, worn.faces)
+    assert_allclose(find_placement(lying, body, FINE, Job()).turn[1], [0.0, -1.0, 0.0], rtol=0, atol=0)
+    assert_allclose(find_placement(worn, body, FINE, Job()).turn, np.eye(3), rtol=0, atol=0)
+
+
+@pytest.mark.real_data
+@pytest.mark.skipif(not DATA.exists(), reason="the data folder is absent")
+@pytest.mark.parametrize("body", ["female_averageweight", "female_maxweight", "male_averageweight"])
+@pytest.mark.parametrize("name", ["tshirt.ply", "berkeley/dress2/dress2-iso.obj"])
+def test_hips_fill_a_real_garment_on_its_head_as_well_but_its_sleeves_tell(name, body):
+    person, garment = read_mesh(DATA / "bodies" / f"mh_{body}.ply"), read_mesh(DATA / "garments" / name)
+    worn = find_placement(garment, person, PlaceConfig(), Job()).start_positions(garment.vertices)
+    found = find_placement(TriangleMesh(worn @ DOWN.T, garment.faces), person, PlaceConfig(), Job())
     assert_allclose(found.turn[1], [0.0, -1.0, 0.0], rtol=0, atol=0)
 
 

@@ -1,9 +1,9 @@
 """Placement: a start on the body without crossings.
 
-place, voxel_fit: unit, axes and place of a garment on a body it was never on
+place, orientation, voxel_fit: unit, axes and place of a garment on a body it was never on
 transfer, regrade: from the body it was on to another; in the same size or in the customer's
 rigid_escape, flexible_escape: the garment led about a body as a whole, or part by part
-limbs, limb_openings, limb_lead: a body's limbs, the openings that are there for them, sleeves laid on arms
+limbs: a body's limbs, the openings that are there for them, sleeves laid on arms
 rigidity: cloth that keeps its shape as far as it may
 way_out: what cloth inside a body asks for, so led
 body_growth: a thin body that grows inside the garment

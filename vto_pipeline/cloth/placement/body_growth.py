@@ -17,9 +17,9 @@ from scipy.sparse.linalg import splu
 
 from vto_pipeline.cloth.model.coarsening import CoarseGarment, coarsen
 from vto_pipeline.cloth.placement.flexible_escape import escape_flexibly
-from vto_pipeline.cloth.placement.limb_lead import lead_onto_limbs
-from vto_pipeline.cloth.placement.limb_openings import Piece, pieces_with_limbs
-from vto_pipeline.cloth.placement.limbs import Limb, Limbs
+from vto_pipeline.cloth.placement.limbs.lead import lead_onto_limbs
+from vto_pipeline.cloth.placement.limbs.limbs import Limb, Limbs
+from vto_pipeline.cloth.placement.limbs.openings import Piece, pieces_with_limbs
 from vto_pipeline.cloth.placement.rigid_escape import escape_rigidly
 from vto_pipeline.cloth.placement.voxel_fit import close_openings
 from vto_pipeline.errors import GarmentError, InputError, IntersectingError

@@ -11,7 +11,17 @@ import numpy as np
 from pydantic import Field
 
 from vto_pipeline.cloth.placement.body_growth import Thinning, plan_body_growth
-from vto_pipeline.cloth.placement.voxel_fit import BodyCubes, VoxelFit, VoxelPlacement, quarter_turns
+from vto_pipeline.cloth.placement.orientation import (
+    FALLING,
+    LARGER,
+    axis_names,
+    best_orientation,
+    fits_when_larger,
+    larger,
+    other_way_up,
+    promising_orientations,
+)
+from vto_pipeline.cloth.placement.voxel_fit import BodyCubes, VoxelPlacement, quarter_turns
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.arrays import FloatArray
@@ -23,12 +33,7 @@ from vto_pipeline.units import LENGTH_M
 
 _PLAUSIBLE = (0.12, 1.3)  # longest side of a garment as a share of the body's: from briefs to a gown with a train
 _SMALLEST = 0.02  # the same of a patch of cloth that is in metres: no other unit would make it larger
-_COARSE = 2.0  # times the cube: enough to tell which ways up are worth a second look
-_TELLING = 1.5  # times the cube: enough to tell them apart
-_CLOSE = 0.9  # of the best coarse worth: these are looked at again with fine cubes
 _ALIKE = 0.98  # as good, but for where the cubes happen to lie
-_LARGER, _STEPS = 1.2, 4  # a garment may start up to twice as large as it is
-_FALLING = 0.85  # of the best worth yet: larger garments need not be tried
 _FAR_BETTER = 1.25  # times the worth of its own size: a garment that fits gains less by being larger
 _DEEP = 0.01  # m
 _HEIGHTS, _ALL_HEIGHTS = 6, 24  # tried where limbs are astray: where that takes long to tell, and where it does not
@@ -112,41 +117,43 @@ def find_placement(
     if config.place == "as_it_stands":
         job.note("garment left where it stands, as requested")
         return _AS_IT_STANDS
-    cubes = BodyCubes(body)
+    cubes = BodyCubes(body, 1e-3 * config.cube_mm, config.cloth_in_body)
     if laid_out and config.place == "auto":
-        own = _as_laid_out(garment, cubes, config, job)
+        own = _as_laid_out(garment, cubes, job)
         if own is not None:
             return own
-    scale = _scale(garment, cubes, config, job)
+    scale = _scale(garment, cubes, job)
     metres = TriangleMesh(scale * garment.vertices, garment.faces)
-    ways = _promising_orientations(metres, cubes, config)
+    ways = promising_orientations(metres, cubes, config.turned_well)
     stands, fullest = ways[0], max(ways, key=lambda way: way.score)
     if round(fullest.score, 6) <= 0.0:  # but for what the transforms round
         raise InputError(
             "the body fills this garment nowhere: it goes around nothing of the body",
             hint="give it as it is worn, sewn and open; drape.place=as_it_stands leaves it where it lies",
         )
-    best = ways[_preferred([way.turn for way in ways], np.array([way.score for way in ways]), config)]
-    if not _as_files_have_it(best.turn):
-        turns = quarter_turns()
-        if _is_upright(fullest.turn):  # to be tight is no reason to be upside down
-            turns = [turn for turn in turns if _is_upright(turn)]
-        best = _best_orientation_if_larger(metres, cubes, config, turns)
+    best = best_orientation(metres, cubes, ways, config.turned_well)
+    thinning = Thinning(body)
+    turned = other_way_up(metres, cubes, best, thinning.limbs_astray, config.turned_well)
+    if turned is not None:
+        job.note("garment turned the other way up: more limbs are where its openings are then")
+        best = turned
     if (best.turn == stands.turn).all():
         best, gain = stands, fullest.score / max(stands.score, 1e-9) - 1.0
         if (gain + 1.0) * _ALIKE > 1.0:
-            job.note(f"garment not turned, though ({_axis_names(fullest)}) as (x, y, z) would score {gain:.1%} better")
+            job.note(
+                f"garment not turned, though ({axis_names(fullest.turn)}) as (x, y, z) would score {gain:.1%} better"
+            )
     else:
         job.note(
-            f"garment turned: its ({_axis_names(best)}) is the body's (x, y, z); as it stood, it scored "
+            f"garment turned: its ({axis_names(best.turn)}) is the body's (x, y, z); as it stood, it scored "
             f"{_relative_score(stands.score, best.score):.0%} of the best"
         )
-    stretch, best = _enlarge_until_body_inside(metres, cubes, best, config)
+    stretch, best = _enlarge_until_body_inside(metres, cubes, best, thinning, config)
     job.metrics["needs_larger_share"] = stretch - 1.0
     if stretch > 1.0:
         job.warn(f"too small: this body needs it {stretch - 1:.0%} larger")
     if config.place == "auto":
-        stretch, best = _where_limbs_are_in_place(metres, cubes, stretch, best, config, job)
+        stretch, best = _where_limbs_are_in_place(metres, cubes, stretch, best, thinning, job)
     share = _relative_score(best.score_in_place, best.score)
     if config.place == "auto" and best is stands and scale == 1.0 and share >= config.stands_well:
         job.note(f"garment left where it stands: its place scores {share:.0%} of the best")
@@ -170,12 +177,12 @@ def place_garment(garment: Garment, body: TriangleMesh, config: PlaceConfig, job
     return Garment(mesh, replace(rest, positions=placed.rest_positions(rest.positions), panels=panels))
 
 
-def _as_laid_out(garment: TriangleMesh, body: BodyCubes, config: PlaceConfig, job: Job) -> Placement | None:
+def _as_laid_out(garment: TriangleMesh, body: BodyCubes, job: Job) -> Placement | None:
     """Return the placement that a pattern's file means; None where that is beside the body.
 
     The file was drawn for another body: the garment's top, which it hangs from, goes to the same share of the stature.
     """
-    fit = VoxelFit(garment, body, 1e-3 * config.cube_mm, config.cloth_in_body)
+    fit = body.fit(garment)
     top, floor = float(garment.vertices[:, 1].max()), float(body.mesh.vertices[:, 1].min())
     ratio = float(np.ptp(body.mesh.vertices[:, 1])) / _FILE_STATURE
     middle = np.median(body.mesh.vertices, axis=0)
@@ -208,7 +215,7 @@ def _as_laid_out(garment: TriangleMesh, body: BodyCubes, config: PlaceConfig, jo
 
 
 def _where_limbs_are_in_place(
-    garment: TriangleMesh, body: BodyCubes, stretch: float, best: VoxelPlacement, config: PlaceConfig, job: Job
+    garment: TriangleMesh, body: BodyCubes, stretch: float, best: VoxelPlacement, thinning: Thinning, job: Job
 ) -> tuple[float, VoxelPlacement]:
     """Return how much larger the garment starts, and the best height at which the fewest limbs are out of place.
 
@@ -218,20 +225,19 @@ def _where_limbs_are_in_place(
     What hangs from one opening for both arms goes below them. Where it is out of place, or too small, it goes to the
     lowest of the heights that are as good to it, were it large enough: it slides. There it starts in its own size.
     """
-    thinning, cube = Thinning(body.mesh), 1e-3 * config.cube_mm
-    larger = TriangleMesh(stretch * garment.vertices, garment.faces)
-    there, fit = best.placed(larger), VoxelFit(larger, body, cube, config.cloth_in_body)
+    start = TriangleMesh(stretch * garment.vertices, garment.faces)
+    there, fit = best.placed(start), body.fit(start)
     heights = partial(fit.best_placements, best.turn, _ALL_HEIGHTS)
     if not thinning.hangs(there):
-        return stretch, _least_pierced(best, heights, larger, thinning.limbs_out_of_place, job)
+        return stretch, _least_pierced(best, heights, start, thinning.limbs_out_of_place, job)
     if stretch > 1.0 or thinning.limbs_out_of_place(there) > 0:
-        below = [way for way in heights() if thinning.is_below_arms(way.placed(larger))]
-        good = [way for way in below if way.score >= _FALLING * below[0].score]
-        own, turned = VoxelFit(garment, body, cube, config.cloth_in_body), garment.vertices @ best.turn.T
+        below = [way for way in heights() if thinning.is_below_arms(way.placed(start))]
+        good = [way for way in below if way.score >= FALLING * below[0].score]
+        own, turned = body.fit(garment), garment.vertices @ best.turn.T
         ways = []
         for way in sorted(good, key=lambda way: float(way.shift[1])):
-            rise = way.placed(larger).vertices[:, 1].max() - turned[:, 1].max()
-            ways += own.best_placements(best.turn, 1, np.array([0.0, rise, 0.0]), (np.inf, cube, np.inf))
+            rise = way.placed(start).vertices[:, 1].max() - turned[:, 1].max()
+            ways += own.best_placements(best.turn, 1, np.array([0.0, rise, 0.0]), (np.inf, body.cube, np.inf))
         if ways:
             best = _least_pierced(ways[0], lambda: ways[1:], garment, thinning.limbs_out_of_place, job)
             rise = best.placed(garment).vertices[:, 1].max() - there.vertices[:, 1].max()
@@ -275,61 +281,8 @@ def _least_pierced(
     return best
 
 
-def _promising_orientations(garment: TriangleMesh, body: BodyCubes, config: PlaceConfig) -> list[VoxelPlacement]:
-    """Return the best places of the garment as it is turned in the file, first, and after promising quarter turns."""
-    cube = 1e-3 * config.cube_mm
-    turns = quarter_turns()
-    cubes = VoxelFit(garment, body, _COARSE * cube, config.cloth_in_body)
-    coarse = np.array([cubes.best_placement(turn).score for turn in turns])
-    promising = coarse >= np.maximum(_CLOSE * coarse.max(), config.turned_well * coarse[0])
-    cubes = VoxelFit(garment, body, cube, config.cloth_in_body)
-    looks = zip(turns, promising, strict=True)
-    return [cubes.best_placement(turn) for turn, look in looks if look or _as_files_have_it(turn)]
-
-
-def _preferred(turns: Sequence[FloatArray], scores: FloatArray, config: PlaceConfig) -> int:
-    """Return which turn is taken: one as files have garments, unless another is far better.
-
-    A body fills a garment that is back to front, or a loose skirt upside down, almost as well or better. So the score
-    counts only where it is clear.
-    """
-    best = int(np.argmax(scores))
-    usual = (k for k, turn in enumerate(turns) if _as_files_have_it(turn))
-    return next((k for k in usual if scores[k] >= config.turned_well * scores[best]), best)
-
-
-def _as_files_have_it(turn: FloatArray) -> bool:
-    """Return whether it brings y up and front +z, or z up and front -y, to the body's y and z."""
-    return _is_upright(turn) and turn[0, 0] == 1.0
-
-
-def _is_upright(turn: FloatArray) -> bool:
-    """Return whether what is up in the file, y or z, is up on the body."""
-    return bool((turn[1] == (0, 1, 0)).all() or (turn[1] == (0, 0, 1)).all())
-
-
-def _best_orientation_if_larger(
-    garment: TriangleMesh, body: BodyCubes, config: PlaceConfig, turns: Sequence[FloatArray]
-) -> VoxelPlacement:
-    """Return the best place, turned as the garment would be if larger, in one of these ways.
-
-    One too small for the trunk may suit a thigh, and a tight top the hips upside down, its sleeves beside them. So the
-    turn is that which suits the size that fits best and the next larger one, in which nothing is tight.
-    """
-    scores: list[FloatArray] = []
-    for step in range(_STEPS + 1):
-        cubes = VoxelFit(_times(garment, step), body, 1e-3 * _TELLING * config.cube_mm, config.cloth_in_body)
-        scores.append(np.array([cubes.best_placement(turn).score for turn in turns]))
-        if scores[-1].max() < _FALLING * max(one.max() for one in scores):
-            break
-    fits = int(np.argmax([one.max() for one in scores]))
-    relative = np.sum([one / max(one.max(), 1e-9) for one in scores[fits : fits + 2]], axis=0)
-    turn = turns[_preferred(turns, relative, config)]
-    return VoxelFit(garment, body, 1e-3 * config.cube_mm, config.cloth_in_body).best_placement(turn)
-
-
 def _enlarge_until_body_inside(
-    garment: TriangleMesh, body: BodyCubes, own: VoxelPlacement, config: PlaceConfig
+    garment: TriangleMesh, body: BodyCubes, own: VoxelPlacement, thinning: Thinning, config: PlaceConfig
 ) -> tuple[float, VoxelPlacement]:
     """Return by how much the garment must start larger for the body to be inside it, and its place then.
 
@@ -340,31 +293,26 @@ def _enlarge_until_body_inside(
         garment: As large as it is [m].
         body: To be inside.
         own: Its best place at its own size, with the turn to keep.
-        config: Search and thresholds.
+        thinning: Of the body.
+        config: Thresholds.
     """
     scores: list[float] = []
-    for step in range(_STEPS + 1):
-        cubes = VoxelFit(_times(garment, step), body, 1e-3 * _TELLING * config.cube_mm, config.cloth_in_body)
+    for cubes in fits_when_larger(garment, body):
         scores.append(cubes.best_placement(own.turn).score)
-        if scores[-1] < _FALLING * max(scores):
+        if scores[-1] < FALLING * max(scores):
             break
     best = int(np.argmax(scores))
     if best == 0:
         return 1.0, own
-    if scores[best] < _FAR_BETTER * scores[0] or not Thinning(body.mesh).tells_too_small(own.placed(garment)):
+    if scores[best] < _FAR_BETTER * scores[0] or not thinning.tells_too_small(own.placed(garment)):
         depth = -SurfaceDistance(body.mesh).signed(own.placed(garment).vertices).distance
         if (depth > _DEEP).mean() <= config.buried:
             return 1.0, own
-    cubes = VoxelFit(_times(garment, best), body, 1e-3 * config.cube_mm, config.cloth_in_body)
-    larger = cubes.best_placement(own.turn)
-    return (_LARGER**best, larger) if larger.score > own.score else (1.0, own)
+    there = body.fit(larger(garment, best)).best_placement(own.turn)
+    return (LARGER**best, there) if there.score > own.score else (1.0, own)
 
 
-def _times(garment: TriangleMesh, step: int) -> TriangleMesh:
-    return TriangleMesh(_LARGER**step * garment.vertices, garment.faces)
-
-
-def _scale(garment: TriangleMesh, body: BodyCubes, config: PlaceConfig, job: Job) -> float:
+def _scale(garment: TriangleMesh, body: BodyCubes, job: Job) -> float:
     """Return the garment's unit in metres: one if plausible, else the unit in which the body fills it best."""
     longest = np.ptp(garment.vertices, axis=0).max() / np.ptp(body.mesh.vertices, axis=0).max()
     low, high = _PLAUSIBLE
@@ -380,17 +328,11 @@ def _scale(garment: TriangleMesh, body: BodyCubes, config: PlaceConfig, job: Job
     worth = dict.fromkeys(plausible, 0.0)
     for unit, metres in plausible.items() if len(plausible) > 1 else ():
         scaled = TriangleMesh(metres * garment.vertices, garment.faces)
-        cube = max(1e-3 * config.cube_mm, np.ptp(scaled.vertices, axis=0).max() / _AROUND)
-        cubes = VoxelFit(scaled, body, cube, config.cloth_in_body)
+        cubes = body.fit(scaled, max(1.0, np.ptp(scaled.vertices, axis=0).max() / (_AROUND * body.cube)))
         worth[unit] = max(cubes.best_placement(turn).score for turn in quarter_turns())
     unit = max(worth, key=lambda name: worth[name])
     job.note(f"garment assumed to be in {unit}: in metres its longest side would be {longest:.3g} times the body's")
     return plausible[unit]
-
-
-def _axis_names(fill: VoxelPlacement) -> str:
-    """Name which of the garment's axes are the body's x, y and z."""
-    return ", ".join(("-" if row.sum() < 0.0 else "") + "xyz"[np.abs(row).argmax()] for row in fill.turn)
 
 
 def _relative_score(worth: float, best: float) -> float:

@@ -58,10 +58,14 @@ class BodyCubes:
 
     Args:
         mesh: The body [m].
+        cube: Side of the cubes, where they are fine [m].
+        penalty: Weight of cloth inside the body against body inside the garment.
     """
 
-    def __init__(self, mesh: TriangleMesh) -> None:
+    def __init__(self, mesh: TriangleMesh, cube: float, penalty: float) -> None:
         self.mesh = mesh
+        self.cube = cube
+        self._penalty = penalty
         self.low: FloatArray = mesh.vertices.min(axis=0)
         self._made: dict[float, NDArray[np.bool_]] = {}
 
@@ -70,6 +74,10 @@ class BodyCubes:
         if cube not in self._made:
             self._made[cube] = _voxelise(self.mesh, self.low, cube)
         return self._made[cube]
+
+    def fit(self, garment: TriangleMesh, coarser: float = 1.0) -> VoxelFit:
+        """Return the fit of a garment [m] on it, in cubes so many times as large."""
+        return VoxelFit(garment, self, coarser * self.cube, self._penalty)
 
 
 class VoxelFit:

@@ -17,7 +17,7 @@ from vto_pipeline.cloth.model.build import ClothModel, ClothState, at_rest, with
 from vto_pipeline.cloth.placement.body_growth import plan_body_growth
 from vto_pipeline.cloth.placement.clear_body import OVERSTRETCHED, clear_body_crossings, edge_stretches
 from vto_pipeline.cloth.placement.collision_free_start import find_collision_free_start
-from vto_pipeline.cloth.placement.limbs import Limbs
+from vto_pipeline.cloth.placement.limbs.limbs import Limbs
 from vto_pipeline.cloth.rest.convergence import SettleLimits, SettlingResult, relax_to_rest
 from vto_pipeline.cloth.rest.true_distance import some_positions
 from vto_pipeline.cloth.simulation import default_skin

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from vto_pipeline.cloth.placement.limb_openings import Piece
-from vto_pipeline.cloth.placement.limbs import Limb, Limbs
+from vto_pipeline.cloth.placement.limbs.limbs import Limb, Limbs
+from vto_pipeline.cloth.placement.limbs.openings import Piece
 from vto_pipeline.cloth.placement.rigidity import Rigidity
 from vto_pipeline.geometry.geodesic import distance_from
 from vto_pipeline.geometry.topology import edges
