@@ -266,3 +266,12 @@ def test_a_skirt_too_small_for_the_hips_is_not_put_about_the_neck(sex, stature, 
     found = find_placement(garment, body, PlaceConfig(), Job())
     top = found.start_positions(garment.vertices)[:, 1].max() - body.vertices[:, 1].min()
     assert top / np.ptp(body.vertices[:, 1]) == pytest.approx(0.6, abs=0.1)
+
+
+@pytest.mark.real_data
+@pytest.mark.skipif(not DATA.exists(), reason="the data folder is absent")
+def test_a_garment_that_fewer_triangles_would_join_is_placed():
+    """Decimated, this suit has an edge of three faces."""
+    garment = read_mesh(DATA / "garments" / "makehuman" / "male_casualsuit01.obj")
+    person = read_mesh(DATA / "bodies" / "mh_male_averageweight.ply")
+    assert_allclose(find_placement(garment, person, PlaceConfig(), Job()).turn, np.eye(3), rtol=0, atol=0)

@@ -7,6 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from vto_pipeline.cloth.placement.voxel_fit import BodyCubes, VoxelFit, VoxelPlacement, quarter_turns
+from vto_pipeline.errors import InputError
+from vto_pipeline.geometry.remeshing.decimate import decimate
+from vto_pipeline.geometry.topology import boundary_loops
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -20,6 +23,7 @@ _STEPS = 4
 _COARSE = 2.0  # times the cube: enough to tell which ways up are worth a second look
 _TELLING = 1.5  # times the cube: enough to tell them apart
 _CLOSE = 0.9  # of the best coarse score: these are looked at again with fine cubes
+_FEW = 4000  # triangles: enough to tell where limbs go
 _LIMBS_TELL = 2  # fewer limbs astray: one is, of many a garment that is worn as it should be
 
 
@@ -82,13 +86,14 @@ def other_way_up(
         limbs_astray: Counts the limbs that are not where they are meant to be, with a garment there.
         turned_well: Share of the best score that another way needs.
     """
-    before = limbs_astray(best.placed(garment))
+    few = _of_few_triangles(garment)
+    before = limbs_astray(best.placed(few))
     if before < _LIMBS_TELL:
         return None
     cubes = body.fit(garment)
     ways = [cubes.best_placement(half @ best.turn) for half in (np.diag([-1.0, -1.0, 1.0]), np.diag([1.0, -1.0, -1.0]))]
     for way in sorted(ways, key=lambda way: -way.score):
-        if way.score >= turned_well * best.score and limbs_astray(way.placed(garment)) <= before - _LIMBS_TELL:
+        if way.score >= turned_well * best.score and limbs_astray(way.placed(few)) <= before - _LIMBS_TELL:
             return way
     return None
 
@@ -112,6 +117,16 @@ def axis_names(turn: FloatArray) -> str:
 def as_files_have_it(turn: FloatArray) -> bool:
     """Return whether a turn, shape (3, 3), brings y up and front +z, or z up and front -y, to the body's y and z."""
     return _is_upright(turn) and turn[0, 0] == 1.0
+
+
+def _of_few_triangles(garment: TriangleMesh) -> TriangleMesh:
+    """Return a garment in few triangles; as it is where edges would have more than two of them then."""
+    few = decimate(garment, _FEW)
+    try:
+        boundary_loops(few)
+    except InputError:
+        return garment
+    return few
 
 
 def _is_upright(turn: FloatArray) -> bool:
