@@ -112,9 +112,7 @@ def close_scan_holes(
         lifted = lift_fillings(filled, ~observed, distance, config.clearance_mm * 1e-3)
         pierced = [] if config.keep is not None else pierced_fillings(lifted, distance, bare)
         if pierced:
-            opened = open_pierced(
-                filled, len(clean.faces), pierced, mannequin, bare, config.clearance_mm * 1e-3, job
-            )
+            opened = open_pierced(filled, len(clean.faces), pierced, mannequin, bare, config.clearance_mm * 1e-3, job)
             shapes, is_opening = _told_apart(opened, distance, mannequin, photos, config, job)
             filled = _filled(opened, shapes, is_opening)
             observed = np.zeros(len(filled.vertices), dtype=bool)
