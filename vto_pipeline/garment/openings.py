@@ -74,6 +74,7 @@ def close_scan_holes(
 
     With a mannequin a loop is an opening when the body passes through it. Without one, or where the cloth hangs beyond
     it, when the loop is long and the cloth runs across its plane like the end of a tube; that is a guess, and said so.
+    A filling that a part of the mannequin comes through is opened there once, with a warning.
 
     Args:
         shell: The garment cut out of the scan, oriented outward.
