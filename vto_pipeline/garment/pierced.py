@@ -74,7 +74,7 @@ def _no_cloth(
 
 
 def _joined(mesh: TriangleMesh, keep: NDArray[np.bool_]) -> TriangleMesh:
-    """Return the kept faces that hang together with the first of the mesh."""
+    """Return the kept faces that are connected with the first of the mesh."""
     kept = submesh(mesh, keep)[0]
     _, piece = face_components(kept)
     return submesh(kept, piece == piece[0])[0]
