@@ -57,6 +57,7 @@ STRETCHED = 4.0
 """Edges so many times as long as they usually are in fillings are stretched: in between, nothing was looked at."""
 SPLITS = 8
 """Rounds in which edges that are stretched or cut the mannequin are halved; each takes three quarters of its depth."""
+LITTLE_SEEN = "too little was seen beside an opening"
 HINT = "take more photos of that place, from above or below; are scan and mannequin aligned?"
 
 
@@ -270,41 +271,65 @@ class KeptOutside:
         return moved
 
 
-def check_lifted(lifted: Lifted, distance: SurfaceDistance, bare: BareParts | None) -> None:
-    """Refuse fillings that a part of the mannequin goes through: what was filled is an opening, or holds one.
+class Pierced(NamedTuple):
+    """A filling that a part of the mannequin goes through.
+
+    Args:
+        faces: Of it, among those that there were before splits, shape (N,).
+        reason: In words.
+    """
+
+    faces: IntArray
+    reason: str
+
+
+def pierced_fillings(lifted: Lifted, distance: SurfaceDistance, bare: BareParts | None) -> list[Pierced]:
+    """Return the fillings that a part of the mannequin goes through: what was filled is an opening, or holds one.
+
+    They still run through the mannequin, or were lifted over a part that was seen bare.
 
     Args:
         lifted: As `lift_fillings` leaves them.
         distance: Signed distances to the mannequin [m].
         bare: What was seen of the bare mannequin, if it is known.
-
-    Raises:
-        GarmentError: one still runs through the mannequin, or was lifted over a part that was seen bare.
     """
     before, after = lifted.before, lifted.after
     faces = np.flatnonzero(lifted.filled[after.faces].any(axis=1))
     if len(faces) == 0:
-        return
+        return []
     middle = after.vertices[after.faces[faces]].mean(axis=1)
     inside = distance.signed(middle).distance
-    if inside.min() < -LEFT_INSIDE:
-        raise GarmentError(
-            f"a filled hole runs through the mannequin at {_place(middle[int(np.argmin(inside))])}, "
-            f"{-1e3 * inside.min():.0f} mm inside: too little was seen beside an opening",
-            hint=HINT,
-        )
-    if bare is None:
-        return
     first = distance.signed(before.vertices[before.faces[faces]].mean(axis=1)).distance
     count, piece = face_components(TriangleMesh(after.vertices, after.faces[faces]))
+    found = []
     for hole in range(count):
-        mine = (piece == hole) & (faces < lifted.whole)
-        if first[mine].min() < -DEEP and np.mean(bare.under(middle[mine])) > BARE:
-            raise GarmentError(
-                f"a filled hole at {_place(middle[mine].mean(axis=0))} covers mannequin that was seen bare, and was "
-                f"{-1e3 * first[mine].min():.0f} mm inside it: too little was seen beside an opening",
-                hint=HINT,
+        mine, whole = piece == hole, (piece == hole) & (faces < lifted.whole)
+        deepest = np.flatnonzero(mine)[int(np.argmin(inside[mine]))]
+        if inside[deepest] < -LEFT_INSIDE:
+            through = f"runs through the mannequin at {_place(middle[deepest])}, {-1e3 * inside[deepest]:.0f} mm inside"
+        elif bare is not None and first[whole].min(initial=0.0) < -DEEP and np.mean(bare.under(middle[whole])) > BARE:
+            through = (
+                f"at {_place(middle[whole].mean(axis=0))} covers mannequin that was seen bare, and was "
+                f"{-1e3 * first[whole].min():.0f} mm inside it"
             )
+        else:
+            continue
+        found.append(Pierced(faces[whole].astype(np.int32), f"a filled hole {through}: {LITTLE_SEEN}"))
+    return found
+
+
+def check_lifted(lifted: Lifted, distance: SurfaceDistance, bare: BareParts | None) -> None:
+    """Refuse fillings that a part of the mannequin goes through.
+
+    Args:
+        lifted, distance, bare: As in `pierced_fillings`.
+
+    Raises:
+        GarmentError: there is one.
+    """
+    pierced = pierced_fillings(lifted, distance, bare)
+    if pierced:
+        raise GarmentError(pierced[0].reason, hint=HINT)
 
 
 def _place(point: FloatArray) -> str:

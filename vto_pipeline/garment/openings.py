@@ -9,7 +9,7 @@ from pydantic import Field
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.align import PosedPhotos
 from vto_pipeline.garment.bare_parts import BareParts
-from vto_pipeline.garment.lifting import check_lifted, lift_fillings
+from vto_pipeline.garment.lifting import HINT, check_lifted, lift_fillings, pierced_fillings
 from vto_pipeline.garment.loop_evidence import LoopShape, encloses, measure_loops
 from vto_pipeline.garment.notches import close_notches
 from vto_pipeline.garment.photographed.carved import carve_fillings
@@ -17,6 +17,7 @@ from vto_pipeline.garment.photographed.confirmed import LookAgain, confirm_filli
 from vto_pipeline.garment.photographed.covered import covered_loops
 from vto_pipeline.garment.photographed.parted import refuse_parted
 from vto_pipeline.garment.photographed.sightings import look_at_mannequin
+from vto_pipeline.garment.pierced import open_pierced
 from vto_pipeline.garment.rims import drop_flaps, fair_rims, largest_piece, trim_ledges
 from vto_pipeline.garment.wearable import LEAST_PERIMETER_MM, check_wearable
 from vto_pipeline.geometry.remeshing.decimate import decimate, faces_at
@@ -73,6 +74,7 @@ def close_scan_holes(
 
     With a mannequin a loop is an opening when the body passes through it. Without one, or where the cloth hangs beyond
     it, when the loop is long and the cloth runs across its plane like the end of a tube; that is a guess, and said so.
+    A filling that a part of the mannequin comes through is opened there once, with a warning.
 
     Args:
         shell: The garment cut out of the scan, oriented outward.
@@ -101,29 +103,33 @@ def close_scan_holes(
     bridged, notches = clean, 0
     if distance is not None:
         bridged, notches = close_notches(clean, distance, bare, least_perimeter, config.reach_mm * 1e-3)
-    shapes = measure_loops(bridged)
-    is_opening = _classify(bridged, shapes, distance, config, job)
-    if mannequin is not None and photos is not None and any(is_opening):
-        is_opening = _uncovered(bridged, shapes, is_opening, mannequin, photos, job)
-    if config.keep is not None:
-        is_opening = _kept(shapes, is_opening, config.keep, job)
-    count = sum(is_opening)
-    if config.expected is not None and count != config.expected:
-        raise GarmentError(f"{count} openings found, expected {config.expected}: {_listing(shapes, is_opening)}")
-    job.progress(0.5, f"filling {len(shapes) - count} scan holes")
-    if count == len(shapes):
+    shapes, is_opening = _told_apart(bridged, distance, mannequin, photos, config, job)
+    job.progress(0.5, f"filling {len(shapes) - sum(is_opening)} scan holes")
+    if all(is_opening):
         job.leave_out("hole filling", "every boundary loop is a real opening")
-    filled = fill_holes(bridged, [shape.walk for shape, real in zip(shapes, is_opening, strict=True) if not real])
+    filled = _filled(bridged, shapes, is_opening)
     observed = np.arange(len(filled.vertices)) < len(clean.vertices)
-    if distance is not None:
+    if mannequin is not None and distance is not None:
         lifted = lift_fillings(filled, ~observed, distance, config.clearance_mm * 1e-3)
-        filled, observed = lifted.after, ~lifted.filled
-        if config.keep is None:
+        pierced = [] if config.keep is not None else pierced_fillings(lifted, distance, bare)
+        if pierced:
+            opened = open_pierced(filled, len(clean.faces), pierced, mannequin, bare, config.clearance_mm * 1e-3, job)
+            shapes, is_opening = _told_apart(opened, distance, mannequin, photos, config, job)
+            filled = _filled(opened, shapes, is_opening)
+            observed = np.zeros(len(filled.vertices), dtype=bool)
+            observed[filled.faces[: len(clean.faces)]] = True
+            lifted = lift_fillings(filled, ~observed, distance, config.clearance_mm * 1e-3)
             check_lifted(lifted, distance, bare)
+            for one in pierced:
+                job.warn(f"{one.reason}; it was opened there, and where its rim runs is uncertain. {HINT}")
+        filled, observed = lifted.after, ~lifted.filled
         job.measure(lifted_cm2=1e4 * float(face_areas(filled)[lifted.moved[filled.faces].any(axis=1)].sum()))
     final = fair_rims(filled, config.fair_mm * 1e-3)
     if face_components(final)[0] != 1:
         raise GarmentError(f"the garment fell apart into {face_components(final)[0]} pieces")
+    count = sum(is_opening)
+    if config.expected is not None and count != config.expected:
+        raise GarmentError(f"{count} openings found, expected {config.expected}: {_listing(shapes, is_opening)}")
     scanned = np.arange(len(final.faces)) < len(clean.faces)
     if mannequin is not None and distance is not None and photos is not None and count and not observed.all():
         final = carve_fillings(final, observed, mannequin, photos, distance, config.clearance_mm * 1e-3, job)
@@ -150,6 +156,29 @@ def close_scan_holes(
             refuse_parted(sightings, final, found, config.keep is not None, job)
     warn_of_filled_rims(found, observed, job)
     return final, found, observed
+
+
+def _told_apart(
+    mesh: TriangleMesh,
+    distance: SurfaceDistance | None,
+    mannequin: TriangleMesh | None,
+    photos: PosedPhotos | None,
+    config: OpeningsConfig,
+    job: Job,
+) -> tuple[list[LoopShape], list[bool]]:
+    """Return the boundary loops of a garment, and which of them are openings by all the evidence there is."""
+    shapes = measure_loops(mesh)
+    is_opening = _classify(mesh, shapes, distance, config, job)
+    if mannequin is not None and photos is not None and any(is_opening):
+        is_opening = _uncovered(mesh, shapes, is_opening, mannequin, photos, job)
+    if config.keep is not None:
+        is_opening = _kept(shapes, is_opening, config.keep, job)
+    return shapes, is_opening
+
+
+def _filled(mesh: TriangleMesh, shapes: list[LoopShape], is_opening: list[bool]) -> TriangleMesh:
+    """Return the mesh with the loops filled that are no openings."""
+    return fill_holes(mesh, [shape.walk for shape, real in zip(shapes, is_opening, strict=True) if not real])
 
 
 def list_openings(garment: TriangleMesh) -> list[Opening]:

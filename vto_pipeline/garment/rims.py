@@ -53,7 +53,7 @@ def trim_ledges(shell: TriangleMesh, mannequin: TriangleMesh, widest: float) -> 
     steep = (facing < LEDGE_COSINE) & np.isfinite(to_rim) & (nearest.distance < widest)
     on_rim = np.zeros(len(shell.vertices), dtype=bool)
     on_rim[rim] = True
-    ledge = _reached(shell, steep, steep & (on_rim[shell.faces].sum(axis=1) >= 2))
+    ledge = reached(shell, steep, steep & (on_rim[shell.faces].sum(axis=1) >= 2))
     return largest_piece(submesh(shell, ~ledge)[0]) if ledge.any() else shell
 
 
@@ -135,7 +135,7 @@ def _largest_mask(mesh: TriangleMesh) -> NDArray[np.bool_]:
     return piece == int(np.argmax(area))
 
 
-def _reached(mesh: TriangleMesh, among: NDArray[np.bool_], seeds: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def reached(mesh: TriangleMesh, among: NDArray[np.bool_], seeds: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return the faces connected to a seed through edges between faces of the set, shape (F,)."""
     beside = edge_faces(mesh)
     beside = beside[beside[:, 1] >= 0]
