@@ -50,7 +50,9 @@ def inside_out(folded: NDArray[np.bool_], twin: IntArray) -> NDArray[np.bool_]:
     def graph(kept: NDArray[np.bool_], name: IntArray, size: int) -> coo_array:
         return coo_array((np.ones(int(kept.sum())), (name[here[kept]], name[there[kept]])), shape=(size, size))
 
-    parts, part = connected_components(graph((twin >= 0) & ~folded, np.arange(count, dtype=np.int32), count), directed=False)
+    parts, part = connected_components(
+        graph((twin >= 0) & ~folded, np.arange(count, dtype=np.int32), count), directed=False
+    )
     order, before = breadth_first_order(graph(folded, part, parts).tocsr(), int(np.bincount(part).argmax()), False)
     out = np.zeros(parts, np.bool_)
     for one in order[1:]:

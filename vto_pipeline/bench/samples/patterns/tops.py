@@ -172,8 +172,8 @@ def shirt(tape: Tape) -> Pattern:
     for near, far in (("front_cuff_left", "back_cuff_left"), ("back_cuff_right", "front_cuff_right")):
         seams += [([(near, 0)], [(far, 3)]), ([(near, 2)], [(far, 1)])]
     collar, ring = _stand(trunk, panels)
-    fall, over = _fall(trunk, panels)
-    return sewn("shirt", tape.stature, [*panels, *arms, *collar, *fall], [*seams, *ring, *over])
+    fall, turned = _fall(trunk, panels)
+    return sewn("shirt", tape.stature, [*panels, *arms, *collar, *fall], [*seams, *ring, *turned])
 
 
 def jacket(tape: Tape) -> Pattern:
