@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import ctypes
 import os
+import resource
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +32,11 @@ def write_much(bytes_: int) -> Arrays:
 def count_forever(start: int) -> Arrays:
     while True:
         start += 1
+
+
+def kept_waiting(seconds: float) -> Arrays:
+    time.sleep(seconds)
+    return {"values": np.array([1])}
 
 
 def return_an_object() -> Arrays:
@@ -64,12 +69,22 @@ def test_too_much_memory_is_a_format_error() -> None:
         run_limited(bytearray, 2**30, memory_bytes=2**29)
 
 
-@pytest.mark.parametrize("function", [time.sleep, count_forever])
-def test_too_much_time_is_a_format_error(function: Callable[[int], Arrays]) -> None:
+def test_too_much_processor_time_is_a_format_error() -> None:
+    start = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    with pytest.raises(FormatError, match="longer than 1 s of processor time"):
+        run_limited(count_forever, 0, seconds=1.0)
+    assert 0.5 < resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - start < 2.5  # s: some of it is the system's
+
+
+def test_a_reader_that_only_waits_is_a_format_error() -> None:
     start = time.monotonic()
-    with pytest.raises(FormatError, match="longer than 1 s"):
-        run_limited(function, 60, seconds=1.0)
-    assert 0.5 < time.monotonic() - start < 30.0  # s: the limit of 1 s, and a busy machine; one waits for 60 s
+    with pytest.raises(FormatError, match="not ended after 10 s"):
+        run_limited(time.sleep, 60, seconds=1.0)
+    assert 9.5 < time.monotonic() - start < 50.0  # s: the limit of 10 s, and a busy machine; one waits for 60 s
+
+
+def test_time_in_which_others_have_the_processor_does_not_count() -> None:
+    assert run_limited(kept_waiting, 2.5, seconds=1.0)["values"].tolist() == [1]
 
 
 def test_too_large_a_file_is_a_format_error() -> None:

@@ -6,7 +6,8 @@ instead of the other way round). The frames begin as the panels are placed, so t
 closing of the seams over the panels. Each vertex is drawn to where its panel stands about the body, first strongly,
 then ever less. Each triangle's frame is drawn to those of its neighbours (Levi & Gotsman 2015, "Smooth rotation
 enhanced as-rigid-as-possible mesh animation"), or nothing would resist bending: the tip of a dart would stay pushed in.
-So the garment stays open for the body, and hardly folds into itself.
+So the garment stays open for the body, and hardly folds into itself. Over a seam that the file has folded, none is
+drawn: a collar's fall stays down.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from scipy.sparse import coo_array, csc_array
 from scipy.sparse.linalg import splu
 from scipy.spatial.transform import Rotation
 
+from vto_pipeline.garment.pattern.folds import folds, inside_out
 from vto_pipeline.garment.pattern.sew import Sewn
 from vto_pipeline.geometry.topology import laid_edge_lengths, opposite_half_edges
 from vto_pipeline.model.arrays import FloatArray, IntArray
@@ -67,7 +69,9 @@ def embed(mesh: TriangleMesh, frames: FloatArray) -> FloatArray:
     links = links + links.T
     twin, turns = _neighbours(mesh)
     area = float(np.abs(np.linalg.det(mesh.texture[:, 1:] - mesh.texture[:, :1])).mean())
-    x = place = mesh.vertices + _bulge(mesh, frames)
+    folded = folds(mesh, frames, twin)
+    alike = (twin >= 0) & ~folded
+    x = place = mesh.vertices + _bulge(mesh, frames, inside_out(folded, twin))
     for share in _HOLDS:
         hold = share * float(weight.mean())
         solver = splu(csc_array(_diagonal(links.sum(axis=1) + hold) - links))
@@ -79,7 +83,7 @@ def embed(mesh: TriangleMesh, frames: FloatArray) -> FloatArray:
                 right[:, k] -= np.bincount(rows, wanted[:, :, k].ravel(), count)
             before, x = x, np.asarray(solver.solve(right))
             ahead = (x + _MOMENTUM * (x - before))[mesh.faces]
-            beside = np.where(twin[:, None, None] >= 0, frames[twin // 3] @ turns, 0.0)
+            beside = np.where(alike[:, None, None], frames[twin // 3] @ turns, 0.0)
             smooth = _SMOOTH * area * beside.reshape(-1, 3, 3, 2).sum(axis=1)
             frames = _frames(np.roll(ahead, -1, axis=1) - ahead, flat, weight, smooth)
     return x
@@ -97,10 +101,10 @@ def _as_placed(x: FloatArray, placed: FloatArray) -> FloatArray:
     return np.asarray(found)
 
 
-def _bulge(mesh: TriangleMesh, frames: FloatArray) -> FloatArray:
+def _bulge(mesh: TriangleMesh, frames: FloatArray, turned: NDArray[np.bool_]) -> FloatArray:
     """Return a small way outwards for each vertex, most in the middle: flat cloth with a dart would never leave its
     plane, as both sides of it are alike."""
-    normals = np.cross(frames[:, :, 0], frames[:, :, 1])
+    normals = np.cross(frames[:, :, 0], frames[:, :, 1]) * np.where(turned, -1.0, 1.0)[:, None]
     out = np.stack([np.bincount(mesh.faces.ravel(), np.repeat(normals[:, k], 3)) for k in range(3)], axis=1)
     out = out / np.maximum(np.linalg.norm(out, axis=1), 1e-12)[:, None]
     away = np.linalg.norm(mesh.vertices - mesh.vertices.mean(axis=0), axis=1)

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from vto_pipeline.garment.pattern.planned import SIDES
+from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.pattern import Edge, Panel, Pattern, Placement, Side, Stitch
 
 Point = tuple[float, float]
@@ -16,7 +17,14 @@ Seam = tuple[Sequence[tuple[str, int]], Sequence[tuple[str, int]]]
 _FILE_STATURE = 1.72  # m: where panels stand is said for a body of this height, as in GarmentCode's files
 
 
-def piece(name: str, side: str, away: float, path: Sequence[Point | list[Point]], shift: Point = (0.0, 0.0)) -> Panel:
+def piece(
+    name: str,
+    side: str,
+    away: float,
+    path: Sequence[Point | list[Point]],
+    shift: Point = (0.0, 0.0),
+    over: float | None = None,
+) -> Panel:
     """Return a panel that stands upright beside the body.
 
     Args:
@@ -25,6 +33,7 @@ def piece(name: str, side: str, away: float, path: Sequence[Point | list[Point]]
         away: From the body's middle [m].
         path: Corners, anticlockwise, y the height over the floor; a list between two holds a curve's control points.
         shift: Of the panel in its plane, before it is sewn [m].
+        over: The height that it is folded down over, its wrong side outwards [m]; None: it stands upright.
     """
     path = [*path, path[0]]
     at = [k for k, one in enumerate(path) if isinstance(one, tuple)]
@@ -33,7 +42,10 @@ def piece(name: str, side: str, away: float, path: Sequence[Point | list[Point]]
         inner = [point for one in path[a + 1 : b] if isinstance(one, list) for point in one]
         edges.append(Edge("bezier" if inner else "polyline", np.array([path[a], *inner, path[b]], dtype=float)))
     turn = SIDES[side]
-    return Panel(name, tuple(edges), placement=Placement(turn, turn @ [*shift, away]))
+    if over is None:
+        return Panel(name, tuple(edges), placement=Placement(turn, turn @ [*shift, away]))
+    place = turn @ [shift[0], 2.0 * over + shift[1], away]
+    return Panel(name, tuple(edges), placement=Placement(turn @ np.diag([1.0, -1.0, -1.0]), place))
 
 
 def mirrored(path: Sequence[Point | list[Point]]) -> list[Point | list[Point]]:
@@ -53,7 +65,7 @@ def sewn(name: str, stature: float, panels: Sequence[Panel], seams: Sequence[Sea
         panels: At that body's heights.
         seams: Edges of the first side in the order of its outline, and those of the second against it.
     """
-    top = max(float(e.points[:, 1].max()) + p.placement.translation[1] for p in panels if p.placement for e in p.edges)
+    top = max(_heights(edge, one.placement).max() for one in panels if one.placement for edge in one.edges)
     rise = np.array([0.0, top * (_FILE_STATURE / stature - 1.0), 0.0])
     stitches = tuple(
         Stitch(tuple(Side(*one) for one in first), tuple(Side(*one, forward=False) for one in second))
@@ -65,3 +77,8 @@ def sewn(name: str, stature: float, panels: Sequence[Panel], seams: Sequence[Sea
         place = Placement(one.placement.rotation, one.placement.translation + rise)
         placed.append(Panel(one.name, one.edges, grain=one.grain, placement=place))
     return Pattern(name, tuple(placed), stitches)
+
+
+def _heights(edge: Edge, place: Placement) -> FloatArray:
+    """Return the heights of an edge's points in space [m], shape (K,)."""
+    return np.asarray(edge.points @ place.rotation[1, :2] + place.translation[1])

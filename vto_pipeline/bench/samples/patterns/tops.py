@@ -21,6 +21,7 @@ _AWAY = 0.16  # m: of panels from the middle of the body
 _SLOPE = np.deg2rad(20.0)  # of sleeves, downwards
 _BESIDE = 0.06  # m: of sleeves from the trunk
 _BAND, _CUFF = 0.035, 0.06  # m: heights of a collar's stand and of a cuff
+_FALL, _POINT, _BEND = 0.045, 0.012, 9.0  # m: height of a collar's fall, how far its points go; its curvature [1/m]
 _BUST_DART = (0.03, 0.10)  # m: how wide and how long
 
 
@@ -150,7 +151,7 @@ def dress(tape: Tape) -> Pattern:
 
 
 def shirt(tape: Tape) -> Pattern:
-    """Return a shirt, buttoned up, with long sleeves, cuffs that these are gathered into, and a collar's stand."""
+    """Return a shirt, buttoned up, with long sleeves, cuffs that these are gathered into, and a collar."""
     trunk = _Trunk(tape, 0.14, 0.46)
     length, width, band = 0.22 * tape.stature, 0.08 * tape.stature, 0.065 * tape.stature
     panels, seams = _open_trunk(trunk, 0.06, 0.0)
@@ -171,7 +172,8 @@ def shirt(tape: Tape) -> Pattern:
     for near, far in (("front_cuff_left", "back_cuff_left"), ("back_cuff_right", "front_cuff_right")):
         seams += [([(near, 0)], [(far, 3)]), ([(near, 2)], [(far, 1)])]
     collar, ring = _stand(trunk, panels)
-    return sewn("shirt", tape.stature, [*panels, *arms, *collar], [*seams, *ring])
+    fall, turned = _fall(trunk, panels)
+    return sewn("shirt", tape.stature, [*panels, *arms, *collar, *fall], [*seams, *ring, *turned])
 
 
 def jacket(tape: Tape) -> Pattern:
@@ -249,6 +251,50 @@ def _stand(trunk: _Trunk, panels: list[Panel]) -> tuple[list[Panel], list[Seam]]
         ([("front_collar_right", 2)], [("back_collar", 2)]),
     ]
     return pieces, seams
+
+
+def _fall(trunk: _Trunk, panels: list[Panel]) -> tuple[list[Panel], list[Seam]]:
+    """Return the three pieces of a collar's fall, folded down over its stand, and their seams."""
+    front, back = _length(panels[0], 4), _length(panels[2], 4)
+    low = trunk.neck[1] + _BAND
+    side, whole = _bent(front, 0.5 * front, low, _POINT), _bent(2.0 * back, 0.0, low, 0.0)
+    pieces = [
+        piece("front_fall_left", "front", 0.13, side, (0.01, 0.0), over=low),
+        piece("front_fall_right", "front", 0.13, mirrored(side), (-0.01, 0.0), over=low),
+        piece("back_fall", "back", 0.13, whole, over=low),
+    ]
+    seams: list[Seam] = [
+        ([("front_collar_left", 2)], [("front_fall_left", 0)]),
+        ([("front_collar_right", 1)], [("front_fall_right", 3)]),
+        ([("back_collar", 3)], [("back_fall", 0)]),
+        ([("front_fall_left", 1)], [("back_fall", 3)]),
+        ([("front_fall_right", 2)], [("back_fall", 1)]),
+    ]
+    return pieces, seams
+
+
+def _bent(length: float, middle: float, low: float, point: float) -> Path:
+    """Return a strip whose lower edge is a shallow arc, so that its upper one is longer and lies outside when folded.
+
+    Args:
+        length: Of the lower edge [m].
+        middle, low: Where the middle of its lower edge is [m].
+        point: How much farther its left end goes up [m].
+    """
+    half, radius = 0.5 * length * _BEND, 1.0 / _BEND
+
+    def at(share: float, far: float) -> Point:
+        return middle + far * float(np.sin(share * half)), low - radius + far * float(np.cos(share * half))
+
+    inner, outer, reach = radius, radius + _FALL, 1.0 / float(np.cos(half))  # of the control point of a curve
+    return [
+        at(-1, inner),
+        [at(0, inner * reach)],
+        at(1, inner),
+        at(1, outer),
+        [at(0, outer * reach)],
+        at(-1, outer + point),
+    ]
 
 
 def _length(panel: Panel, edge: int) -> float:
