@@ -84,8 +84,12 @@ def test_on_a_path_there_is_room_for_cloth_that_lies_in_several_layers():
         assert 3.0 * ROOM - 1e-9 < gap_between(body.path.at(path.time(frame))) < 3.0 * ROOM + 0.01
 
 
-def test_each_frame_sinks_once_however_many_steps_and_attempts_lead_to_it(monkeypatch):
-    """Steps add up to the time of a frame but for rounding: it must not count as one between two others."""
+@pytest.mark.parametrize(("speed", "times"), [(0.1, 60), (0.0, 1)])
+def test_each_frame_sinks_once_however_many_steps_and_attempts_lead_to_it(monkeypatch, speed, times):
+    """Steps add up to the time of a frame but for rounding: it must not count as one between two others.
+
+    A pose that is held sinks once for all frames.
+    """
     sunk, sink = [], yielding._sink
 
     def counted(mesh, *others):
@@ -93,9 +97,10 @@ def test_each_frame_sinks_once_however_many_steps_and_attempts_lead_to_it(monkey
         return sink(mesh, *others)
 
     monkeypatch.setattr(yielding, "_sink", counted)
-    still, count = two_balls([APART]), 60
-    path = BodyPath(lambda _: still.keyframes[0].copy(), still.faces, count, 1.0 / 30.0)
-    body, time = YieldingBody(path, SKIN, everywhere(still)), 0.0
+    balls, count = two_balls([APART]), 60
+    way = np.array([speed, 0.0, 0.0])
+    path = BodyPath(lambda time: balls.keyframes[0] + time * way, balls.faces, count, 1.0 / 30.0)
+    body, time = YieldingBody(path, SKIN, everywhere(balls)), 0.0
     for frame in range(1, count):
         begin = time
         for steps in (2, 7, 16):  # of each attempt
@@ -107,7 +112,7 @@ def test_each_frame_sinks_once_however_many_steps_and_attempts_lead_to_it(monkey
                 body.path.at(time)
         body.path.at(path.time(frame))
         body.depth(frame)
-    assert len(sunk) == count
+    assert len(sunk) == times
 
 
 @pytest.mark.parametrize("chosen", ["all", "none"])

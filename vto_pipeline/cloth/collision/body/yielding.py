@@ -30,6 +30,7 @@ _UNFOLDINGS, _RINGS = 10, 2  # how often folds that are left are smoothed at mos
 _ROOM = 2.0  # skins between parts of the body that come near each other: one for the cloth on either
 _HEMS = 3.0  # times that where cloth is carried along: a closing groin draws it in by its hem, in several layers
 _REMEMBERED = 3  # frames
+_HELD = 1e-9  # m: a body that moves by less between frames holds its pose
 _ON_A_FRAME = 1e-6  # of the time between frames: steps that end on a frame add up to it but for rounding
 
 
@@ -37,11 +38,13 @@ class _Sunken(NamedTuple):
     """What has become of the skin in a frame.
 
     Args:
-        posed_pairs: Pairs of triangles that meet as the body is posed.
+        posed: The body as it is posed [m], shape (V, 3).
+        posed_pairs: Pairs of its triangles that meet.
         moved: How the skin has moved by sinking [m], shape (V, 3).
         pairs: How many pairs meet then.
     """
 
+    posed: FloatArray
     posed_pairs: int
     moved: FloatArray
     pairs: int
@@ -89,7 +92,8 @@ class YieldingBody:
     def _frame(self, frame: int) -> _Sunken:
         if frame not in self._known:
             mesh = TriangleMesh(self._posed.at(self._posed.time(frame)), self._posed.faces)
-            self._known[frame] = _sink(mesh, self._about, self._room, self._mean)
+            held = [one for one in self._known.values() if np.abs(one.posed - mesh.vertices).max() < _HELD]
+            self._known[frame] = held[0] if held else _sink(mesh, self._about, self._room, self._mean)
             if len(self._known) > _REMEMBERED:
                 self._known.popitem(last=False)
         return self._known[frame]
@@ -149,7 +153,7 @@ def _sink(mesh: TriangleMesh, about: NDArray[np.int64], room: float, mean: csr_m
         now = TriangleMesh(places, mesh.faces)
     if now is not looked_at:
         meeting = self_intersections(now)
-    return _Sunken(len(posed), now.vertices - mesh.vertices, len(meeting))
+    return _Sunken(mesh.vertices, len(posed), now.vertices - mesh.vertices, len(meeting))
 
 
 def _pushed_apart(
