@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from pathlib import Path
 
@@ -134,6 +135,26 @@ def test_walking_on_the_spot_is_said():
     job = Job()
     retarget(clip, mapped(clip), avatar, job=job)
     assert any("on the spot" in text for text in job.warnings)
+
+
+@pytest.mark.parametrize("rate", [10, 30, 240])
+def test_a_leap_is_named_with_its_time_and_size(rate):
+    """Of a root at 1.2 m/s, where frames are lost. A slip of 0.02 m is none, nor is the swing of a leg."""
+    avatar, count = body("female"), 2 * rate
+    times = np.arange(count) / rate
+    poses = np.zeros((count, len(avatar.joints), 3))
+    poses[:, avatar.joint_names.index("left_hip"), 0] = 0.4 * np.sin(2 * np.pi * times)
+    size = 0.5 if rate == 10 else 0.1  # m: in a tenth of a second people get so far
+    for leap in (0.0, 0.02, size):
+        places = np.stack([0.0 * times, 0.0 * times, 1.2 * times], axis=1)
+        places[times >= 1.0 - 1e-9, 0] += leap
+        clip = clip_of(avatar, poses, places, 1 / rate)
+        job = Job()
+        retarget(clip, mapped(clip), avatar, RetargetConfig(hold_feet=False), job)
+        found = [text for text in job.warnings if "leaps" in text]
+        assert len(found) == (leap == size)
+    said = re.fullmatch(r"the motion leaps at 1\.00 s: .* by (\d+) mm from one frame to the next; .*", found[0])
+    assert float(said[1]) == pytest.approx(1e3 * size, rel=0.1)  # the leg swings on meanwhile
 
 
 def test_arms_through_the_body_are_seen():

@@ -29,6 +29,7 @@ PATCHES = np.array([[0, 1, 2], [3, 4, 5]], np.int32)
 AUDIT = (
     *("frames", "frames_crossing_body", "most_body_crossings", "frames_crossing_itself", "frames_body_crossing_itself"),
     *("body_yields_mm", "penetration_mm", "max_stretch", "seconds_per_frame"),
+    *("cpu_seconds_per_frame", "most_cpu_seconds"),
 )
 
 

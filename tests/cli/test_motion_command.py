@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ import pytest
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.io.bodies.avatars import write_avatar
 from vto_pipeline.io.motion.archive import read_avatar_motion
-from vto_pipeline.io.motion.read import read_motion
+from vto_pipeline.io.motion.read import presets, read_motion
 from vto_pipeline.io.motion.tracked.lines import LANDMARKS
 from vto_pipeline.numerics.kinematics import quaternion_matrices, world_transforms
 
@@ -33,6 +34,12 @@ def write_walker(path: Path) -> None:
         text += "End Site\n{\nOFFSET 0 -8 12\n}\n" + "}\n" * 3
     row = " ".join(["0 94 0", *["0 0 0"] * 7])
     path.write_text(f"{text}}}\nMOTION\nFrames: 4\nFrame Time: 0.04\n{row}\n{row}\nnan {row[2:]}\n{row}\n")
+
+
+def test_the_help_names_the_presets_that_there_are(vto):
+    said = " ".join(vto("motion", "--help").out.split())
+    listed = re.search(r"Presets have names: ([a-z_, ]+)\.", said)
+    assert sorted(listed[1].split(", ")) == sorted(presets())
 
 
 def test_a_motion_is_described_and_carried_over(vto):

@@ -7,6 +7,7 @@ from ipc_judge import self_crosses
 
 from vto_pipeline.avatar.model.pose import named_pose, pose_avatar
 from vto_pipeline.avatar.template.template import template
+from vto_pipeline.cloth.collision.body import yielding
 from vto_pipeline.cloth.collision.body.yielding import YieldingBody, give_way, sunken
 from vto_pipeline.geometry.intersections import self_intersections
 from vto_pipeline.model.body import MovingBody
@@ -78,8 +79,51 @@ def test_on_a_path_there_is_room_for_cloth_that_lies_in_several_layers():
     path = BodyPath(lambda time: near.keyframes[round(time)].copy(), near.faces, 3, 1.0)
     body = YieldingBody(path, SKIN, everywhere(near))
     assert [body.own_crossings(frame) > 0 for frame in range(3)] == [False, False, True]
+    assert not any(body.crosses_itself(frame) for frame in range(3))
     for frame in range(3):
         assert 3.0 * ROOM - 1e-9 < gap_between(body.path.at(path.time(frame))) < 3.0 * ROOM + 0.01
+
+
+@pytest.mark.parametrize(("speed", "times"), [(0.1, 60), (0.0, 1)])
+def test_each_frame_sinks_once_however_many_steps_and_attempts_lead_to_it(monkeypatch, speed, times):
+    """Steps add up to the time of a frame but for rounding: it must not count as one between two others.
+
+    A pose that is held sinks once for all frames.
+    """
+    sunk, sink = [], yielding._sink
+
+    def counted(mesh, *others):
+        sunk.append(mesh)
+        return sink(mesh, *others)
+
+    monkeypatch.setattr(yielding, "_sink", counted)
+    balls, count = two_balls([APART]), 60
+    way = np.array([speed, 0.0, 0.0])
+    path = BodyPath(lambda time: balls.keyframes[0] + time * way, balls.faces, count, 1.0 / 30.0)
+    body, time = YieldingBody(path, SKIN, everywhere(balls)), 0.0
+    for frame in range(1, count):
+        begin = time
+        for steps in (2, 7, 16):  # of each attempt
+            time = begin
+            for _ in range(steps):
+                step = (path.time(frame) - begin) / steps
+                body.path.at(time)
+                time += step
+                body.path.at(time)
+        body.path.at(path.time(frame))
+        body.depth(frame)
+    assert len(sunk) == times
+
+
+@pytest.mark.parametrize("chosen", ["all", "none"])
+def test_what_still_passes_through_itself_is_known_without_asking_again(chosen):
+    """By ipctk: of a seated body whose skin has sunk, or was not to."""
+    person = named_pose(template(0.5), "sitting")
+    about = np.arange(len(person.vertices) if chosen == "all" else 0)
+    path = BodyPath(lambda time: person.vertices if time else template(0.5).vertices, person.faces, 2, 1.0)
+    body = YieldingBody(path, SKIN, about)
+    assert body.own_crossings(1) > 0
+    assert body.crosses_itself(1) == self_crosses(TriangleMesh(body.path.at(1.0), person.faces)) == (chosen == "none")
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])

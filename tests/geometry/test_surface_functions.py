@@ -35,6 +35,20 @@ def test_signed_distance_to_a_sphere_even_with_a_hole():
     assert (wanted < 0).sum() > 50
 
 
+def test_only_the_tree_that_is_asked_for_is_built_and_of_the_surface_as_it_was(monkeypatch):
+    igl = pytest.importorskip("igl")
+    ball, points = shapes.sphere(4), np.array([[0.0, 0.5, 0.0], [0.0, 2.0, 0.0]])
+    vertices = ball.vertices.copy()
+    one, other = (SurfaceDistance(TriangleMesh(vertices, ball.faces)) for _ in range(2))
+    vertices *= 3.0
+    with monkeypatch.context() as without:
+        without.delattr(igl, "FastWindingNumberBVH")
+        assert_allclose(one.nearest(points).distance, [0.5, 1.0], atol=6e-3)  # sagitta
+    with monkeypatch.context() as without:
+        without.delattr(igl, "AABB")
+        assert other.inside(points).tolist() == [True, False]
+
+
 @pytest.mark.parametrize("offset", [0.0, 0.1003, 0.25])
 def test_a_cut_leaves_just_the_area_on_its_side(offset):
     sheet = shapes.grid(10, 10, 0.1)

@@ -78,7 +78,7 @@ def spinning(frames: int):
     return type(moves)(turns, root)
 
 
-@pytest.mark.parametrize("damage", ["nan", "short", "huge"])
+@pytest.mark.parametrize("damage", ["nan", "-1.#IND00", "1.#QNAN", "1.#INF", "-nan(ind)", "short", "huge"])
 def test_lost_frames_are_filled_and_said(tmp_path, damage):
     moves = spinning(9)
     lines = bvh_text(moves).splitlines()
@@ -86,15 +86,23 @@ def test_lost_frames_are_filled_and_said(tmp_path, damage):
     for lost in (first + 3, first + 4):
         words = lines[lost].split()
         lines[lost] = {
-            "nan": " ".join(["nan", *words[1:]]),
             "short": " ".join(words[:20]),
             "huge": " ".join([*words[:-1], "1e30"]),
-        }[damage]
+        }.get(damage, " ".join([damage, *words[1:]]))
     (tmp_path / "a.bvh").write_text("\n".join(lines))
     found, job = read(tmp_path / "a.bvh")
     # straight lines and constant turns are what is put in; the file holds eight digits
     np.testing.assert_allclose(world_places(found.clip), moves.places(), rtol=0, atol=1e-6)
     assert any("2 lost frames" in text for text in job.warnings)
+
+
+def test_what_only_looks_like_a_number_that_is_none_is_named(tmp_path):
+    lines = bvh_text(spinning(9)).splitlines()
+    lines[-2] = " ".join(["1.#", *lines[-2].split()[1:]])
+    (tmp_path / "a.bvh").write_text("\n".join(lines))
+    with pytest.raises(FormatError, match="'1.#' is not a number") as raised:
+        parse_bvh(str(tmp_path / "a.bvh"))
+    assert raised.value.where.endswith(f"line {len(lines) - 1}")
 
 
 def test_a_clip_that_is_mostly_lost_is_refused(tmp_path):

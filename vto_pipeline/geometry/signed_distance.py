@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +29,7 @@ class SurfacePoints:
 
 
 class SurfaceDistance:
-    """Distance queries against one mesh, whose trees are built once.
+    """Distance queries against one mesh, whose trees are built once, when they are first asked for.
 
     Inside is where the generalised winding number is above one half (Barill et al. 2018, "Fast winding numbers for
     soups and clouds"), so that small holes of the mesh do no harm.
@@ -37,14 +39,8 @@ class SurfaceDistance:
     """
 
     def __init__(self, mesh: TriangleMesh) -> None:
-        import igl
-
-        self._vertices = np.ascontiguousarray(mesh.vertices)
-        self._faces = np.ascontiguousarray(mesh.faces, dtype=np.int64)
-        self._tree = igl.AABB()
-        self._tree.init(self._vertices, self._faces)
-        self._winding = igl.FastWindingNumberBVH()
-        self._winding.init(self._vertices, self._faces)
+        self._vertices = np.array(mesh.vertices, order="C")  # a copy: whose arrays are changed meanwhile is not asked
+        self._faces = np.array(mesh.faces, dtype=np.int64, order="C")
 
     def nearest(self, points: FloatArray) -> SurfacePoints:
         """Return the nearest surface points; distances are not negative."""
@@ -59,3 +55,19 @@ class SurfaceDistance:
     def inside(self, points: FloatArray, above: float = 0.5) -> NDArray[np.bool_]:
         """Return whether points are inside, shape (N,): where the winding number is above this."""
         return np.asarray(self._winding.winding_number(np.ascontiguousarray(points)) > above)
+
+    @cached_property
+    def _tree(self) -> Any:
+        import igl
+
+        tree = igl.AABB()
+        tree.init(self._vertices, self._faces)
+        return tree
+
+    @cached_property
+    def _winding(self) -> Any:
+        import igl
+
+        winding = igl.FastWindingNumberBVH()
+        winding.init(self._vertices, self._faces)
+        return winding

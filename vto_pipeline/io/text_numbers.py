@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -9,6 +11,9 @@ import numpy as np
 
 from vto_pipeline.errors import FormatError
 from vto_pipeline.model.arrays import FloatArray
+
+_NOT_FINITE = re.compile(r"[+-]?(1\.#[a-z]+\d*|nan\([a-z]+\))", re.I)
+"""What Windows' C libraries print for numbers that are none, old and new: 1.#QNAN0, -1.#IND00, 1.#INF00, -nan(ind)."""
 
 
 def read_lines(path: Path) -> list[str]:
@@ -24,7 +29,7 @@ def read_lines(path: Path) -> list[str]:
 
 
 def parse_numbers(lines: Sequence[str], line_numbers: Sequence[int], path: Path) -> FloatArray:
-    """All numbers of some lines, in order.
+    """All numbers of some lines, in order; what any C library prints for one that is not finite counts as one.
 
     Args:
         lines: Text, numbers apart by white space.
@@ -41,12 +46,16 @@ def parse_numbers(lines: Sequence[str], line_numbers: Sequence[int], path: Path)
         return np.fromiter(map(float, " ".join(lines).split()), dtype=np.float64)
     except ValueError:
         pass
+    found = []
     for line, number in zip(lines, line_numbers, strict=True):
         for token in line.split():
-            if not _is_number(token):
+            try:
+                found.append(_number(token))
+            except ValueError:
                 hint = "write numbers with a decimal point, not a comma" if "," in token else ""
-                raise FormatError(f"{token[:40]!r} is not a number", where=f"{path}, line {number}", hint=hint)
-    raise FormatError("a token is not a number", where=str(path))
+                problem = f"{token[:40]!r} is not a number"
+                raise FormatError(problem, where=f"{path}, line {number}", hint=hint) from None
+    return np.array(found, dtype=np.float64)
 
 
 def parse_rows(lines: Sequence[str], line_numbers: Sequence[int], path: Path) -> FloatArray:
@@ -67,9 +76,7 @@ def parse_rows(lines: Sequence[str], line_numbers: Sequence[int], path: Path) ->
     return values.reshape(len(lines), counts[0] if counts else 0)
 
 
-def _is_number(token: str) -> bool:
-    try:
-        float(token)
-    except ValueError:
-        return False
-    return True
+def _number(token: str) -> float:
+    if not _NOT_FINITE.fullmatch(token):
+        return float(token)
+    return math.copysign(math.inf if "inf" in token.lower() else math.nan, -1.0 if token.startswith("-") else 1.0)

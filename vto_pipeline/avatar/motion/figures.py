@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
@@ -16,6 +18,21 @@ from vto_pipeline.model.motion import AvatarMotion
 _SPIKE_M_S2, _SPIKE_RATIO, _AROUND_S = 40.0, 8.0, 0.2
 _APART = 2
 """Parts whose joints are farther apart in the skeleton than this never touch where one bends into the next."""
+_LEAP_M = 0.05
+
+
+class Leap(NamedTuple):
+    """A joint that is not where it was going.
+
+    Args:
+        frame: In which.
+        joint: Which.
+        distance: How far it is off its course [m].
+    """
+
+    frame: int
+    joint: int
+    distance: float
 
 
 def plant_drift(places: FloatArray, planted: NDArray[np.bool_]) -> float:
@@ -40,12 +57,38 @@ def spikes(places: FloatArray, frame_time: float) -> int:
         places: Of the joints [m], shape (T, J, 3).
         frame_time: [s].
     """
-    if len(places) < 5:
-        return 0
-    pull = np.linalg.norm(np.diff(places, 2, axis=0), axis=-1) / frame_time**2
+    return int(_jerked(_off_course(places), frame_time).any(axis=1).sum())
+
+
+def worst_leap(places: FloatArray, frame_time: float) -> Leap | None:
+    """Return where a joint is jerked the farthest off its course; None where that is nowhere by more than 50 mm.
+
+    Args:
+        places: Of the joints [m], shape (T, J, 3).
+        frame_time: [s].
+    """
+    off = _off_course(places)
+    far = np.where(_jerked(off, frame_time), off, 0.0)
+    if far.max(initial=0.0) < _LEAP_M:
+        return None
+    row, joint = np.unravel_index(np.argmax(far), far.shape)
+    return Leap(int(row) + 2, int(joint), float(far[row, joint]))
+
+
+def _off_course(places: FloatArray) -> FloatArray:
+    """Return how far joints are in each frame, from the third, from where their speed led [m], shape (T - 2, J)."""
+    off: FloatArray = np.linalg.norm(np.diff(places, 2, axis=0), axis=-1)
+    return off
+
+
+def _jerked(off: FloatArray, frame_time: float) -> NDArray[np.bool_]:
+    """Return which of these are jerks, shape (T - 2, J); see `spikes`."""
+    if len(off) < 3:
+        return np.zeros(off.shape, np.bool_)
     window = max(5, 2 * round(_AROUND_S / frame_time) + 1)
-    usual = median_filter(pull, (min(window, len(pull)), 1), mode="nearest")
-    return int(((pull > _SPIKE_M_S2) & (pull > _SPIKE_RATIO * usual)).any(axis=1).sum())
+    usual = median_filter(off, (min(window, len(off)), 1), mode="nearest")
+    jerked: NDArray[np.bool_] = (off > _SPIKE_M_S2 * frame_time**2) & (off > _SPIKE_RATIO * usual)
+    return jerked
 
 
 def crossing_frames(motion: AvatarMotion, avatar: Avatar, count: int) -> tuple[int, int]:

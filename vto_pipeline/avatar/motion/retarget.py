@@ -10,7 +10,7 @@ from pydantic import Field
 from vto_pipeline.avatar.motion.align import carry_over
 from vto_pipeline.avatar.motion.arms import Arms, eased
 from vto_pipeline.avatar.motion.balance import Balance, balance
-from vto_pipeline.avatar.motion.figures import plant_drift, spikes
+from vto_pipeline.avatar.motion.figures import plant_drift, spikes, worst_leap
 from vto_pipeline.avatar.motion.foot_skate import hold_feet
 from vto_pipeline.avatar.motion.limits import limit_turns
 from vto_pipeline.avatar.motion.plants import find_plants, runs, speeds
@@ -92,7 +92,7 @@ def retarget(
     turn, place = posed_joints(avatar, poses, root)
     before = contact_places(turn, place, avatar)
     planted = find_plants(before, clip.frame_time)
-    spikes_before = spikes(place, clip.frame_time)
+    spikes_before, leap = spikes(place, clip.frame_time), worst_leap(place, clip.frame_time)
     if config.hold_feet:
         job.progress(0.4, "hold the feet")
         turn, root = hold_feet(turn, place, planted, avatar, clip.frame_time)
@@ -118,6 +118,12 @@ def retarget(
         arms_moved=float(swings.any(axis=(1, 2)).mean()),
     )
     _report(figures, before, place, clip.frame_time, job)
+    if leap is not None:
+        joint = avatar.joint_names[leap.joint].replace("_", " ")
+        job.warn(
+            f"the motion leaps at {leap.frame * clip.frame_time:.2f} s: {joint} by {1e3 * leap.distance:.0f} mm "
+            "from one frame to the next; frames may be missing there"
+        )
     pelvis = avatar.joints[avatar.joint_names.index("pelvis")]
     motion = AvatarMotion(avatar.joint_names, poses, root - pelvis, planted, clip.frame_time)
     if config.lead_in_s:

@@ -36,6 +36,8 @@ _COLUMNS = (
     "inside_mm",
     "stretch",
     "s_per_frame",
+    "cpu_s_per_frame",
+    "cpu_s_most",
 )
 
 
@@ -100,6 +102,8 @@ def run_figures(folder: Path, body: Path) -> dict[str, Value]:
                 "inside_mm": found["penetration_mm"],
                 "stretch": found["max_stretch"],
                 "s_per_frame": found["seconds_per_frame"],
+                "cpu_s_per_frame": found["cpu_seconds_per_frame"],
+                "cpu_s_most": found["most_cpu_seconds"],
             }
     return {}
 

@@ -61,7 +61,7 @@ def follow(
     model = build_cloth(garment.mesh, garment.rest, fabric, materials=config, job=job)
     stepper = FrameStepper(model, garment, path, fabric, config, job)
 
-    def keep(*, steps: int, attempts: int, began: float) -> None:
+    def keep(*, steps: int, attempts: int, began: tuple[float, float]) -> None:
         assert log is not None
         body, state = stepper.body_at(path.time(len(log.frames))), stepper.now.state
         found = audit_frame(
@@ -73,7 +73,8 @@ def follow(
             yields=stepper.body.depth(len(log.frames)),
             steps=steps,
             attempts=attempts,
-            seconds=time.perf_counter() - began,
+            seconds=time.perf_counter() - began[0],
+            cpu_seconds=time.process_time() - began[1],
         )
         log.add(state.positions, asdict(found), stepper.now.arrays())
 
@@ -81,9 +82,9 @@ def follow(
         job.note(f"{len(log.frames)} frames of an interrupted run are kept")
         stepper.now = moment_from(log.state)
     else:
-        keep(steps=0, attempts=0, began=time.perf_counter())
+        keep(steps=0, attempts=0, began=_now())
     while len(log.frames) < path.frames:
-        number, began = len(log.frames), time.perf_counter()
+        number, began = len(log.frames), _now()
         job.progress(number / path.frames, _pace(number, path.frames, log.records))
         reached = stepper.go_to(number)
         if reached.why:
@@ -100,6 +101,11 @@ def follow(
     job.measure(**{name: value for name, value in found.items() if name != "per_frame"})
     _warn(found, job)
     return ClothMotion(np.array(log.frames), model.faces, path.frame_time), found
+
+
+def _now() -> tuple[float, float]:
+    """Return wall and processor time [s]."""
+    return time.perf_counter(), time.process_time()
 
 
 def summary(records: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -119,6 +125,8 @@ def summary(records: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "body_yields_mm": most("yields_mm"),
         "max_stretch": most("max_stretch"),
         "seconds_per_frame": float(np.median([record["seconds"] for record in records])),
+        "cpu_seconds_per_frame": float(np.median([record["cpu_seconds"] for record in records])),
+        "most_cpu_seconds": most("cpu_seconds"),
         "per_frame": [dict(record) for record in records],
     }
 

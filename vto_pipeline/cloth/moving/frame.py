@@ -26,7 +26,7 @@ from vto_pipeline.cloth.moving.path_collider import PathCollider
 from vto_pipeline.cloth.moving.skins import draped_skin, thickened
 from vto_pipeline.cloth.simulation import default_skin
 from vto_pipeline.errors import DivergedError
-from vto_pipeline.geometry.intersections import intersecting_faces, self_intersections
+from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.geometry.topology import laid_edge_lengths
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.fabric import Fabric
@@ -153,7 +153,7 @@ class FrameStepper:
         """
         time = self._path.time(frame)
         begin, body = self.now, self.body_at(time)
-        self._collider.crosses_itself = len(self_intersections(body)) > 0
+        self._collider.crosses_itself = self.body.crosses_itself(frame)
         substeps, skin = self._steps_by_travel(begin, time), begin.skin.copy()
         best: tuple[int, Moment, Reached] | None = None
         why, tried = "", 0

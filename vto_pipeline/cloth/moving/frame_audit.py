@@ -31,6 +31,7 @@ class FrameAudit:
         steps: Of the solver, in the attempt that was kept.
         attempts: How often the frame was tried.
         seconds: Wall time [s].
+        cpu_seconds: Processor time, which other work on the machine does not raise as much [s].
     """
 
     time_s: float
@@ -45,6 +46,7 @@ class FrameAudit:
     steps: int
     attempts: int
     seconds: float
+    cpu_seconds: float
 
 
 def stretch_of_edges(mesh: TriangleMesh, natural: FloatArray) -> FloatArray:
@@ -64,6 +66,7 @@ def audit_frame(
     steps: int,
     attempts: int,
     seconds: float,
+    cpu_seconds: float,
 ) -> FrameAudit:
     """Return how a frame came out.
 
@@ -74,7 +77,7 @@ def audit_frame(
         body: Where that is.
         own_crossings: Of the body as it is posed.
         yields: How far its skin has sunk [m].
-        steps, attempts, seconds: What it took.
+        steps, attempts, seconds, cpu_seconds: What it took.
     """
     mesh = TriangleMesh(state.positions, model.faces)
     nearest = float(SurfaceDistance(body).signed(mesh.vertices).distance.min())
@@ -91,4 +94,5 @@ def audit_frame(
         steps=steps,
         attempts=attempts,
         seconds=seconds,
+        cpu_seconds=cpu_seconds,
     )

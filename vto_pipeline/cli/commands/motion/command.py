@@ -56,7 +56,7 @@ def motion_command(
 
     Reads BVH, glTF and GLB with a skeleton, poses of the SMPL family (.npz), and poses in YAML. Also joints that a
     camera follows, as JSON lines: from a file (.jsonl), or from standard input where FILE is a dash. Presets have
-    names: t_pose, a_pose, arms_down, arms_up, sitting, step, walking_step.
+    names: t_pose, a_pose, arms_down, arms_up, sitting, walking_step.
 
     \b
     vto motion walk.bvh
