@@ -105,7 +105,7 @@ def test_the_likely_cause_is_named() -> None:
         (apart, PERSON.faces, PERSON.vertices, "clothed"),
         (0.4 * apart, PERSON.faces, PERSON.vertices, "unit: in"),
         (
-            np.vstack([PERSON.vertices, PERSON.vertices + [2.0, 0.0, 0.0]]),
+            np.vstack([PERSON.vertices, PERSON.vertices + np.array([2.0, 0.0, 0.0])]),
             np.vstack([PERSON.faces, PERSON.faces + len(PERSON.vertices)]),
             apart,
             "what stands beside",

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from vto_pipeline.avatar.model.pose import named_pose
-from vto_pipeline.avatar.scan.standing import stood_up
+from vto_pipeline.avatar.scan.standing import stood_up, warn_of_several
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.io.meshes import read_mesh
 from vto_pipeline.model.job import Job
@@ -56,6 +56,28 @@ def test_what_is_no_body_stays_as_it_is() -> None:
     job = Job()
     given = TriangleMesh(ball.vertices, ball.faces)
     assert stood_up(given, job) is given
+    assert not job.warnings
+
+
+def test_two_bodies_are_told_and_one_in_pieces_is_not() -> None:
+    count = len(BODY.vertices)
+
+    def beside(shift: list[float]) -> list[str]:
+        job = Job()
+        both = np.vstack([BODY.vertices, BODY.vertices + shift]), np.vstack([BODY.faces, BODY.faces + count])
+        warn_of_several(TriangleMesh(*both), job)
+        return job.warnings
+
+    assert "2 bodies stand beside" in beside([2.5, 0.0, 0.0])[0]
+    assert "2 bodies stand beside" in beside([0.0, 0.0, 1.0])[0]
+    assert not beside([0.01, 0.0, 0.01])  # one layer of skin over another
+    legs = [trimesh.creation.cylinder(0.08, 0.8) for _ in range(2)]
+    trunk = trimesh.creation.cylinder(0.2, 0.9)
+    for part, place in ((trunk, [0, 0, 1.25]), (legs[0], [0.12, 0, 0.4]), (legs[1], [-0.12, 0, 0.4])):
+        part.apply_translation(place)
+    whole = trimesh.util.concatenate([trunk, *legs])
+    job = Job()
+    warn_of_several(TriangleMesh(whole.vertices[:, [0, 2, 1]], whole.faces[:, ::-1]), job)
     assert not job.warnings
 
 

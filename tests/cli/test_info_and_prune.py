@@ -62,8 +62,8 @@ def test_openings_of_a_tube_are_two_circles(vto):
 def test_a_fabric_is_described_in_si(vto):
     Path("poplin.yaml").write_text("name: poplin\nareal_density_gsm: 120\nbending: {warp: 1.1e-5}\n")
     said = vto("info", "poplin.yaml", "--json")
-    assert (said.data["kind"], said.data["areal_density_kg_m2"]) == ("fabric", pytest.approx(0.12))
-    assert said.data["bending_warp_nm"] == pytest.approx(1.1e-5)
+    assert (said.data["kind"], said.data["areal_density_kg_per_m2"]) == ("fabric", pytest.approx(0.12))
+    assert said.data["bending_warp_n_m"] == pytest.approx(1.1e-5)
     assert "thickness" in said.data["assumed"]
     assert "1.1e-05" in vto("info", "poplin.yaml").out  # not 0.000
     assert vto("scan", "poplin.yaml", "--role", "garment").code == 3

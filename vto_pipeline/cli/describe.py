@@ -91,7 +91,7 @@ def _fabric(path: Path, job: Job) -> dict[str, Any]:
 
     fabric = read_fabric(path)
     figures = ("areal_density", "thickness", "stretch_warp", "stretch_weft", "shear", "bending_warp", "bending_weft")
-    units = ("kg_m2", "m", "n_m", "n_m", "n_m", "nm", "nm")
+    units = ("kg_per_m2", "m", *3 * ("n_per_m",), *2 * ("n_m",))
     return {
         "name": fabric.name,
         **{f"{figure}_{unit}": getattr(fabric, figure) for figure, unit in zip(figures, units, strict=True)},

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from vto_pipeline.avatar.model.pose import morph
 from vto_pipeline.avatar.scan.body_transfer import transfer_motion
-from vto_pipeline.avatar.scan.standing import stood_up
+from vto_pipeline.avatar.scan.standing import stood_up, warn_of_several
 from vto_pipeline.cloth.drape import drape
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.placement.regrade import GradeConfig, worn_rest
@@ -42,6 +42,7 @@ def _morph(inputs: Inputs, settings: MorphConfig, job: Job) -> Outputs:
 
 def _mesh_morph(inputs: Inputs, settings: MorphConfig, job: Job) -> Outputs:
     body = stood_up(need_metres(inputs["body_mesh"], "a body"), job)
+    warn_of_several(body, job)
     if "body_avatar" not in inputs:
         job.leave_out("fitting an avatar", "a body mesh was given, and the cloth is draped on it directly")
         return {"collider": MovingBody(body.vertices[np.newaxis], body.faces)}

@@ -1,10 +1,11 @@
-"""A body mesh that others made, with the axis up along which it stands."""
+"""A body mesh that others made: the axis along which it stands, its facing, and whether it is one."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from vto_pipeline.avatar.scan.initial_pose import best_axis
+from vto_pipeline.geometry.topology import face_components
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -13,6 +14,9 @@ _LIKE_A_BODY_M = 0.06
 _SIDEWAYS = np.cos(np.deg2rad(60.0))
 _CLEARLY = 0.97
 """A guess of the facing counts where it is so much better than the one next to +Z; front and back differ by 6 %."""
+
+_AS_TALL = 0.6
+"""A piece so tall, as a share of the whole, is no arm and no leg that was modelled by itself."""
 
 
 def stood_up(body: TriangleMesh, job: Job) -> TriangleMesh:
@@ -40,3 +44,24 @@ def stood_up(body: TriangleMesh, job: Job) -> TriangleMesh:
         return body
     job.note(f"{found.name} of the body mesh is up; it was turned so that +Y is up")
     return TriangleMesh(body.vertices @ found.turn.T, body.faces)
+
+
+def warn_of_several(body: TriangleMesh, job: Job) -> None:
+    """Warn of pieces as tall as bodies that stand beside each other: the garment goes onto the one that fills it best.
+
+    Args:
+        body: In metres, +Y up.
+        job: Warned.
+    """
+    count, piece = face_components(body)
+    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    corners = body.vertices[body.faces]
+    np.minimum.at(low, piece, corners.min(axis=1))
+    np.maximum.at(high, piece, corners.max(axis=1))
+    tall = np.flatnonzero((high - low)[:, 1] > _AS_TALL * np.ptp(body.vertices[:, 1]))
+    apart = (low[tall][:, np.newaxis] > high[tall])[:, :, [0, 2]].any()
+    if apart:
+        job.warn(
+            f"{len(tall)} bodies stand beside each other in the mesh: the garment is put on the one that fills it "
+            "best; remove the others"
+        )
