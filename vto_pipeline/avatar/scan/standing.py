@@ -37,8 +37,8 @@ def stood_up(body: TriangleMesh, job: Job) -> TriangleMesh:
         front = np.array([np.sin(best.yaw), np.cos(best.yaw)])  # along x and z
         axis = int(np.argmax(np.abs(front)))
         job.warn(
-            f"the body faces {'-' if front[axis] < 0.0 else '+'}{'XZ'[axis]}, not +Z as files have it: a garment that "
-            "was not made on it may be put on back to front; turn the body if so"
+            f"the body faces {'-' if front[axis] < 0.0 else '+'}{'XZ'[axis]}, not +Z as files have it. A garment that "
+            "was not made on it may be put on back to front; if so, turn the body"
         )
     if found.name == "+Y":
         return body
