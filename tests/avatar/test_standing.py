@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from vto_pipeline.avatar.model.pose import named_pose
-from vto_pipeline.avatar.scan.standing import stood_up, warn_of_several
+from vto_pipeline.avatar.standing import stood_up, warn_of_several
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.io.meshes import read_mesh
 from vto_pipeline.model.job import Job

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from vto_pipeline.avatar.model.pose import morph
 from vto_pipeline.avatar.scan.body_transfer import transfer_motion
-from vto_pipeline.avatar.scan.standing import stood_up, warn_of_several
+from vto_pipeline.avatar.standing import stood_up, warn_of_several
 from vto_pipeline.cloth.drape import drape
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.placement.regrade import GradeConfig, worn_rest

@@ -2,7 +2,6 @@
 
 upright: unit, axes and orientation of a scan
 initial_pose: where to begin
-standing: a body mesh by others, with the axis up along which it stands
 correspondence, registration: closest points; pose and shape by Gauss-Newton
 tangential_slide, bust_points, displacement, misfit_correlation: the last millimetres
 bind_pose: the result carried back, sound in both poses
