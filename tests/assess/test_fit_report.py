@@ -13,6 +13,7 @@ from vto_pipeline.assess.fit import FitConfig, assess_fit
 from vto_pipeline.errors import ConfigError
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
 
 POPLIN = Fabric("poplin", 0.12, 3e-4, 1500, 1200, 60, 0.2, 1.1e-5, 0.9e-5, 1e-3, 0.3)
 BODY = tube(0.15, 0.15, 0.0, 1.8)
@@ -40,6 +41,25 @@ def test_verdict_follows_the_allowance(ease_m: float, verdict: str) -> None:
 
 def test_cloth_shorter_than_the_body_is_stretched() -> None:
     assert chest(0.01, scale_rest=0.9)["verdict"] == "stretched"
+
+
+@pytest.mark.parametrize(("scale_rest", "verdict"), [(0.6, "stretched"), (0.9, "stretched"), (0.97, "good")])
+def test_cloth_with_a_gap_is_stretched_as_well(scale_rest: float, verdict: str) -> None:
+    """A tube with 6 cm of ease and a gap of 30 degrees, as where sleeves go off: 0.92 m of cloth.
+
+    Less than 6 cm of that may be stretch: 10 % of it is more, 3 % is less.
+    """
+    radius = 0.15 + 0.06 / (2 * np.pi)
+    garment = tube(radius, radius, 0.8, 1.5)
+    middle = garment.vertices[garment.faces].mean(axis=1)
+    gap = np.abs(np.arctan2(middle[:, 0], middle[:, 2])) < np.deg2rad(15)
+    rest = garment.vertices * [scale_rest, 1.0, scale_rest]
+    opened = TriangleMesh(garment.vertices, garment.faces[~gap])
+    found, _ = assess_fit(opened, rest, BODY, {"chest": 1.2}, POPLIN, FitConfig(), Job())
+    zone = next(z for z in found["zones"] if z["zone"] == "chest")
+    assert not zone["closed"]
+    assert_allclose(zone["ease_m"], 0.06, atol=2e-3, rtol=0, err_msg="a chord over the gap is shorter than its arc")
+    assert zone["verdict"] == verdict
 
 
 def test_settings_override_the_table() -> None:

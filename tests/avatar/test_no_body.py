@@ -96,3 +96,21 @@ def test_people_and_their_noise_are_like_a_body() -> None:
     apart = PERSON.vertices * [1.25, 1.0, 1.25]
     with pytest.raises(AvatarError, match="not a body"):
         refuse_shape_of_no_body(TriangleMesh(apart, PERSON.faces), SPACE, PERSON.vertices)
+
+
+def test_the_likely_cause_is_named() -> None:
+    """A woman in inches is read as 0.63 m; two people side by side are broader than anyone's reach."""
+    apart = PERSON.vertices * [1.25, 1.0, 1.25]
+    for vertices, faces, posed, cause in (
+        (apart, PERSON.faces, PERSON.vertices, "clothed"),
+        (0.4 * apart, PERSON.faces, PERSON.vertices, "unit: in"),
+        (
+            np.vstack([PERSON.vertices, PERSON.vertices + np.array([2.0, 0.0, 0.0])]),
+            np.vstack([PERSON.faces, PERSON.faces + len(PERSON.vertices)]),
+            apart,
+            "what stands beside",
+        ),
+    ):
+        with pytest.raises(AvatarError, match="not a body") as refused:
+            refuse_shape_of_no_body(TriangleMesh(vertices, faces), SPACE, posed)
+        assert cause in refused.value.hint

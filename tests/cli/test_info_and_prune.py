@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 import trimesh
 
@@ -29,13 +31,42 @@ def test_a_mesh_is_described_in_metres(vto):
 
 def test_every_kind_that_may_be_given_has_a_description(vto):
     assert DESCRIPTIONS.keys() == {
-        "photos", "video", "depth", "cloud", "surface", "silhouettes", "measurements", "avatar", "pattern"
+        "photos", "video", "depth", "cloud", "surface", "silhouettes", "measurements", "fabric", "avatar", "pattern"
     }  # fmt: skip
-    Path("tape.yaml").write_text("unit: cm\nsex: female\nmeasurements: {chest_girth: 96, stature: 170}\n")
+    Path("tape.yaml").write_text("unit: cm\nsex: female\nmeasurements: {chest_girth: 96, stature: 170, mass: 65}\n")
     said = vto("info", "tape.yaml", "--json")
     assert said.data["chest_girth_m"] == pytest.approx(0.96)
+    assert said.data["mass_kg"] == 65
+    Path("letter.yaml").write_text("sex: male\nsize: M\n")
+    assert vto("info", "letter.yaml", "--json").data["kind"] == "measurements"
     assert vto("info", "nothing.ply").code == 3
     assert vto("info", "toy.yaml").code == 3
+
+
+def test_openings_of_a_tube_are_two_circles(vto):
+    tube = trimesh.creation.cylinder(radius=0.2, height=0.9, sections=400)
+    tube.update_faces(abs(tube.face_normals[:, 2]) < 0.5)  # without its lids
+    tube.export("tube.ply")
+    said = vto("info", "tube.ply", "--json")
+    assert said.data["openings"] == 2
+    assert said.data["longest_openings_m"] == pytest.approx([2 * math.pi * 0.2] * 2, rel=1e-3)  # of 400 chords
+    assert "1.257, 1.257" in vto("info", "tube.ply").out
+    leaves = np.array([[0, 0, 0], [0, 1, 0], [0.3, 0, 0], [-0.3, 0, 0], [0, 0, 0.3]])
+    trimesh.Trimesh(leaves, [[0, 1, 2], [0, 1, 3], [0, 1, 4]], process=False).export("book.ply")
+    said = vto("info", "book.ply", "--json")  # one edge of three faces: no loops, and no refusal
+    assert said.code == 0
+    assert "openings" not in said.data
+    assert any("openings not counted" in note for note in said.data["notes"])
+
+
+def test_a_fabric_is_described_in_si(vto):
+    Path("poplin.yaml").write_text("name: poplin\nareal_density_gsm: 120\nbending: {warp: 1.1e-5}\n")
+    said = vto("info", "poplin.yaml", "--json")
+    assert (said.data["kind"], said.data["areal_density_kg_per_m2"]) == ("fabric", pytest.approx(0.12))
+    assert said.data["bending_warp_n_m"] == pytest.approx(1.1e-5)
+    assert "thickness" in said.data["assumed"]
+    assert "1.1e-05" in vto("info", "poplin.yaml").out  # not 0.000
+    assert vto("scan", "poplin.yaml", "--role", "garment").code == 3
 
 
 def test_a_run_is_described_by_its_record(vto):

@@ -69,6 +69,8 @@ def test_measurements_come_back_exactly(tmp_path: Path) -> None:
         ("75", "7500", "measurements.mass: 7500 kg is not plausible; expected 10.0 to 400.0 kg", 7, ""),
         ("sigmas", "sigma", "sigma: unknown key", 8, "did you mean sigmas?"),
         ("{waist_girth", "{waist", "sigmas.waist: unknown measurement", 8, "waist_girth?"),
+        ("stature", "height", "measurements.height: unknown measurement (got 178.0)", 4, "did you mean stature?"),
+        ("mass", "Weight", "measurements.Weight: unknown measurement (got 75.0)", 7, "did you mean mass?"),
         (
             "sigmas:",
             "waist girth: 80\n#",

@@ -53,3 +53,13 @@ def test_the_body_ends_as_the_very_mesh_that_was_given(known: bool) -> None:
     assert_array_equal(collider.keyframes[-1], given.vertices)
     if known:
         assert np.abs(collider.keyframes[0][::-1] - template().vertices).max() < 1e-9
+
+
+def test_a_body_mesh_of_another_axis_is_draped_upright() -> None:
+    """Cloth falls along -Y: on a body with z up it would fall to the body's back."""
+    body = named_pose(template(), "t_pose")
+    lying = TriangleMesh(body.vertices[:, [0, 2, 1]] * [1, -1, 1], body.faces)  # (x, -z, y): z up, front -y
+    job = Job()
+    collider = MORPH.run({"body_mesh": lying}, MORPH.settings(keyframes=4), job)["collider"]
+    assert_array_equal(collider.keyframes[-1], body.vertices)
+    assert any("+Z of the body mesh is up" in note for note in job.notes)

@@ -41,6 +41,17 @@ class Ease:
         """How much longer the cloth is than at rest along this line, as a share."""
         return self.cloth_length / self.rest_length - 1.0
 
+    @property
+    def pulled(self) -> bool:
+        """Whether the garment gets around the body only by being stretched.
+
+        Where it goes all the way around, its cloth at rest is shorter than the body. Where it is open, or an arm goes
+        off, its girth bridges a gap: without its stretch it is shorter than the body.
+        """
+        if self.closed:
+            return self.rest_length < self.body_girth
+        return self.garment_girth - (self.cloth_length - self.rest_length) < self.body_girth
+
 
 def ease_at(
     garment: TriangleMesh,

@@ -134,7 +134,7 @@ def _zone(name: str, measured: Ease, allowance: Allowance | None) -> dict[str, A
 
 
 def _judge(measured: Ease, allowance: Allowance | None) -> str:
-    if measured.closed and measured.rest_length < measured.body_girth:
+    if measured.pulled:
         return "stretched"  # no way around this body without pulling the cloth
     if allowance is None:
         return "no allowance known"

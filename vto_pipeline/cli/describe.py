@@ -2,18 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from vto_pipeline.errors import InputError
 from vto_pipeline.model.job import Job
+
+_OPENINGS = 8
+"""Of so many openings the lengths are listed: a garment has a handful, a scan's holes are hundreds."""
 
 
 def _surface(path: Path, job: Job) -> dict[str, Any]:
+    from vto_pipeline.geometry.remeshing.rims import perimeter
+    from vto_pipeline.geometry.topology import boundary_loops
     from vto_pipeline.io.meshes import read_mesh
     from vto_pipeline.report.facts import surface_facts
 
-    return surface_facts(read_mesh(path, job=job))
+    mesh = read_mesh(path, job=job)
+    facts = surface_facts(mesh)
+    if facts["closed"]:
+        return facts
+    try:
+        girths = sorted((perimeter(mesh, loop) for loop in boundary_loops(mesh)), reverse=True)
+    except InputError as e:  # edges of three faces: what the openings are is not told by such a mesh
+        job.note(f"{path.name}: openings not counted: {e.problem}")
+        return facts
+    return {**facts, "openings": len(girths), "longest_openings_m": girths[:_OPENINGS]}
 
 
 def _cloud(path: Path, job: Job) -> dict[str, Any]:
@@ -57,14 +72,32 @@ def _avatar(path: Path, job: Job) -> dict[str, Any]:
 
     avatar = receive_avatar(path)
     measured = measure(avatar).values
-    return {"vertices": len(avatar.vertices), **{f"{key}_m": value for key, value in measured.items() if key != "mass"}}
+    return {"vertices": len(avatar.vertices), **_in_si(measured)}
 
 
 def _measurements(path: Path, job: Job) -> dict[str, Any]:
     from vto_pipeline.io.bodies.measurements import read_measurements
 
     read = read_measurements(path)
-    return {"sex": read.sex, **{f"{key}_m": value for key, value in read.values.items() if key != "mass"}}
+    return {"sex": read.sex, **_in_si(read.values)}
+
+
+def _in_si(values: Mapping[str, float]) -> dict[str, float]:
+    return {f"{key}_kg" if key == "mass" else f"{key}_m": value for key, value in values.items()}
+
+
+def _fabric(path: Path, job: Job) -> dict[str, Any]:
+    from vto_pipeline.io.fabrics import read_fabric
+
+    fabric = read_fabric(path)
+    figures = ("areal_density", "thickness", "stretch_warp", "stretch_weft", "shear", "bending_warp", "bending_weft")
+    units = ("kg_per_m2", "m", *3 * ("n_per_m",), *2 * ("n_m",))
+    return {
+        "name": fabric.name,
+        **{f"{figure}_{unit}": getattr(fabric, figure) for figure, unit in zip(figures, units, strict=True)},
+        "friction": fabric.friction,
+        "assumed": ", ".join(fabric.assumed),
+    }
 
 
 def _silhouettes(path: Path, job: Job) -> dict[str, Any]:
@@ -105,6 +138,7 @@ DESCRIPTIONS: dict[str, Callable[[Path, Job], dict[str, Any]]] = {
     "depth": _depth,
     "avatar": _avatar,
     "measurements": _measurements,
+    "fabric": _fabric,
     "silhouettes": _silhouettes,
     "video": _video,
     "pattern": _pattern,

@@ -17,8 +17,10 @@ from vto_pipeline.io.patterns.read import is_pattern
 
 _WANTED = (
     "a folder of photos, of depth frames, of front and side pictures, or of MakeHuman; a video, a point cloud, a mesh, "
-    "a body model, a measurements file, a sewing pattern, or an avatar"
+    "a body model, a measurements file, a fabric file, a sewing pattern, or an avatar"
 )
+_TOLD_BY = {"measurements": "measurements", "size": "measurements", "areal_density_gsm": "fabric"}
+"""Key of a document -> what such a document holds."""
 
 
 def find_kind(path: Path) -> tuple[str, str]:
@@ -28,8 +30,8 @@ def find_kind(path: Path) -> tuple[str, str]:
         path: File or folder.
 
     Returns:
-        "photos", "video", "depth", "cloud", "surface", "silhouettes", "measurements", "avatar" or "pattern", and the
-        reason.
+        "photos", "video", "depth", "cloud", "surface", "silhouettes", "measurements", "fabric", "avatar" or "pattern",
+        and the reason.
 
     Raises:
         InputError: nothing there, or nothing known.
@@ -75,11 +77,8 @@ def _file(path: Path) -> tuple[str, str] | None:
         return "pattern", "it holds panels"
     if suffix in (".yaml", ".yml", ".json"):
         data = load_yaml(path, error=InputError).data
-        return (
-            ("measurements", "it has the key measurements")
-            if isinstance(data, dict) and "measurements" in data
-            else None
-        )
+        told = [key for key in _TOLD_BY if isinstance(data, dict) and key in data]
+        return (_TOLD_BY[told[0]], f"it has the key {told[0]}") if told else None
     if suffix == ".ply":
         return _ply(path)
     if suffix in video.SUFFIXES:

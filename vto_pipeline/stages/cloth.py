@@ -10,6 +10,7 @@ from pydantic import Field
 
 from vto_pipeline.avatar.model.pose import morph
 from vto_pipeline.avatar.scan.body_transfer import transfer_motion
+from vto_pipeline.avatar.standing import stood_up, warn_of_several
 from vto_pipeline.cloth.drape import drape
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.placement.regrade import GradeConfig, worn_rest
@@ -40,7 +41,8 @@ def _morph(inputs: Inputs, settings: MorphConfig, job: Job) -> Outputs:
 
 
 def _mesh_morph(inputs: Inputs, settings: MorphConfig, job: Job) -> Outputs:
-    body = need_metres(inputs["body_mesh"], "a body")
+    body = stood_up(need_metres(inputs["body_mesh"], "a body"), job)
+    warn_of_several(body, job)
     if "body_avatar" not in inputs:
         job.leave_out("fitting an avatar", "a body mesh was given, and the cloth is draped on it directly")
         return {"collider": MovingBody(body.vertices[np.newaxis], body.faces)}
@@ -73,7 +75,7 @@ STAGES: tuple[Stage, ...] = (
     ),
     Stage(
         name="mesh.morph",
-        about="the body mesh as given; the source body, if known, morphs into it",
+        about="the body mesh as given, +Y up; the source body, if known, morphs into it",
         needs=("body_mesh",),
         optional=("source_avatar", "body_avatar"),
         makes=("collider",),

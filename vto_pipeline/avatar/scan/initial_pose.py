@@ -48,6 +48,25 @@ class InitialPose:
     score: float
 
 
+@dataclass(frozen=True)
+class Upright:
+    """A scan along the axis that explains it best.
+
+    Args:
+        name: The file's axis that is up, such as "+Z".
+        turn: What makes that axis +Y, shape (3, 3).
+        inside_out: Whether its faces were flipped.
+        stands: The scan, +Y up, without floor.
+        guesses: The best guess for each facing, best first.
+    """
+
+    name: str
+    turn: FloatArray
+    inside_out: bool
+    stands: TriangleMesh
+    guesses: list[InitialPose]
+
+
 def upright_initial_poses(scan: TriangleMesh, job: Job) -> tuple[TriangleMesh, list[InitialPose]]:
     """Return the scan with +Y up, facing outwards and without floor, and the guesses for it, best first.
 
@@ -57,7 +76,24 @@ def upright_initial_poses(scan: TriangleMesh, job: Job) -> tuple[TriangleMesh, l
         scan: In metres.
         job: Notified of a turn.
     """
-    best: tuple[float, str, bool, TriangleMesh, list[InitialPose]] | None = None
+    found = best_axis(scan)
+    if found is None:
+        raise AvatarError("the scan is not as tall as a body or a dress form in any direction", hint="check the unit")
+    if len(found.stands.faces) < len(scan.faces):
+        job.note("cut off a floor that was joined to the feet")
+    if found.name != "+Y":
+        job.note(f"{found.name} of the scan is up; the avatar is rotated so that +Y is up")
+    if found.inside_out:
+        job.note("the scan was inside out; its faces were flipped")
+    return found.stands, found.guesses
+
+
+def best_axis(scan: TriangleMesh) -> Upright | None:
+    """Return a scan, in metres, with the axis up that explains it best, or None where it is tall along none.
+
+    The file's own +Y is kept unless another axis explains the scan clearly better.
+    """
+    best: tuple[float, Upright] | None = None
     for name, turn in candidate_up_rotations(scan).items():
         stands = without_floor(TriangleMesh(scan.vertices @ turn.T, scan.faces))
         if over := inside_out(stands):
@@ -65,19 +101,10 @@ def upright_initial_poses(scan: TriangleMesh, job: Job) -> tuple[TriangleMesh, l
         guesses = initial_poses(stands)
         score = guesses[0].score * (1.0 if name == "+Y" else _OTHER_AXIS)
         if best is None or score < best[0]:
-            best = (score, name, over, stands, guesses)
+            best = (score, Upright(name, turn, over, stands, guesses))
         if name == "+Y" and score < _SURE_M:
             break
-    if best is None:
-        raise AvatarError("the scan is not as tall as a body or a dress form in any direction", hint="check the unit")
-    _, name, over, stands, guesses = best
-    if len(stands.faces) < len(scan.faces):
-        job.note("cut off a floor that was joined to the feet")
-    if name != "+Y":
-        job.note(f"{name} of the scan is up; the avatar is rotated so that +Y is up")
-    if over:
-        job.note("the scan was inside out; its faces were flipped")
-    return stands, guesses
+    return None if best is None else best[1]
 
 
 def initial_poses(scan: TriangleMesh) -> list[InitialPose]:

@@ -29,6 +29,8 @@ _TRUNK = 0.8
 _MIN_TRUNK, _MIN_LIMB = 0.3, 0.5
 _LIKE_A_BODY = 2 / 3
 """So much of a person lies near the model's body: of people 94 % and more, of a dress form on its stand 89 %."""
+_STANDS_M, _REACH = 0.75, 1.2
+"""Children who stand are taller than that [m]; no one's arms reach that many times their stature."""
 _ENDS = ("head", "wrist", "ankle")
 """Joints of a person's ends: the head, the hands and the feet."""
 _NO_END, _CROTCH_M = 0.05, 0.03
@@ -91,8 +93,18 @@ def refuse_shape_of_no_body(scan: TriangleMesh, space: ShapeSpace, posed: FloatA
         raise AvatarError(
             f"this is not a body: no build and pose comes near its shape. Within {1e3 * EXPLAINED_M:.0f} mm of the "
             f"nearest one lies {share:.0%} of it (at least {_LIKE_A_BODY:.0%})",
-            hint="set clothed: true when the person wears loose clothes",
+            hint=_likely_cause(scan),
         )
+
+
+def _likely_cause(scan: TriangleMesh) -> str:
+    """Say why the model comes nowhere near a scan that stands along +Y: its unit, what is beside it, or clothes."""
+    across, height, deep = np.ptp(scan.vertices, axis=0)
+    if height < _STANDS_M:
+        return f"as read it is {height:.2f} m tall; if its unit is another, say so: {{file: ..., unit: in}}"
+    if max(across, deep) > _REACH * height:
+        return f"it is {max(across, deep):.2f} m wide and {height:.2f} m tall; remove what stands beside the body"
+    return "set clothed: true when the person wears loose clothes"
 
 
 def refuse_garment(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray) -> None:

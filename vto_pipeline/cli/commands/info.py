@@ -10,6 +10,10 @@ import click
 from vto_pipeline.cli.options import PATH, message_options
 from vto_pipeline.cli.session import Session, pass_session
 
+_SIDES = ("size_m", "pixels")
+_SMALL = 0.01
+"""Below it three digits are told, not three places: a fabric's bending rigidity is some 1e-5 N·m."""
+
 
 @click.command("info")
 @click.argument("path", metavar="PATH", type=PATH)
@@ -49,12 +53,14 @@ def info_command(session: Session, path: Path) -> None:
     job = Job()
     facts = DESCRIPTIONS[kind](path, job)
     data = {"path": str(path), "kind": kind, "because": reason, **facts, "notes": job.notes, "warnings": job.warnings}
-    rows = [(key.replace("_", " "), _text(value)) for key, value in facts.items()]
+    rows = [(key.replace("_", " "), _text(key, value)) for key, value in facts.items()]
     lines = [f"{path}: {kind}, because {reason}", *table_lines(("", ""), rows)[2:]]
     session.answer(data, [*lines, *job.notes, *(f"warning: {text}" for text in job.warnings)])
 
 
-def _text(value: Any) -> str:
+def _text(key: str, value: Any) -> str:
     if isinstance(value, list):
-        return " x ".join(_text(item) for item in value)
-    return f"{value:.3f}" if isinstance(value, float) else str(value)
+        return (" x " if key in _SIDES else ", ").join(_text(key, item) for item in value)
+    if isinstance(value, float):
+        return f"{value:.3f}" if abs(value) >= _SMALL or value == 0.0 else f"{value:.3g}"
+    return str(value)

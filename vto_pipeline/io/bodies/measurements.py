@@ -45,7 +45,29 @@ _TITLES = {
     "back_neck_point_to_wrist_length": "back_neck_to_wrist",
     "across_back_shoulder_width_through_the_back_neck_point": "across_back_shoulder_width",
     "inside_leg_length": "inside_leg",
+    "inside_leg_height": "inside_leg",
     "body_mass": "mass",
+}
+
+# words of everyday, for the hint alone: what a tailor calls waist is not always the waist of ISO 8559-1
+_EVERYDAY = {
+    "height": "stature",
+    "body_height": "stature",
+    "weight": "mass",
+    "bust": "bust_girth",
+    "chest": "chest_girth",
+    "waist": "waist_girth",
+    "hip": "hip_girth",
+    "hips": "hip_girth",
+    "seat": "hip_girth",
+    "neck": "neck_girth",
+    "head": "head_girth",
+    "thigh": "thigh_girth",
+    "inseam": "inside_leg",
+    "sleeve": "back_neck_to_wrist",
+    "sleeve_length": "back_neck_to_wrist",
+    "arm_length": "outer_arm_length",
+    "shoulder_width": "back_shoulder_width",
 }
 
 _RANGES = {"mass": (10.0, 400.0), "stature": (0.5, 2.6)}  # kg, m
@@ -89,7 +111,8 @@ def read_measurements(source: Path | Mapping[str, Any]) -> Measurements:
         for name in getattr(stored, section):
             if _snake(name) not in MEASUREMENT_NAMES:
                 problem = f"{section}.{name}: unknown measurement (got {getattr(stored, section)[name]})"
-                hint = suggest(name, MEASUREMENT_NAMES)
+                meant = _EVERYDAY.get(_snake(name))
+                hint = f"did you mean {meant}?" if meant else suggest(_snake(name), MEASUREMENT_NAMES)
                 raise InputError(problem, where=document.where((section, name)), hint=hint)
 
     def to_si(values: Mapping[str, float]) -> dict[str, float]:

@@ -1,0 +1,93 @@
+"""A body mesh by others stands along +Y whatever its file calls up, and a facing other than +Z is told."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+
+from vto_pipeline.avatar.model.pose import named_pose
+from vto_pipeline.avatar.standing import stood_up, warn_of_several
+from vto_pipeline.avatar.template.template import template
+from vto_pipeline.io.meshes import read_mesh
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+
+BODIES = Path("/work/shared/data/bodies")
+POSED = named_pose(template(), "t_pose")
+BODY = TriangleMesh(POSED.vertices, POSED.faces)
+
+
+def turned(body: TriangleMesh, axis: str, degrees: float) -> TriangleMesh:
+    turn = Rotation.from_euler(axis, degrees, degrees=True)
+    return TriangleMesh(turn.apply(body.vertices.copy()), body.faces)
+
+
+@pytest.mark.parametrize(("axis", "degrees", "up"), [("x", 90, "+Z"), ("x", -90, "-Z"), ("x", 180, "-Y")])
+def test_the_body_is_turned_back(axis: str, degrees: float, up: str) -> None:
+    job = Job()
+    stands = stood_up(turned(BODY, axis, degrees), job)
+    assert_allclose(stands.vertices, BODY.vertices, rtol=0, atol=1e-12)  # a quarter turn and its inverse: rounding
+    assert any(note.startswith(up) for note in job.notes)
+    assert not job.warnings
+
+
+def test_what_stands_stays_as_it_is() -> None:
+    job = Job()
+    assert stood_up(BODY, job) is BODY
+    slightly = turned(BODY, "y", 30)
+    assert stood_up(slightly, job) is slightly
+    assert not job.notes
+    assert not job.warnings
+
+
+@pytest.mark.parametrize(("degrees", "front"), [(180, "-Z"), (90, "+X"), (-90, "-X")])
+def test_another_facing_is_told_and_kept(degrees: float, front: str) -> None:
+    job = Job()
+    away = turned(BODY, "y", degrees)
+    assert stood_up(away, job) is away
+    assert any(f"the body faces {front}" in warning for warning in job.warnings)
+
+
+def test_what_is_no_body_stays_as_it_is() -> None:
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.9)
+    job = Job()
+    given = TriangleMesh(ball.vertices, ball.faces)
+    assert stood_up(given, job) is given
+    assert not job.warnings
+
+
+def test_two_bodies_are_told_and_one_in_pieces_is_not() -> None:
+    count = len(BODY.vertices)
+
+    def beside(shift: list[float]) -> list[str]:
+        job = Job()
+        both = np.vstack([BODY.vertices, BODY.vertices + shift]), np.vstack([BODY.faces, BODY.faces + count])
+        warn_of_several(TriangleMesh(*both), job)
+        return job.warnings
+
+    assert "2 bodies stand beside" in beside([2.5, 0.0, 0.0])[0]
+    assert "2 bodies stand beside" in beside([0.0, 0.0, 1.0])[0]
+    assert not beside([0.01, 0.0, 0.01])  # one layer of skin over another
+    legs = [trimesh.creation.cylinder(0.08, 0.8) for _ in range(2)]
+    trunk = trimesh.creation.cylinder(0.2, 0.9)
+    for part, place in ((trunk, [0, 0, 1.25]), (legs[0], [0.12, 0, 0.4]), (legs[1], [-0.12, 0, 0.4])):
+        part.apply_translation(place)
+    whole = trimesh.util.concatenate([trunk, *legs])
+    job = Job()
+    warn_of_several(TriangleMesh(whole.vertices[:, [0, 2, 1]], whole.faces[:, ::-1]), job)
+    assert not job.warnings
+
+
+@pytest.mark.real_data
+@pytest.mark.skipif(not BODIES.exists(), reason="bodies by others are not here")
+@pytest.mark.parametrize("name", ["female_averageweight", "female_maxweight", "male_averageweight"])
+def test_bodies_by_others_are_told_front_from_back(name: str) -> None:
+    body = read_mesh(BODIES / f"mh_{name}.ply")
+    job = Job()
+    assert stood_up(body, job) is body
+    assert not job.warnings
+    stood_up(turned(body, "y", 180), job)
+    assert "the body faces -Z" in job.warnings[0]
