@@ -9,12 +9,14 @@ from figures import figure, tunic
 from numpy.testing import assert_allclose
 
 from vto_pipeline.avatar.from_measurements import fit_measurements
+from vto_pipeline.cloth.placement.body_growth import Thinning
 from vto_pipeline.cloth.placement.orientation import as_files_have_it
 from vto_pipeline.cloth.placement.place import PlaceConfig, find_placement
 from vto_pipeline.cloth.placement.voxel_fit import BodyCubes, quarter_turns
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.remeshing.remesh import RemeshConfig, remesh
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.geometry.topology import boundary_loops
 from vto_pipeline.io.meshes import read_mesh
 from vto_pipeline.model.body import Measurements
 from vto_pipeline.model.job import Job
@@ -24,6 +26,7 @@ DATA = Path(__file__).parents[3] / "shared" / "data"
 FINE = PlaceConfig(cube_mm=10)
 Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 DOWN = np.diag([-1.0, -1.0, 1.0])
+AROUND = np.diag([-1.0, 1.0, -1.0])
 
 
 def spool():
@@ -221,6 +224,28 @@ def test_a_tunic_on_its_head_is_turned_for_its_sleeves():
     lying = TriangleMesh(worn.vertices @ DOWN.T, worn.faces)
     assert_allclose(find_placement(lying, body, FINE, Job()).turn[1], [0.0, -1.0, 0.0], rtol=0, atol=0)
     assert_allclose(find_placement(worn, body, FINE, Job()).turn, np.eye(3), rtol=0, atol=0)
+
+
+def test_a_tunic_back_to_front_is_turned_for_its_neckline():
+    body, level = figure(0.3), tunic(0.3)
+    neck = max(boundary_loops(level), key=lambda loop: level.vertices[loop, 1].mean())
+    x = level.vertices.copy()
+    x[neck, 1] -= np.tan(np.deg2rad(25.0)) * x[neck, 2]
+    assert Thinning(body).neck_lean(TriangleMesh(x, level.faces)) == pytest.approx(np.deg2rad(25.0), abs=0.02)
+    worn, back = TriangleMesh(x, level.faces), TriangleMesh(x @ AROUND.T, level.faces)
+    assert_allclose(find_placement(worn, body, FINE, Job()).turn, np.eye(3), rtol=0, atol=0)
+    assert_allclose(find_placement(back, body, FINE, Job()).turn, AROUND, rtol=0, atol=0)
+
+
+@pytest.mark.real_data
+@pytest.mark.skipif(not DATA.exists(), reason="the data folder is absent")
+@pytest.mark.parametrize("sex", ["female", "male"])
+@pytest.mark.parametrize("name", ["tshirt", "blouse-short", "tank-male", "dress3"])
+def test_real_garments_back_to_front_are_turned_for_their_necklines(name, sex):
+    garment = read_mesh(DATA / "garments" / "berkeley" / name / f"{name}-iso.obj")
+    person = read_mesh(DATA / "bodies" / f"mh_{sex}_averageweight.ply")
+    back = TriangleMesh(garment.vertices @ Z_UP @ AROUND.T, garment.faces)
+    assert_allclose(find_placement(back, person, PlaceConfig(), Job()).turn, AROUND, rtol=0, atol=0)
 
 
 @pytest.mark.real_data

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import pytest
 from numpy.testing import assert_array_equal
 
+import vto_pipeline
 from vto_pipeline import api
 from vto_pipeline.cli.main import main
 from vto_pipeline.errors import ConfigError, InputError
@@ -38,12 +42,22 @@ def test_a_document_may_be_a_mapping_and_settings_a_mapping_too(tmp_path, monkey
         api.run(document, settings={"pose.posse": "t_pose"})
 
 
-def test_what_does_not_go_together_is_refused_before_anything_runs(tmp_path, monkeypatch):
+@pytest.mark.parametrize("package", [api, vto_pipeline])
+def test_what_does_not_go_together_is_refused_before_anything_runs(package, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ConfigError, match="give one of"):
-        api.fit()
+        package.fit()
     with pytest.raises(ConfigError, match="either a body or measurements"):
-        api.drape("shirt.ply")
+        package.drape("shirt.ply")
     with pytest.raises(ConfigError, match="no such role"):
-        api.scan("shirt.ply", "hat")
+        package.scan("shirt.ply", "hat")
+    with pytest.raises(ConfigError, match="no such file"):
+        package.run("absent.yaml")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("first", ["vto_pipeline", "vto_pipeline.scan.similarity"])
+def test_the_package_is_called_for_a_scan_whether_it_was_loaded_or_not(first):
+    asked = f"import {first}, vto_pipeline; print(callable(vto_pipeline.scan), hasattr(vto_pipeline, 'scam'))"
+    found = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
+    assert found.stdout.split() == ["True", "False"]

@@ -12,4 +12,22 @@ normals, surface: a surface through an unorganised cloud
 upright, similarity: which way is up; one set of points mapped on another
 library_message: what COLMAP, OpenCV and Open3D say when they fail
 canonical: one order for what hash tables give in any order
+
+Called, it does what `vto scan` does: package and command share a name.
 """
+
+import sys
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+
+class _Command(ModuleType):
+    """A package that is called as the command of its name."""
+
+    def __call__(self, *args: Any, **settings: Any) -> Any:
+        """See `vto_pipeline.api.scan`."""
+        return import_module("vto_pipeline.api").scan(*args, **settings)
+
+
+sys.modules[__name__].__class__ = _Command

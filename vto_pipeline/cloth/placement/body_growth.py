@@ -290,7 +290,7 @@ class Thinning:
             for number, limb in enumerate(self.limbs.limbs):
                 if above is not None and limb.name.endswith("arm"):
                     count += len(piece.pierced[number]) > 0 or self._over(piece, above, limb).max() > _UNDER_ARMS
-                elif limb.name == "head" and piece.meant.count(piece.meant[number]) == 1 and piece.meant[number] >= 0:
+                elif limb.name == "head" and number in piece.alone():
                     over = self._over(piece, piece.meant[number], limb)
                     count += over.min() > _OVER or over.max() < -_UNDER
         return count
@@ -299,6 +299,15 @@ class Thinning:
         """Return whether a garment hangs about the trunk as a tube, and may slide: trousers and sleeves hold others."""
         pieces = pieces_with_limbs(garment, self.limbs, self.after(_LINES))
         return all(self._hangs_from(piece) is not None and len(set(piece.meant)) == 2 for piece in pieces)
+
+    def neck_lean(self, garment: TriangleMesh) -> float | None:
+        """Return how far forward, +z, the plane of an opening for the head alone leans [rad]; None where none is."""
+        head = next((number for number, limb in enumerate(self.limbs.limbs) if limb.name == "head"), -1)
+        for piece in pieces_with_limbs(garment, self.limbs, self.after(_LINES)):
+            if head in piece.alone():
+                _, up, ahead = piece.area_vector(piece.meant[head])
+                return float(np.arctan2(ahead, up))
+        return None
 
     def tells_too_small(self, garment: TriangleMesh) -> bool:
         """Return whether a garment that a person fills better when larger may be too small to be worn where it is."""

@@ -24,6 +24,7 @@ _COARSE = 2.0  # times the cube: enough to tell which ways up are worth a second
 _TELLING = 1.5  # times the cube: enough to tell them apart
 _CLOSE = 0.9  # of the best coarse score: these are looked at again with fine cubes
 _FEW = 4000  # triangles: enough to tell where limbs go
+_LEANS_BACK = np.deg2rad(10.0)  # of a neckline: by so much none does in front
 _LIMBS_TELL = 2  # fewer limbs astray: one is, of many a garment that is worn as it should be
 
 
@@ -96,6 +97,31 @@ def other_way_up(
         if way.score >= turned_well * best.score and limbs_astray(way.placed(few)) <= before - _LIMBS_TELL:
             return way
     return None
+
+
+def other_way_round(
+    garment: TriangleMesh,
+    body: BodyCubes,
+    best: VoxelPlacement,
+    neck_lean: Callable[[TriangleMesh], float | None],
+    turned_well: float,
+) -> VoxelPlacement | None:
+    """Return the best place the other way round, where the neck tells that it is worn so; None where it does not.
+
+    Necklines are lower in front: their planes lean forward by 2 to 50 degrees, half of them by 23 and more.
+
+    Args:
+        garment: In metres.
+        body: Where it shall go.
+        best: Its best place.
+        neck_lean: How far the neck of a garment there leans forward [rad]; None where it has none.
+        turned_well: Share of the best score that another way needs.
+    """
+    lean = neck_lean(best.placed(_of_few_triangles(garment)))
+    if lean is None or lean > -_LEANS_BACK:
+        return None
+    way = body.fit(garment).best_placement(np.diag([-1.0, 1.0, -1.0]) @ best.turn)
+    return way if way.score >= turned_well * best.score else None
 
 
 def fits_when_larger(garment: TriangleMesh, body: BodyCubes) -> Iterator[VoxelFit]:

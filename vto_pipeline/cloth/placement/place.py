@@ -18,6 +18,7 @@ from vto_pipeline.cloth.placement.orientation import (
     best_orientation,
     fits_when_larger,
     larger,
+    other_way_round,
     other_way_up,
     promising_orientations,
 )
@@ -133,9 +134,11 @@ def find_placement(
         )
     best = best_orientation(metres, cubes, ways, config.turned_well)
     thinning = Thinning(body)
-    turned = other_way_up(metres, cubes, best, thinning.limbs_astray, config.turned_well)
-    if turned is not None:
+    if (turned := other_way_up(metres, cubes, best, thinning.limbs_astray, config.turned_well)) is not None:
         job.note("garment turned the other way up: more limbs are where its openings are then")
+        best = turned
+    if (turned := other_way_round(metres, cubes, best, thinning.neck_lean, config.turned_well)) is not None:
+        job.note("garment turned the other way round: its neck is lower in front then")
         best = turned
     if (best.turn == stands.turn).all():
         best, gain = stands, fullest.score / max(stands.score, 1e-9) - 1.0

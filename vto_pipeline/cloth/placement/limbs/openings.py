@@ -47,7 +47,7 @@ class Piece(NamedTuple):
 
     def astray(self) -> list[int]:
         """Return the limbs that go through cloth, or not through the opening that is there for them alone."""
-        alone = self._alone()
+        alone = self.alone()
         return [
             limb
             for limb, (meant, through) in enumerate(zip(self.meant, self.through, strict=True))
@@ -56,12 +56,19 @@ class Piece(NamedTuple):
 
     def misplaced(self) -> set[int]:
         """Return the limbs that are astray, or never come to the opening that is there for them alone."""
-        idle = {limb for limb in self._alone() if self.meant[limb] not in self.through[limb]}
+        idle = {limb for limb in self.alone() if self.meant[limb] not in self.through[limb]}
         return idle | set(self.astray())
 
-    def _alone(self) -> set[int]:
+    def alone(self) -> set[int]:
         """Return the limbs that have an opening to themselves."""
         return {limb for limb, opening in enumerate(self.meant) if opening >= 0 and self.meant.count(opening) == 1}
+
+    def area_vector(self, opening: int) -> FloatArray:
+        """Return the area that an opening encloses along each axis [m²], shape (3,), from the side that is up."""
+        rim = self.mesh.vertices[self.openings[opening]]
+        rim = rim - rim.mean(axis=0)
+        area = 0.5 * np.cross(rim, np.roll(rim, -1, axis=0)).sum(axis=0)
+        return np.asarray(area if area[1] >= 0.0 else -area)
 
     def steepness(self, opening: int, reach: float) -> float:
         """Return the mean sine of the slope of cloth about an opening, by area: 1 is upright, 0 level.
