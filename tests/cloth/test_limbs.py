@@ -5,13 +5,16 @@ import pytest
 from cloth_scenes import moved, tube
 from figures import ARM, SHOULDER, arm_end, figure, tunic
 from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
 
+from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.cloth.placement.body_growth import Thinning, _least_faulty, plan_body_growth
 from vto_pipeline.cloth.placement.limbs.limbs import Limbs
 from vto_pipeline.cloth.placement.limbs.openings import pieces_with_limbs
 from vto_pipeline.errors import IntersectingError
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import boundary_loops
+from vto_pipeline.model.body import Measurements
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -134,3 +137,13 @@ def test_how_steep_cloth_is_about_an_opening(slope):
     assert_allclose(piece.steepness(high, 0.15), np.sin(slope), rtol=0.01)  # 48 corners for a circle
     assert_allclose(piece.steepness(low, 0.15), np.sin(0.5), rtol=0.01)
     assert piece.steepness(high, 0.0) == 0.0
+
+
+@pytest.mark.parametrize("degrees", [0.0, 40.0, 180.0, -90.0])
+def test_feet_tell_where_a_body_faces(degrees):
+    """The avatar faces +Z; so it is known after any turn. The figure has no feet."""
+    avatar = fit_measurements(Measurements({"stature": 1.7, "chest_girth": 0.9, "hip_girth": 0.95}, sex="male")).mesh
+    turn = Rotation.from_euler("y", degrees, degrees=True).as_matrix()
+    ahead = Limbs(TriangleMesh(avatar.vertices @ turn.T, avatar.faces)).ahead
+    assert_allclose(ahead, turn[:, 2], rtol=0, atol=0.05)
+    assert_allclose(Limbs(figure(0.3)).ahead, [0.0, 0.0, 1.0], rtol=0, atol=0)

@@ -246,6 +246,9 @@ def test_real_garments_back_to_front_are_turned_for_their_necklines(name, sex):
     person = read_mesh(DATA / "bodies" / f"mh_{sex}_averageweight.ply")
     back = TriangleMesh(garment.vertices @ Z_UP @ AROUND.T, garment.faces)
     assert_allclose(find_placement(back, person, PlaceConfig(), Job()).turn, AROUND, rtol=0, atol=0)
+    facing_back = TriangleMesh(person.vertices @ AROUND.T, person.faces)
+    assert_allclose(find_placement(back, facing_back, PlaceConfig(), Job()).turn, np.eye(3), rtol=0, atol=0)
+    assert_allclose(find_placement(garment, facing_back, PlaceConfig(), Job()).turn, AROUND @ Z_UP.T, rtol=0, atol=0)
 
 
 @pytest.mark.real_data

@@ -301,12 +301,12 @@ class Thinning:
         return all(self._hangs_from(piece) is not None and len(set(piece.meant)) == 2 for piece in pieces)
 
     def neck_lean(self, garment: TriangleMesh) -> float | None:
-        """Return how far forward, +z, the plane of an opening for the head alone leans [rad]; None where none is."""
+        """Return how far forward the plane of an opening for the head alone leans [rad]; None where there is none."""
         head = next((number for number, limb in enumerate(self.limbs.limbs) if limb.name == "head"), -1)
         for piece in pieces_with_limbs(garment, self.limbs, self.after(_LINES)):
             if head in piece.alone():
-                _, up, ahead = piece.area_vector(piece.meant[head])
-                return float(np.arctan2(ahead, up))
+                area = piece.area_vector(piece.meant[head])
+                return float(np.arctan2(area @ self.limbs.ahead, area[1]))
         return None
 
     def tells_too_small(self, garment: TriangleMesh) -> bool:

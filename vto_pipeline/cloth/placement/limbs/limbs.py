@@ -26,6 +26,8 @@ _BAND = 0.015  # of the body's height: distance between levels, and between the 
 _STANDS_OUT = 0.1  # of the body's height: shorter ones are fingers, a nose, a bun
 _ROOT = 0.08  # of the body's height: how far a shoulder or a hip goes on within the trunk
 _STRAIGHT = 5  # bands at the end of a limb that tell its direction there
+_SHIN = 0.25  # of the body's height: from the toes over the skin to the middle of the shin
+_FOOT = 0.05  # of the body's height: how far toes are in front of it at least
 _BELT = 0.02  # of the body's height: half of the belt's width
 
 
@@ -55,7 +57,7 @@ class Limb(NamedTuple):
 
 
 class Limbs:
-    """The limbs of a body, +Y up and +Z its front, the highest first.
+    """The limbs of a body, +Y up, the highest first.
 
     Args:
         body: Only the piece about its middle counts [m].
@@ -63,7 +65,7 @@ class Limbs:
 
     def __init__(self, body: TriangleMesh) -> None:
         height = float(np.ptp(body.vertices[:, 1]))
-        self._graph, self._band = _graph(body), _BAND * height
+        self._graph, self._band, self._height = _graph(body), _BAND * height, height
         self._area = laplacian(body)[1]
         self._belt = self._middle_belt(body, _BELT * height)
         self.limbs: list[Limb] = []
@@ -107,6 +109,18 @@ class Limbs:
         legs = [limb for limb in self.limbs if limb.name.endswith("leg")]
         tops = [float(limb.root[1]) for limb in legs]
         return sum(tops) / len(tops) if tops else -np.inf
+
+    @property
+    def ahead(self) -> FloatArray:
+        """Where the feet point, level and of unit length, shape (3,); +Z where there are none."""
+        ways = [
+            limb.axis[0] - limb.axis[min(int(np.searchsorted(limb.along, _SHIN * self._height)), len(limb.axis) - 1)]
+            for limb in self.limbs
+            if limb.name.endswith("leg")
+        ]
+        way = np.mean(ways, axis=0) * [1.0, 0.0, 1.0] if ways else np.zeros(3)
+        length = float(np.linalg.norm(way))
+        return way / length if length > _FOOT * self._height else np.array([0.0, 0.0, 1.0])
 
     def ways_in(self, thin: TriangleMesh) -> list[FloatArray]:
         """Return the shortest ways over the skin from the end of each limb to the belt [m], shape (N, 3) each.
