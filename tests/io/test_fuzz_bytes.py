@@ -98,7 +98,7 @@ WAYS: dict[str, tuple[Callable[[], Any], str]] = {
     "raises": (lambda: 1 / 0, "ZeroDivisionError"),
     "exits": (lambda: os._exit(0), "exit code 0"),
     "crashes": (os.abort, "signal 6"),
-    "hangs": (lambda: time.sleep(120.0), "longer than"),
+    "hangs": (lambda: time.sleep(120.0), "has not ended"),
 }
 
 
