@@ -70,6 +70,7 @@ def best_orientation(
 
 def other_way_up(
     garment: TriangleMesh,
+    few: TriangleMesh,
     body: BodyCubes,
     best: VoxelPlacement,
     limbs_astray: Callable[[TriangleMesh], int],
@@ -82,12 +83,12 @@ def other_way_up(
 
     Args:
         garment: In metres.
+        few: The same in few triangles.
         body: Where it shall go.
         best: Its best place.
         limbs_astray: Counts the limbs that are not where they are meant to be, with a garment there.
         turned_well: Share of the best score that another way needs.
     """
-    few = _of_few_triangles(garment)
     before = limbs_astray(best.placed(few))
     if before < _LIMBS_TELL:
         return None
@@ -101,6 +102,7 @@ def other_way_up(
 
 def other_way_round(
     garment: TriangleMesh,
+    few: TriangleMesh,
     body: BodyCubes,
     best: VoxelPlacement,
     neck_lean: Callable[[TriangleMesh], float | None],
@@ -112,16 +114,27 @@ def other_way_round(
 
     Args:
         garment: In metres.
+        few: The same in few triangles.
         body: Where it shall go.
         best: Its best place.
         neck_lean: How far the neck of a garment there leans forward [rad]; None where it has none.
         turned_well: Share of the best score that another way needs.
     """
-    lean = neck_lean(best.placed(_of_few_triangles(garment)))
+    lean = neck_lean(best.placed(few))
     if lean is None or lean > -_LEANS_BACK:
         return None
     way = body.fit(garment).best_placement(np.diag([-1.0, 1.0, -1.0]) @ best.turn)
     return way if way.score >= turned_well * best.score else None
+
+
+def of_few_triangles(garment: TriangleMesh) -> TriangleMesh:
+    """Return a garment [m] in few triangles; as it is where edges would have more than two of them then."""
+    few = decimate(garment, _FEW)
+    try:
+        boundary_loops(few)
+    except InputError:
+        return garment
+    return few
 
 
 def fits_when_larger(garment: TriangleMesh, body: BodyCubes) -> Iterator[VoxelFit]:
@@ -143,16 +156,6 @@ def axis_names(turn: FloatArray) -> str:
 def as_files_have_it(turn: FloatArray) -> bool:
     """Return whether a turn, shape (3, 3), brings y up and front +z, or z up and front -y, to the body's y and z."""
     return _is_upright(turn) and turn[0, 0] == 1.0
-
-
-def _of_few_triangles(garment: TriangleMesh) -> TriangleMesh:
-    """Return a garment in few triangles; as it is where edges would have more than two of them then."""
-    few = decimate(garment, _FEW)
-    try:
-        boundary_loops(few)
-    except InputError:
-        return garment
-    return few
 
 
 def _is_upright(turn: FloatArray) -> bool:

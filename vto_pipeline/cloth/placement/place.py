@@ -18,6 +18,7 @@ from vto_pipeline.cloth.placement.orientation import (
     best_orientation,
     fits_when_larger,
     larger,
+    of_few_triangles,
     other_way_round,
     other_way_up,
     promising_orientations,
@@ -133,11 +134,11 @@ def find_placement(
             hint="give it as it is worn, sewn and open; drape.place=as_it_stands leaves it where it lies",
         )
     best = best_orientation(metres, cubes, ways, config.turned_well)
-    thinning = Thinning(body)
-    if (turned := other_way_up(metres, cubes, best, thinning.limbs_astray, config.turned_well)) is not None:
+    thinning, few = Thinning(body), of_few_triangles(metres)
+    if (turned := other_way_up(metres, few, cubes, best, thinning.limbs_astray, config.turned_well)) is not None:
         job.note("garment turned the other way up: more limbs are where its openings are then")
         best = turned
-    if (turned := other_way_round(metres, cubes, best, thinning.neck_lean, config.turned_well)) is not None:
+    if (turned := other_way_round(metres, few, cubes, best, thinning.neck_lean, config.turned_well)) is not None:
         job.note("garment turned the other way round: its neck is lower in front then")
         best = turned
     if (best.turn == stands.turn).all():
