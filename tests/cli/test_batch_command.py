@@ -92,6 +92,20 @@ def test_a_batch_does_what_can_be_done_and_only_the_rest_again(ordered, tmp_path
 
 
 @pytest.mark.filterwarnings("default")  # of dask and its worker processes
+def test_a_setting_on_the_command_line_wins_in_every_row(ordered) -> None:
+    Path("table.csv").write_text(TABLE.replace("true", ""))
+    wrong = ordered("batch", "order.yaml", "-o", "november", "--set", "add.ofset=5")
+    assert (wrong.code, Path("november").exists()) == (2, False)
+    assert "offset" in wrong.err  # what is meant
+    said = ordered("batch", "order.yaml", "-o", "november", "--set", "add.offset=5")
+    assert said.code == 0, said.err
+    left = {"a": 3, "b": 4, "c": 3}
+    assert {row: squared(row) for row in left} == {row: str((2 * one + 2 * 4 + 5) ** 2) for row, one in left.items()}
+    assert "3 of 3 rows are done" in ordered("batch", "order.yaml", "-o", "november", "--set", "add.offset=5").err
+    assert "done and unchanged" not in ordered("batch", "order.yaml", "-o", "november", "--set", "add.offset=6").err
+
+
+@pytest.mark.filterwarnings("default")  # of dask and its worker processes
 def test_rows_whose_results_are_stored_start_no_process(ordered, monkeypatch: pytest.MonkeyPatch) -> None:
     Path("table.csv").write_text(TABLE.replace("true", ""))
     assert ordered("batch", "order.yaml", "-o", "november").code == 0

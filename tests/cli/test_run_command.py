@@ -156,6 +156,8 @@ def test_plan_knows_what_is_stored_and_what_the_rest_took(vto):
     assert {stage["name"] for stage in changed if stage["expected"]["stored"]} == {"left.double", "right.double"}
     added = next(stage["expected"]["seconds"] for stage in changed if stage["name"] == "add")
     assert added == pytest.approx(max(took["add"], 1e-3))  # clocks tell milliseconds apart: none is forecast shorter
+    forced = vto("plan", "toy.yaml", "--json", "--force-all").data["stages"]
+    assert not any(stage["expected"]["stored"] for stage in forced)  # those results were made with work left out
     lines = vto("plan", "toy.yaml", "-o", "elsewhere").out
     assert "their time is not known" in lines
     Path("toy.yaml").write_text(Path("toy.yaml").read_text().replace(", label, page", ""))

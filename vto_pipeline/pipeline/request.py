@@ -55,7 +55,7 @@ def read_request(document: Document, base: Path, catalogue: Catalogue, overrides
     model = document_model(catalogue)
     checked = check_schema(replace(document, data=data), model)
     for text in overrides:
-        data = _override(data, text, catalogue)
+        data = with_setting(data, *read_setting(text, catalogue))
         checked = check_schema(replace(document, data=data), model)
     made = [artifact for stage in catalogue.stages for artifact in stage.makes]
     places = {"given": document.where(("given",))}
@@ -89,21 +89,30 @@ def _check_version(document: Document) -> dict[str, Any]:
     return data
 
 
-def _override(data: dict[str, Any], text: str, catalogue: Catalogue) -> dict[str, Any]:
-    """Return the document's data with one setting changed; it is validated alone first, so that errors name it."""
+def read_setting(text: str, catalogue: Catalogue) -> tuple[str, str, Any]:
+    """Return section, key and value of "section.key=value".
+
+    Raises:
+        ConfigError: it is written otherwise, there is no such setting, or the value is not valid for it.
+    """
     match = re.fullmatch(r"(\w+)\.(\w+)=(.*)", text, re.DOTALL)
     if match is None:
         raise ConfigError(f"--set takes stage.key=value (got {text!r})", hint="as in --set drape.target_error_mm=0.5")
-    section, key, value = match.groups()
+    section, key, value = match[1], match[2], number_or_word(match[3])
     source = Document({}, Path(f"--set {text}"))
     if section not in catalogue.sections:
         raise ConfigError(
             f"stages.{section}: unknown stage", where=source.where(), hint=suggest(section, catalogue.sections)
         )
-    change = {section: {key: number_or_word(value)}}
-    check_schema(replace(source, data={"given": {}, "want": ["-"], "stages": change}), document_model(catalogue))
+    alone = with_setting({"given": {}, "want": ["-"]}, section, key, value)
+    check_schema(replace(source, data=alone), document_model(catalogue))
+    return section, key, value
+
+
+def with_setting(data: Mapping[str, Any], section: str, key: str, value: Any) -> dict[str, Any]:
+    """Return a document's data with one setting changed."""
     stages = dict(data.get("stages") or {})
-    stages[section] = {**stages.get(section, {}), **change[section]}
+    stages[section] = {**stages.get(section, {}), key: value}
     return {**data, "stages": stages}
 
 

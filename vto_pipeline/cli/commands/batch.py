@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from vto_pipeline.cli.options import PATH, Quantity, force_option, log_option, message_options, quiet_option
+from vto_pipeline.cli.options import (
+    PATH,
+    Quantity,
+    force_option,
+    log_option,
+    message_options,
+    quiet_option,
+    set_option,
+)
 from vto_pipeline.cli.session import Session, pass_session
 from vto_pipeline.errors import BatchError, VtoError
 from vto_pipeline.units import MEMORY_B, TIME_S
@@ -46,6 +54,7 @@ PROGRAM = (sys.executable, "-c", "import sys; from vto_pipeline.cli.main import 
 @click.option(
     "--publish", metavar="ADDRESS", help="Copy what the rows make to an object store, such as s3://bucket/nov."
 )
+@set_option
 @force_option
 @log_option
 @quiet_option
@@ -62,6 +71,7 @@ def batch_command(
     retries: int,
     root: tuple[str, ...],
     publish: str | None,
+    overrides: tuple[str, ...],
     force_all: bool,
 ) -> None:
     """Run a pipeline document many times, each time with the changes of one row of a table.
@@ -84,11 +94,11 @@ def batch_command(
     from vto_pipeline.pipeline.batch.time_left import TimeLeft
     from vto_pipeline.pipeline.execution.folder import locked_run_folder
     from vto_pipeline.pipeline.execution.store import Store
-    from vto_pipeline.stages.entry.batches import plan_rows
+    from vto_pipeline.stages.entry.batches import plan_rows, with_settings
     from vto_pipeline.stages.entry.outcome import open_run
 
     roots = Roots(root)
-    rows = read_order(document, roots)
+    rows = with_settings(read_order(document, roots), overrides)
     folder = (output or Path("runs") / document.stem).absolute()
     inputs = Inputs(folder / "inputs", roots, session.say)
     if inputs.check(rows):

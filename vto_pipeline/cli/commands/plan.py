@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from vto_pipeline.cli.options import PATH, message_options, output_option, set_option
+from vto_pipeline.cli.options import PATH, force_option, message_options, output_option, set_option
 from vto_pipeline.cli.session import Session, pass_session
 
 
@@ -14,9 +14,12 @@ from vto_pipeline.cli.session import Session, pass_session
 @click.argument("document", metavar="FILE.yaml", type=PATH)
 @output_option
 @set_option
+@force_option
 @message_options
 @pass_session
-def plan_command(session: Session, document: Path, output: Path | None, overrides: tuple[str, ...]) -> None:
+def plan_command(
+    session: Session, document: Path, output: Path | None, overrides: tuple[str, ...], force_all: bool
+) -> None:
     """Show which stages a document would run and which it leaves out, with the reason. Nothing is run.
 
     Results in the run's folder are named as stored; beside each other stage stands what it will take, by runs there.
@@ -34,7 +37,7 @@ def plan_command(session: Session, document: Path, output: Path | None, override
 
     request, plan = planned(document, overrides, catalogue())
     store = Store((output or Path("runs") / document.stem) / "cache")
-    expected = forecast(request, plan, store)
+    expected = forecast(request, plan, store, force_all)
     data = {
         "given": {artifact: one.key for artifact, one in request.given.items()},
         "want": list(request.want),

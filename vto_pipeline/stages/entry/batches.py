@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from vto_pipeline.pipeline.execution.key import run_key
 from vto_pipeline.pipeline.execution.run import run
 from vto_pipeline.pipeline.execution.store import Store
 from vto_pipeline.pipeline.plan import Plan, Step
-from vto_pipeline.pipeline.request import Request
+from vto_pipeline.pipeline.request import Request, read_setting, with_setting
 from vto_pipeline.stages.entry import planning
 from vto_pipeline.stages.entry.outcome import Outcome
 
@@ -44,6 +44,22 @@ class PlannedRow:
     done: bool
     stored: bool
     seconds: float | None = None
+
+
+def with_settings(rows: Sequence[Row], overrides: Sequence[str]) -> list[Row]:
+    """Return rows with settings "section.key=value" that win over their documents.
+
+    Raises:
+        ConfigError: one of them is no setting, or not valid.
+    """
+    chosen = [read_setting(text, planning.catalogue()) for text in overrides]
+    found = []
+    for row in rows:
+        data = row.data
+        for setting in chosen:
+            data = with_setting(data, *setting)
+        found.append(replace(row, data=data))
+    return found
 
 
 def plan_rows(
