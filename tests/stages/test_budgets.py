@@ -68,7 +68,7 @@ def test_a_run_that_cannot_adapt_promises_nothing(asked, budgets, refused):
 
 
 def test_a_scan_takes_a_budget_without_a_drape(asked):
-    order = scan_order(SAMPLES / "shirt_on_form" / "photos", "garment", FORM, (), "a test")
+    order = scan_order(SAMPLES / "shirt_on_form" / "photos", "garment", FORM, (), None, "a test")
     whole = TimeBudget(90.0)
     assert asked(order, time_budget=whole)[1] == whole
 

@@ -14,7 +14,7 @@ CLOUD = SAMPLES / "shirt_on_form" / "cloud.ply"
 
 
 def plan_of(mannequin, tmp_path):
-    order = scan_order(CLOUD, "garment", mannequin, [], "scan")
+    order = scan_order(CLOUD, "garment", mannequin, [], None, "scan")
     return {step.stage.name: step for step in planned_document(order.document, tmp_path, (), catalogue())[1].steps}
 
 

@@ -7,7 +7,8 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 HOW_TO_SCALE = (
     "give the mannequin that it was scanned on; or lay a printed board beside it and describe it in board.yaml; or "
-    "state a length between two points of the photos (vto scan --distance, scale.lengths in a document)"
+    "state a length between two points of the photos (vto scan --distance, scale.lengths in a document), or the height "
+    "of the person or form in them (--stature, scale.stature)"
 )
 
 

@@ -16,7 +16,7 @@ from vto_pipeline.cli.session import Session, pass_session
 @click.option("--measurements", type=PATH, metavar="FILE", help="YAML with girths and lengths.")
 @click.option("--front", type=PATH, metavar="PNG", help="Photo or silhouette from the front.")
 @click.option("--side", type=PATH, metavar="PNG", help="Photo or silhouette from the side.")
-@click.option("--stature", type=float, metavar="METRES", help="Body height; required with --front and --side.")
+@click.option("--stature", type=float, metavar="METRES", help="Body height: with --front and --side, or for photos.")
 @click.option("--sex", type=click.Choice(["female", "male", "neutral"]), help="Sex, where the input does not say.")
 @lifelike_option
 @pipeline_options

@@ -26,6 +26,12 @@ _MARK = re.compile(r"(.+):(-?[\d.]+),(-?[\d.]+)")
     metavar="P Q METRES",
     help="A known distance in the photos; P and Q are PHOTO:X,Y+PHOTO:X,Y, one point marked in two photos or more.",
 )
+@click.option(
+    "--stature",
+    type=float,
+    metavar="METRES",
+    help="Height of the person or form in photos, where no board, distance or mannequin tells the scale.",
+)
 @pipeline_options
 @pass_session
 def scan_command(
@@ -34,6 +40,7 @@ def scan_command(
     role: str,
     mannequin: Path | None,
     distances: tuple[tuple[str, str, float], ...],
+    stature: float | None,
     **options: Any,
 ) -> None:
     """Reconstruct a garment, or the surface of a body or mannequin, from INPUT.
@@ -43,13 +50,14 @@ def scan_command(
     \b
     vto scan photos/ --role garment --mannequin form.ply -o runs/shirt
     vto scan photos/ --role mannequin --distance a.jpg:410,95+b.jpg:388,97 a.jpg:402,640+b.jpg:395,633 0.62
+    vto scan customer_photos/ --role body --stature 1.72
     vto scan customer.ply --role body
     """
     from vto_pipeline.cli.results import perform
     from vto_pipeline.stages.entry.documents import scan_order
 
     lengths = [{"one": _marks(one), "other": _marks(other), "metres": metres} for one, other, metres in distances]
-    perform(session, scan_order(source, role, mannequin, lengths, "the command line"), **options)
+    perform(session, scan_order(source, role, mannequin, lengths, stature, "the command line"), **options)
 
 
 def _marks(text: str) -> dict[str, list[float]]:

@@ -62,8 +62,8 @@ def scale_from_lengths(
             f"the stated lengths contradict each other by {100 * off.max():.1f} % (metres per unit: {listed})",
             hint="are they all straight distances in metres, between the points that are marked?",
         )
-    job.measure(stated_lengths=len(lengths), scale_error_percent=round(100 * max(error, float(off.std())), 4))
-    return scale, error
+    job.measure(stated_lengths=len(lengths))
+    return scale, max(error, float(off.std()))
 
 
 def _place(cameras: CameraSet, marks: Sightings, max_error_px: float) -> tuple[FloatArray, float]:

@@ -1,4 +1,4 @@
-"""Metric scale of photos: from a printed board, with floor and origin, or from a stated length."""
+"""Metric scale of photos: from a printed board, with floor and origin, from a stated length, or from a stature."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from vto_pipeline.model.settings import Config
 from vto_pipeline.scan.photos.board import board_corners, detect_board
 from vto_pipeline.scan.photos.lengths import StatedLength, scale_from_lengths
 from vto_pipeline.scan.photos.sfm import transform_reconstruction
+from vto_pipeline.scan.photos.stature import scale_from_stature
 from vto_pipeline.scan.photos.triangulation import triangulate_points
 from vto_pipeline.scan.similarity import fit_similarity
 
@@ -27,17 +28,24 @@ class ScaleConfig(Config):
     max_error_px: float = Field(2.0, gt=0.1, le=20, description="Corners further from their place are left out [px]")
     max_scale_error: float = Field(0.003, gt=0, le=0.1, description="Standard error above which to warn [share]")
     lengths: tuple[StatedLength, ...] = Field((), description="Known distances between points marked in photos")
+    stature: float | None = Field(
+        None,
+        ge=0.3,
+        le=2.6,
+        description="Height of the person or form, from the floor to its top [m]",
+    )
 
 
 def apply_scale(
     photos: PhotoSet, cameras: CameraSet, cloud: PointCloud, config: ScaleConfig, job: Job
 ) -> tuple[CameraSet, PointCloud]:
-    """Bring cameras and points into metres, by the best there is: a stated length, else a board, else not at all.
+    """Bring cameras and points into metres, by a stated length, else a board, else a stature, else not at all.
 
-    What a user states wins over the board: a board.yaml may be left over from another set-up.
+    A length that a user states wins over the board: a board.yaml may be left over from another set-up. A stature does
+    not: it is known to a centimetre, a board to a tenth of a millimetre.
 
     Raises:
-        ScanError: a stated length cannot be used.
+        ScanError: a stated length or stature cannot be used.
     """
     if cameras.metric:
         job.leave_out("scale", "the camera poses were given in metres")
@@ -45,16 +53,27 @@ def apply_scale(
         return cameras, cloud
     if config.lengths:
         scale, error = scale_from_lengths(cameras, config.lengths, config.max_error_px, job)
-        job.measure(scale_source="stated length")
-        if error > config.max_scale_error:
-            job.warn(
-                f"the stated lengths fix the scale to {100 * error:.2f} % only; state a longer one, in more photos"
-            )
-        return transform_reconstruction(cameras, cloud, np.eye(4), scale=scale, metric=True)
-    if photos.board is None:
+        return _stated(cameras, cloud, scale, error, "stated length", config, job)
+    if photos.board is not None:
+        cameras, cloud = apply_board(photos, cameras, cloud, config, job)
+        if cameras.metric or config.stature is None:
+            return cameras, cloud
+    if config.stature is None:
         job.note("no board.yaml with the photos and no stated length: the scan has no scale of its own")
         return cameras, cloud
-    return apply_board(photos, cameras, cloud, config, job)
+    scale, error = scale_from_stature(photos, cameras, cloud, config.stature, job)
+    return _stated(cameras, cloud, scale, error, "stature", config, job)
+
+
+def _stated(
+    cameras: CameraSet, cloud: PointCloud, scale: float, error: float, source: str, config: ScaleConfig, job: Job
+) -> tuple[CameraSet, PointCloud]:
+    """Bring cameras and points into metres by what the user stated, and tell how well it fixes them."""
+    job.measure(scale_source=source, scale_error_percent=round(100 * error, 4))
+    if error > config.max_scale_error:
+        more = "; a length, stated in more photos, or a printed board fixes it better"
+        job.warn(f"the {source} fixes the scale to {100 * error:.2f} % only{more}")
+    return transform_reconstruction(cameras, cloud, np.eye(4), scale=scale, metric=True)
 
 
 def apply_board(

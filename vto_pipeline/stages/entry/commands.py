@@ -30,6 +30,7 @@ def scan(
     *,
     mannequin: Path | str | None = None,
     lengths: Sequence[Mapping[str, Any]] = (),
+    stature: float | None = None,
     output: Path | str | None = None,
     settings: Settings | None = None,
     listener: Listener | None = None,
@@ -41,6 +42,7 @@ def scan(
         role: "garment", "body" or "mannequin".
         mannequin: Surface of the mannequin that a garment was scanned on.
         lengths: Known distances in photos, each with `one`, `other` (photo -> pixel) and `metres`.
+        stature: Height of the person or form in photos or video, from the floor to the top [m].
         output: RUN; None: runs/scan_NAME.
         settings: Changes of single settings.
         listener: Receives how it goes.
@@ -48,7 +50,7 @@ def scan(
     Raises:
         VtoError: what the command line ends with 2 to 5 for.
     """
-    order = scan_order(Path(source), role, _path(mannequin), lengths, "scan")
+    order = scan_order(Path(source), role, _path(mannequin), lengths, stature, "scan")
     return run_order(order, output, _overrides(settings), listener=listener)
 
 

@@ -41,7 +41,12 @@ class Order:
 
 
 def scan_order(
-    source: Path, role: str, mannequin: Path | None, lengths: Sequence[Mapping[str, Any]], name: str
+    source: Path,
+    role: str,
+    mannequin: Path | None,
+    lengths: Sequence[Mapping[str, Any]],
+    stature: float | None,
+    name: str,
 ) -> Order:
     """Return the order of a scan.
 
@@ -51,6 +56,7 @@ def scan_order(
         mannequin: Surface of the mannequin that a garment was scanned on; or its measurements, where it was never
             scanned bare.
         lengths: Known distances in photos, each with `one`, `other` (photo -> pixel) and `metres`.
+        stature: Height of the person or form in photos or video, from the floor to the top [m].
         name: Stands where a file's name stands in messages.
 
     Raises:
@@ -63,24 +69,47 @@ def scan_order(
     kind, note = _captured_kind(source)
     if lengths and kind != "photos":
         raise ConfigError("a distance is only valid with photos")
-    unscaled = kind == "photos" and not lengths and not (source / BOARD_FILE).is_file()
+    written = mannequin is not None and mannequin.suffix.lower() in _MEASUREMENTS
+    by_form = mannequin is not None and not written
+    scale = _scale_settings(kind, stature, lengths)
+    if by_form and stature is not None:
+        scale = _scale_settings(kind, None, lengths)
+    unscaled = kind == "photos" and not scale and not (source / BOARD_FILE).is_file()
     notes = [note]
+    if by_form and stature is not None:
+        notes.append("the stature is not used: the mannequin tells the scale better")
     wanted = [f"{role}_surface"]
     if role == "garment" and mannequin is not None:
         wanted = ["garment", "openings", "labels"]
     elif role == "garment" and unscaled:
-        notes.append("no mannequin, board or distance is given: the surface has no scale, and no garment is cut out")
+        notes.append(
+            "no mannequin, board, distance or stature is given: the surface has no scale, and no garment is cut out"
+        )
     elif role == "garment":
         wanted = ["garment", "openings"]
     if "garment" in wanted and kind in ("photos", "video"):
         wanted.append("garment_texture")
-    written = mannequin is not None and mannequin.suffix.lower() in _MEASUREMENTS
     given = {f"mannequin.{'dressed' if written else 'surface'}": mannequin, f"{role}.{kind}": source}
-    settings = {"scale": {"lengths": [dict(length) for length in lengths]}} if lengths else {}
     # what a scan makes of a body or a form has one name, whichever it was
     copies = {} if role == "garment" else {own: f"{role}_{own}" for own in ("surface.ply", "scan_report.json")}
-    document = _document(name, given, [*wanted, f"{role}_scan_report", "page"], settings)
+    document = _document(name, given, [*wanted, f"{role}_scan_report", "page"], scale)
     return Order(document, Path("runs") / f"scan_{resolved(source).stem}", tuple(notes), copies)
+
+
+def _scale_settings(
+    kind: str, stature: float | None, lengths: Sequence[Mapping[str, Any]] = ()
+) -> dict[str, dict[str, Any]]:
+    """Return the settings of what the user states of a capture's scale.
+
+    Raises:
+        ConfigError: the capture has a scale of its own.
+    """
+    if stature is not None and kind not in ("photos", "video"):
+        raise ConfigError("a stature is only valid with photos or a video")
+    stated: dict[str, Any] = {"lengths": [dict(length) for length in lengths]} if lengths else {}
+    if stature is not None:
+        stated["stature"] = stature
+    return {"scale": stated} if stated else {}
 
 
 def fit_order(
@@ -95,29 +124,32 @@ def fit_order(
 ) -> Order:
     """Return the order of a fit, from one of a scan, measurements, or two photos and a stature [m].
 
+    A stature also scales a scan from photos or video.
+
     Raises:
         ConfigError: not exactly one way is given, or `sex` does not apply to it; InputError: the scan is no capture.
     """
-    photos = (front, side, stature)
-    if any(part is not None for part in photos) and None in photos:
+    outlines = (front, side, stature) if scan is None else (front, side)
+    if any(part is not None for part in outlines) and None in outlines:
         raise ConfigError("front, side and stature must be given together")
     ways = [way for way in (scan, measurements, front) if way is not None]
     if len(ways) != 1:
         raise ConfigError("give one of: a scan; measurements; front and side photos with the stature")
     given: dict[str, Any] = {"body.measurements": measurements, "lifelike": lifelike}
-    notes = []
+    notes, settings = [], {}
     if scan is not None:
         kind, note = _captured_kind(scan)
         notes.append(note)
         given[f"body.{kind}"] = scan
+        settings = _scale_settings(kind, stature)
     if front is not None:
         given["body.silhouettes"] = {"front": str(front), "side": str(side), "stature": stature}
     sections = planning.catalogue().sections
-    settings = {section: {"sex": sex} for section, kind in sections.items() if sex and "sex" in kind.model_fields}
-    if sex and not settings:
+    sexed = {section: {"sex": sex} for section, kind in sections.items() if sex and "sex" in kind.model_fields}
+    if sex and not sexed:
         raise ConfigError("a sex does not apply to this input", hint="write `sex:` in the measurements file")
     shown = ["lifelike_body"] if lifelike is not None else []
-    document = _document(name, given, ["avatar", *shown, "measurements", "landmarks", "page"], settings)
+    document = _document(name, given, ["avatar", *shown, "measurements", "landmarks", "page"], settings | sexed)
     return Order(document, Path("runs") / f"fit_{resolved(ways[0]).stem}", tuple(notes))
 
 
