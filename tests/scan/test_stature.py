@@ -66,8 +66,8 @@ def tilted(mesh: TriangleMesh, degrees: float, noise: float = 0.0) -> TriangleMe
 
 @pytest.mark.parametrize(("degrees", "noise"), [(0.0, 0.0), (9.0, 0.0), (9.0, 4e-4)])
 def test_the_height_above_a_floor_that_is_not_quite_level(degrees: float, noise: float) -> None:
-    beside = revolved(figure(height=0.2))
-    beside = replace(beside, vertices=beside.vertices + np.array([0.3, 0.0, 0.2]))
+    beside = revolved(figure(height=0.6))  # a lamp, thin and tall
+    beside = replace(beside, vertices=beside.vertices * [0.2, 1.0, 0.2] + np.array([0.3, 0.0, 0.2]))
     height, error = standing_height(tilted(concatenate([ground(), revolved(figure()), beside]), degrees, noise))
     assert height == pytest.approx(UNIT * HEIGHT, abs=UNIT * (1e-5 + 5 * noise))
     assert 0 < error < 0.03 * height
