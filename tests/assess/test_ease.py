@@ -87,12 +87,25 @@ def test_sleeves_cut_away_leave_one_way_around() -> None:
     garment = tube(0.17, 0.17, 0.5, 1.5)
     centers = garment.vertices[garment.faces].mean(axis=1)
     keep = np.abs(centers[:, 0]) < 0.16  # front and back stay, two curves
-    body = tube(0.15, 0.15, 0.0, 1.8)
+    arm = tube(0.005, 0.005, 0.6, 1.4)
+    body = concatenate([tube(0.15, 0.15, 0.0, 1.8), shifted(arm, (0.16, 0, 0)), shifted(arm, (-0.16, 0, 0))])
     found = ease_at(garment, garment.vertices, body, 1.0 * UP, UP, garment_faces=keep)
     half = np.arcsin(0.16 / 0.17)
     expected = 4 * half * 0.17 + 4 * 0.17 * np.cos(half)  # two arcs and two chords
     assert_allclose(found.garment_girth, expected, rtol=3e-3, err_msg="the cut follows whole faces, 4 mm wide")
     assert not found.closed
+
+
+def test_loose_cloth_that_is_nearer_to_an_arm_is_no_sleeve() -> None:
+    """A wide skirt with hands beside it: the arms are outside, and what hangs next to them is still the skirt."""
+    arm = tube(0.04, 0.04, 0.6, 1.4)
+    body = concatenate([tube(0.15, 0.12, 0.0, 1.8), shifted(arm, (0.4, 0, 0)), shifted(arm, (-0.4, 0, 0))])
+    garment = tube(0.34, 0.3, 0.5, 1.5)
+    keep = np.abs(garment.vertices[garment.faces].mean(axis=1)[:, 0]) < 0.25
+    found = ease_at(garment, garment.vertices, body, 1.0 * UP, UP, garment_faces=keep)
+    assert found.closed
+    expected = ellipse_perimeter(0.34, 0.3) - ellipse_perimeter(0.15, 0.12)
+    assert_allclose(found.ease, expected, rtol=2e-3, err_msg="256-gon")
 
 
 def test_rest_length_and_stretch() -> None:

@@ -78,7 +78,7 @@ def test_report_is_plain_json_and_says_what_it_left_out() -> None:
 def test_trunk_mask_takes_the_arms_away() -> None:
     radius = 0.15 + 0.06 / (2 * np.pi)
     garment = tube(radius, radius, 0.8, 1.5)
-    trunk = np.abs(BODY.vertices[:, 0]) < 0.14
+    trunk = np.abs(BODY.vertices[:, 0]) < 0.12
     found, _ = assess_fit(garment, garment.vertices, BODY, {"chest": 1.2}, POPLIN, FitConfig(), Job(), trunk=trunk)
     zone = next(z for z in found["zones"] if z["zone"] == "chest")
     assert not zone["closed"]

@@ -12,6 +12,9 @@ from vto_pipeline.geometry.section import Section, plane_section
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 
+_SAME = 1.02
+"""A part of the body whose girth is larger by more than this has another joined to it."""
+
 
 @dataclass(frozen=True)
 class Ease:
@@ -71,7 +74,8 @@ def ease_at(
         body: The body [m].
         origin: A point of the plane [m], shape (3,).
         normal: Of the plane, shape (3,).
-        garment_faces: Only these, shape (F,); for example without sleeves.
+        garment_faces: Only these, shape (F,); for example without sleeves; all, where a whole line around that part of
+            the body holds nothing else. Loose cloth beside the trunk may be nearer to an arm, and is no sleeve.
         body_faces: Only these, shape (F,); for example without arms.
 
     Returns:
@@ -80,13 +84,26 @@ def ease_at(
     inner = max(body_hulls(body, origin, normal, body_faces), key=lambda hull: hull.perimeter, default=None)
     if inner is None:
         return None
-    section = plane_section(garment, origin, normal, garment_faces)
-    around = [(hull, part) for hull, part in _hulls(section, origin, normal) if hull.encloses(inner.center)]
+    section = plane_section(garment, origin, normal)
+    around = [
+        (hull, part)
+        for hull, part in _hulls(section, origin, normal)
+        if section.is_closed(part) and _alone(hull, inner, body_hulls(body, origin, normal))
+    ]
+    if not around:
+        section = plane_section(garment, origin, normal, garment_faces)
+        around = [(hull, part) for hull, part in _hulls(section, origin, normal) if hull.encloses(inner.center)]
     if not around:
         return None
     outer, part = max(around, key=lambda found: found[0].perimeter)
     lengths = section.length(part, garment.vertices), section.length(part, rest)
     return Ease(inner.perimeter, outer.perimeter, *lengths, section.is_closed(part))
+
+
+def _alone(hull: Hull, inner: Hull, parts: list[Hull]) -> bool:
+    """Whether a hull holds a part of the body (`inner`), as the plane cuts it off whole, and no other."""
+    held = [part for part in parts if hull.encloses(part.center)]
+    return len(held) == 1 and held[0].encloses(inner.center) and held[0].perimeter < _SAME * inner.perimeter
 
 
 def body_hulls(
