@@ -68,6 +68,14 @@ def test_which_way_a_profile_runs_and_looks_does_not_matter():
     assert fit_strips(turned, cloth.weight).rigidity == pytest.approx(found.rigidity, rel=1e-9)
 
 
+def test_a_profile_in_pixels_is_told_and_not_taken_for_curl():
+    cloth, strips = both_faces(3)
+    for way in (1, -1):
+        upset = [replace(strip, points=strip.points[::way] * (1.0, -1.0)) for strip in strips]
+        with pytest.raises(InputError, match="does y count down"):
+            fit_strips(upset, cloth.weight)
+
+
 def test_from_three_strips_on_the_spread_counts():
     rng = np.random.default_rng(5)
     cloth = any_cloth(rng)

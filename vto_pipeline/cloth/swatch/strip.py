@@ -11,6 +11,10 @@ from vto_pipeline.model.arrays import FloatArray
 
 _FEWEST = 12
 _SHORTEST = 0.02  # [m]
+_END = 0.15
+"""An end of a strip is so much of its length."""
+_UPSIDE_DOWN = np.radians(20.0)
+"""A strip whose upper end is steeper than its lower one by more than this stands on its head."""
 
 
 @dataclass(frozen=True)
@@ -38,8 +42,15 @@ class Strip:
             raise InputError(f"the strip is shorter than {1e3 * _SHORTEST:.0f} mm", where=self.name, hint=hint)
 
     def laid_right(self) -> Strip:
-        """Return the strip from the edge to its tip, the lower end, with the tip on the right."""
+        """Return the strip from the edge to its tip, the lower end, with the tip on the right.
+
+        Raises:
+            InputError: it is level at the lower end and steep at the upper one, as where y counts down.
+        """
         points = self.points if self.points[-1, 1] < self.points[0, 1] else self.points[::-1]
+        if _steepness(points) > _steepness(points[::-1]) + _UPSIDE_DOWN:
+            problem = "the strip leaves the table steeply and is level at its tip"
+            raise InputError(problem, where=self.name, hint="does y count down, as pixels do? write its negative")
         side = 1.0 if points[-1, 0] >= points[0, 0] else -1.0
         return replace(self, points=points * np.array([side, 1.0]))
 
@@ -47,6 +58,14 @@ class Strip:
         """Return at most so many points, each the mean of neighbours."""
         parts = np.array_split(self.points, min(most, len(self.points)))
         return np.array([part.mean(axis=0) for part in parts])
+
+
+def _steepness(points: FloatArray) -> float:
+    """Return the angle of the first end of a line (N, 2) to the level [rad]."""
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    last = max(int(np.searchsorted(along, _END * along[-1])), 1)
+    way = np.abs(points[last] - points[0])
+    return float(np.arctan2(way[1], way[0]))
 
 
 @dataclass(frozen=True)
