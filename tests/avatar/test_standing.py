@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from vto_pipeline.avatar.model.pose import named_pose
-from vto_pipeline.avatar.standing import stood_up, warn_of_several
+from vto_pipeline.avatar.standing import stood_up, turn_of, warn_of_several
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.io.meshes import read_mesh
 from vto_pipeline.model.job import Job
@@ -32,6 +32,14 @@ def test_the_body_is_turned_back(axis: str, degrees: float, up: str) -> None:
     assert_allclose(stands.vertices, BODY.vertices, rtol=0, atol=1e-12)  # a quarter turn and its inverse: rounding
     assert any(note.startswith(up) for note in job.notes)
     assert not job.warnings
+
+
+@pytest.mark.parametrize(("axis", "degrees", "up"), [("x", 90, "+Z"), ("x", -90, "-Z"), ("x", 0, "")])
+def test_a_garment_turns_with_the_body_that_it_was_on(axis: str, degrees: float, up: str) -> None:
+    job = Job()
+    lying = turned(BODY, axis, degrees)
+    assert_allclose(lying.vertices @ turn_of(lying, job).T, BODY.vertices, rtol=0, atol=1e-12)
+    assert [note[:2] for note in job.notes] == ([up] if up else [])
 
 
 def test_what_stands_stays_as_it_is() -> None:

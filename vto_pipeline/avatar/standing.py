@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from vto_pipeline.avatar.scan.initial_pose import best_axis
+from vto_pipeline.avatar.scan.upright import in_metres
 from vto_pipeline.geometry.topology import face_components
+from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -44,6 +46,20 @@ def stood_up(body: TriangleMesh, job: Job) -> TriangleMesh:
         return body
     job.note(f"{found.name} of the body mesh is up; it was turned so that +Y is up")
     return TriangleMesh(body.vertices @ found.turn.T, body.faces)
+
+
+def turn_of(source: TriangleMesh, job: Job) -> FloatArray:
+    """Return the turn (3, 3) that the avatar of a body has from its file: what makes +Y up.
+
+    Args:
+        source: The body that a garment was on, any axis up [m].
+        job: Notified where that is a turn.
+    """
+    found = best_axis(in_metres(source, Job()))
+    if found is None or found.name == "+Y":
+        return np.eye(3)
+    job.note(f"{found.name} of the body that the garment was on is up; both were turned so that +Y is up")
+    return found.turn
 
 
 def warn_of_several(body: TriangleMesh, job: Job) -> None:
