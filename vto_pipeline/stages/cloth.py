@@ -56,7 +56,9 @@ def _mesh_morph(inputs: Inputs, settings: MorphConfig, job: Job) -> Outputs:
 def _turned(inputs: Inputs, job: Job) -> tuple[TriangleMesh, FloatArray]:
     """Return the simulation mesh in the frame of the body that moves under it, and its turn into that, (3, 3)."""
     mesh, source = inputs["sim_mesh"], inputs.get("mannequin_surface")
-    turn = np.eye(3) if source is None else turn_of(source, job)
+    if source is None:
+        return mesh, np.eye(3)
+    turn = turn_of(source, job)
     return replace(mesh, vertices=mesh.vertices @ turn.T), turn
 
 
