@@ -86,6 +86,13 @@ def test_what_hangs_above_and_lies_below_is_no_floor() -> None:
         standing_height(concatenate([table, revolved(figure())]))
 
 
+def test_what_was_seen_of_it_has_to_reach_the_floor() -> None:
+    """A shirt on a form without texture hangs in the air."""
+    profile = figure()
+    with pytest.raises(ScanError, match="does not reach the floor"):
+        standing_height(concatenate([ground(), revolved(profile[profile[:, 1] > 0.3 * HEIGHT])]))
+
+
 @pytest.mark.parametrize("cut", [0.004, 0.015])
 def test_a_hole_in_the_crown_is_rounded_off(cut: float) -> None:
     height, error = standing_height(tilted(concatenate([ground(), revolved(figure(cut))]), 5.0))

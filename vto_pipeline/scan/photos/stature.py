@@ -73,7 +73,7 @@ def standing_height(surface: TriangleMesh, seed: int = 0) -> tuple[float, float]
         seed: Of the planes that are tried.
 
     Raises:
-        ScanError: there is no floor, nothing on it, or the top is not closed.
+        ScanError: there is no floor, nothing that stands on it, or its top was not seen.
     """
     floor = _floor(surface, np.random.default_rng(seed))
     if floor is None:
@@ -87,6 +87,11 @@ def standing_height(surface: TriangleMesh, seed: int = 0) -> tuple[float, float]
     piece, areas = component_areas(submesh(surface, risen)[0])
     stands, kept = submesh(surface, _faces_of(risen, piece == int(np.argmax(areas))))
     above = above[kept]
+    if above.min() > 2.0 * CLEAR * float(above.max()):
+        raise ScanError(
+            "the stature gives no scale: the largest thing that was seen does not reach the floor",
+            hint="plain legs and stands are lost: state a distance between two points, or lay a printed board there",
+        )
     edge = float(np.sqrt(2.0 * face_areas(stands).mean()))
     added = _unseen_top(stands, above, floor[:3])
     return float(above.max()) + added, float(np.hypot(edge, added / 2.0))
