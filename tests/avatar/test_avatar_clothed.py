@@ -8,7 +8,7 @@ from body_judges import distances, inside
 
 from vto_pipeline.avatar.from_scan import ScanConfig, fit_scan
 from vto_pipeline.avatar.measure import measure
-from vto_pipeline.avatar.model.pose import joint_transforms
+from vto_pipeline.avatar.model.skinning import joint_transforms
 from vto_pipeline.avatar.template.template import JOINTS
 from vto_pipeline.bench.body.clothed import random_wearer, visible_clothed_surface
 from vto_pipeline.io.bodies.measurements import write_measurements

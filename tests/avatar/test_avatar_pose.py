@@ -1,5 +1,7 @@
 """Pose and morph."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -10,13 +12,12 @@ from scipy.spatial.transform import Rotation
 
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.model.pose import (
-    blend_transforms,
     clear_pose,
-    joint_transforms,
     morph,
     named_pose,
     pose_avatar,
 )
+from vto_pipeline.avatar.model.skinning import blend_transforms, joint_transforms
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.intersections import self_intersections
@@ -80,6 +81,57 @@ def test_a_twisted_forearm_keeps_its_girth() -> None:
     # the linear blend keeps cos(45 degrees) = 0.71 at the worst place; straight edges between turned rows cost 4 %
     assert 0.90 < min(kept) < 1.0
     assert max(kept) < 1.02
+
+
+def test_an_arm_turned_in_its_shoulder_turns_the_skin_on_the_way_by_its_share() -> None:
+    """About the arm's axis, so that every place of the skin keeps its distance from it: nothing is wrung."""
+    body = template(0.5)
+    arm = [body.joint_names.index(f"left_{name}") for name in ("shoulder", "elbow", "wrist")]
+    shoulder, elbow = body.joints[arm[:2]]
+    twist = 0.5 * np.pi * (elbow - shoulder) / np.linalg.norm(elbow - shoulder)
+    got = bent(body, "left_shoulder", twist).vertices
+    share = body.weights[:, arm].sum(axis=1)
+    true = Rotation.from_rotvec(np.outer(share, twist)).apply(body.bind_vertices - shoulder) + shoulder
+    assert_allclose(got, true, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("raised", "even"), [(-33.0, False), (-5.0, False), (45.0, True), (105.0, True)])
+def test_skin_between_trunk_and_arm_lies_straight_between_where_the_two_have_it(raised: float, even: bool) -> None:
+    """Each end by scipy's rotation about the shoulder, square to the arm, so that the arm is not turned about its own.
+
+    While arms hang, the share is that of the weights, 3 f² - 2 f³ of the way f. Raised to level and above, it is f.
+    """
+    body = template(0.5)
+    shoulder = body.joint_names.index("left_shoulder")
+    arm = [body.joint_names.index(f"left_{name}") for name in ("shoulder", "elbow", "wrist")]
+    share = body.weights[:, arm].sum(axis=1)
+    turn = np.deg2rad([0.0, 0.0, raised])
+    got = bent(body, "left_shoulder", turn).vertices - body.bind_vertices
+    way = Rotation.from_rotvec(turn).apply(body.bind_vertices - body.joints[shoulder])
+    way += body.joints[shoulder] - body.bind_vertices
+    between = (share > 0) & (share < 1)
+    assert ((share > 0.2) & (share < 0.8)).sum() > 50
+    f = (got * way).sum(axis=1)[between] / (way**2).sum(axis=1)[between]
+    assert_allclose(3 * f**2 - 2 * f**3 if even else f, share[between], rtol=0, atol=1e-9)
+    true = share[:, None] * way
+    true[between] = f[:, None] * way[between]
+    assert_allclose(got, true, rtol=0, atol=1e-9)
+
+
+def test_an_arm_goes_where_its_joints_take_it_however_it_is_turned() -> None:
+    """Skin of one joint alone, by the chain of its rotations; a wrist need not lie in line with the upper arm."""
+    rng = np.random.default_rng(7)
+    body = template(0.5)
+    body = replace(body, joints=body.joints + rng.normal(0, 0.01, body.joints.shape))
+    pose = rng.normal(0, 0.7, body.joints.shape)
+    rotation, offset = joint_transforms(body.joints, body.parents, pose)
+    got = pose_avatar(body, pose, np.zeros(3)).vertices
+    for joint in ("left_shoulder", "left_elbow", "right_wrist", "chest", "left_knee", "head"):
+        own = body.joint_names.index(joint)
+        alone = body.weights[:, own] == 1.0
+        assert alone.any(), joint
+        true = body.bind_vertices[alone] @ rotation[own].T + offset[own]
+        assert_allclose(got[alone], true, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,8 @@ from vto_pipeline.avatar.from_silhouettes import SilhouettesConfig, fit_silhouet
 from vto_pipeline.avatar.measure import measure
 from vto_pipeline.avatar.measuring.population import population
 from vto_pipeline.avatar.model.fit import Fit
-from vto_pipeline.avatar.model.pose import joint_transforms
 from vto_pipeline.avatar.model.shape import shape_space
+from vto_pipeline.avatar.model.skinning import joint_transforms
 from vto_pipeline.avatar.silhouettes.backdrop import segment_person
 from vto_pipeline.avatar.silhouettes.fit import (
     SilhouetteView,

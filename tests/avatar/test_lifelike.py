@@ -15,7 +15,8 @@ from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.lifelike.graft import Seat, beyond, fit_part, strip
 from vto_pipeline.avatar.lifelike.lifelike import LifelikeConfig, lifelike_body
 from vto_pipeline.avatar.lifelike.phenotype import TARGETS, shares
-from vto_pipeline.avatar.model.pose import joint_transforms, named_pose, pose_avatar
+from vto_pipeline.avatar.model.pose import named_pose, pose_avatar
+from vto_pipeline.avatar.model.skinning import joint_transforms
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.geometry.intersections import self_intersections
 from vto_pipeline.geometry.signed_distance import SurfaceDistance

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from vto_pipeline.avatar.model.pose import joint_transforms
+from vto_pipeline.avatar.model.skinning import joint_transforms
 from vto_pipeline.avatar.motion.balance import balance, part_masses, zero_moment_point
 from vto_pipeline.avatar.motion.figures import plant_drift, spikes
 from vto_pipeline.avatar.motion.foot_skate import fade_out, hold_feet

@@ -11,7 +11,7 @@ import pytest
 from motion_shapes import NAMES, OFFSETS, PARENTS, random_moves
 from scipy.spatial.transform import Rotation
 
-from vto_pipeline.avatar.model.pose import joint_transforms
+from vto_pipeline.avatar.model.skinning import joint_transforms
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.errors import FormatError
 from vto_pipeline.geometry.topology import vertex_normals

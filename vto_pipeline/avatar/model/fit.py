@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vto_pipeline.avatar.model.pose import joint_transforms, linear_blend_skinning
 from vto_pipeline.avatar.model.shape import ShapeSpace
+from vto_pipeline.avatar.model.skinning import joint_transforms, linear_blend_skinning
 from vto_pipeline.model.arrays import FloatArray
 
 

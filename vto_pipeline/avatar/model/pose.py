@@ -1,8 +1,4 @@
-"""Pose and movement: skinning over the template's skeleton.
-
-A body is posed with dual quaternions, under which a twisted forearm keeps its girth. The linear blend, whose derivative
-is simple, serves where a pose is searched for.
-"""
+"""Poses of a body, named ones, and the movement from one to another."""
 
 from __future__ import annotations
 
@@ -11,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
+from vto_pipeline.avatar.model.skinning import skin_transforms
 from vto_pipeline.avatar.template.body_plan import ARM_ANGLE_RAD
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.intersections import self_intersections
@@ -48,23 +45,8 @@ def pose_avatar(avatar: Avatar, pose: FloatArray, translation: FloatArray) -> Av
 
 def posed_vertices(avatar: Avatar, pose: FloatArray, translation: FloatArray) -> FloatArray:
     """Return where the avatar's vertices are in another pose [m], shape (V, 3); as `pose_avatar`."""
-    rotation, offset = joint_transforms(avatar.joints, avatar.parents, pose)
-    turn, place = blend_transforms(avatar.weights, rotation, offset)
+    turn, place = skin_transforms(avatar.weights, avatar.joint_names, avatar.joints, avatar.parents, pose)
     return np.einsum("vij,vj->vi", turn, avatar.bind_vertices) + place + translation
-
-
-def joint_transforms(joints: FloatArray, parents: np.ndarray, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return what each joint does to the bind pose, x -> R x + t, shapes (J, 3, 3) and (J, 3). Parents come first."""
-    local = Rotation.from_rotvec(np.array(pose, dtype=float)).as_matrix()  # a copy: it refuses read-only arrays
-    rotation, offset = np.empty_like(local), np.empty((len(joints), 3))
-    for j, parent in enumerate(parents):
-        if parent < 0:
-            rotation[j], anchor = local[j], joints[j]
-        else:
-            rotation[j] = rotation[parent] @ local[j]
-            anchor = rotation[parent] @ joints[j] + offset[parent]
-        offset[j] = anchor - rotation[j] @ joints[j]
-    return rotation, offset
 
 
 def parent_rotations(rotation: FloatArray, parents: np.ndarray) -> FloatArray:
@@ -85,46 +67,6 @@ def compose_pose(pose: FloatArray, turn: FloatArray, above: FloatArray) -> Float
         local = parent.T @ Rotation.from_rotvec(turn[j]).as_matrix() @ parent
         turned[j] = (Rotation.from_matrix(local) * Rotation.from_rotvec(pose[j])).as_rotvec()
     return turned
-
-
-def blend_transforms(weights: FloatArray, rotation: FloatArray, offset: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return what happens to each vertex, x -> R x + t, shapes (V, 3, 3) and (V, 3): always a rigid motion.
-
-    Dual quaternion linear blending (Kavan et al. 2007, eq. 18).
-
-    Args:
-        weights: Shape (V, J).
-        rotation: Of the joints, shape (J, 3, 3).
-        offset: Of the joints [m], shape (J, 3).
-    """
-    real = Rotation.from_matrix(rotation).as_quat()
-    x, y, z, w = real.T
-    tx, ty, tz = offset.T
-    dual = np.stack(  # half of translation times rotation
-        [
-            tx * w + ty * z - tz * y,
-            ty * w + tz * x - tx * z,
-            tz * w + tx * y - ty * x,
-            -tx * x - ty * y - tz * z,
-        ],
-        axis=1,
-    )
-    # q and -q are one rotation: take those that lie on the side of the vertex's main joint
-    side = np.where(real @ real.T < 0, -1.0, 1.0)
-    shares = weights * side[np.argmax(weights, axis=1)]
-    mixed, moved = shares @ real, shares @ dual
-    length = np.linalg.norm(mixed, axis=1, keepdims=True)
-    mixed, moved = mixed / length, moved / length
-    v, s, d, e = mixed[:, :3], mixed[:, 3:], moved[:, :3], moved[:, 3:]
-    return Rotation.from_quat(mixed).as_matrix(), s * d - e * v + np.cross(v, d)
-
-
-def linear_blend_skinning(
-    vertices: FloatArray, weights: FloatArray, rotation: FloatArray, offset: FloatArray
-) -> FloatArray:
-    """Return the vertices moved by the linear blend of their joints (Magnenat-Thalmann et al. 1988), shape (V, 3)."""
-    blended = (weights @ rotation.reshape(len(rotation), 9)).reshape(-1, 3, 3)
-    return np.einsum("vij,vj->vi", blended, vertices) + weights @ offset
 
 
 def named_pose(avatar: Avatar, name: str, raised: float = 0.0) -> Avatar:

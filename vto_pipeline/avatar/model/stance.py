@@ -13,8 +13,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from vto_pipeline.avatar.model.fit import Fit
-from vto_pipeline.avatar.model.pose import joint_transforms
 from vto_pipeline.avatar.model.shape import ShapeSpace
+from vto_pipeline.avatar.model.skinning import joint_transforms
 from vto_pipeline.avatar.template.template import ARM, JOINT_KINDS
 from vto_pipeline.model.arrays import FloatArray
 

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from vto_pipeline.avatar.model.fit import Fit
-from vto_pipeline.avatar.model.pose import blend_transforms, joint_transforms, pose_avatar
+from vto_pipeline.avatar.model.pose import pose_avatar
 from vto_pipeline.avatar.model.shape import ShapeSpace
+from vto_pipeline.avatar.model.skinning import joint_transforms, skin_transforms
 from vto_pipeline.avatar.model.stance import Stance
 from vto_pipeline.avatar.scan.displacement import untangle_displacement
 from vto_pipeline.avatar.template.template import JOINTS, membership
@@ -48,14 +49,12 @@ def to_bind_pose(
     Returns:
         The body, and how many faces are still tangled in either pose.
     """
-    faces, weights = space.base.faces, space.base.weights
-    rotation, offset = joint_transforms(stands.joints, space.base.parents, stands.pose)
-    turn, place = blend_transforms(weights, rotation, offset)
+    base, faces = space.base, space.base.faces
+    turn, place = skin_transforms(base.weights, base.joint_names, stands.joints, base.parents, stands.pose)
     place = place + stands.translation
 
     def at_rest(points: FloatArray) -> FloatArray:
-        rest: FloatArray = np.einsum("vba,vb->va", turn, points - place)
-        return rest
+        return np.asarray(np.linalg.solve(turn, (points - place)[..., None])[..., 0], dtype=np.float64)
 
     straight = at_rest(posed)
     for _ in range(_MENDING_ROUNDS):
@@ -67,7 +66,7 @@ def to_bind_pose(
             break
     floor = np.array([0.0, mended[:, 1].min(), 0.0])
     body = replace(
-        space.base,
+        base,
         bind_vertices=mended - floor,
         joints=stands.joints - floor,
         parameters=dict(zip(space.names, fit.parameters.tolist(), strict=True)),

@@ -8,8 +8,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from vto_pipeline.avatar.model.fit import Fit, posed_vertices
-from vto_pipeline.avatar.model.pose import compose_pose, joint_transforms, parent_rotations
+from vto_pipeline.avatar.model.pose import compose_pose, parent_rotations
 from vto_pipeline.avatar.model.shape import ShapeSpace
+from vto_pipeline.avatar.model.skinning import joint_transforms
 from vto_pipeline.avatar.scan.correspondence import Correspondences
 from vto_pipeline.avatar.scan.initial_pose import InitialPose
 from vto_pipeline.avatar.template.template import JOINT_KINDS

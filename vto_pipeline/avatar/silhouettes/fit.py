@@ -17,8 +17,9 @@ from vto_pipeline.avatar.measuring.definitions import DEFINITIONS
 from vto_pipeline.avatar.measuring.population import Population
 from vto_pipeline.avatar.measuring.tape import Tape
 from vto_pipeline.avatar.model.fit import Fit, posed_vertices
-from vto_pipeline.avatar.model.pose import compose_pose, joint_transforms, parent_rotations
+from vto_pipeline.avatar.model.pose import compose_pose, parent_rotations
 from vto_pipeline.avatar.model.shape import ShapeSpace
+from vto_pipeline.avatar.model.skinning import joint_transforms
 from vto_pipeline.avatar.scan.correspondence import Correspondences, geman_mcclure
 from vto_pipeline.avatar.scan.registration import derivatives
 from vto_pipeline.avatar.silhouettes.outline import Camera, ImageOutline, model_outline

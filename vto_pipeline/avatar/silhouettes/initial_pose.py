@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from vto_pipeline.avatar.model.fit import Fit
-from vto_pipeline.avatar.model.pose import joint_transforms, named_pose
+from vto_pipeline.avatar.model.pose import named_pose
 from vto_pipeline.avatar.model.shape import ShapeSpace
+from vto_pipeline.avatar.model.skinning import joint_transforms
 from vto_pipeline.avatar.scan.initial_pose import InitialPose
 from vto_pipeline.avatar.scan.registration import initial_fit
 from vto_pipeline.avatar.silhouettes.fit import Evidence, SilhouetteView, Solution, run_steps

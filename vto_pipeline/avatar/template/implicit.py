@@ -62,6 +62,11 @@ def smoothstep(t: FloatArray) -> FloatArray:
     return t * t * (3 - 2 * t)
 
 
+def unsmoothed(s: FloatArray) -> FloatArray:
+    """Return what `smoothstep` makes s of, 0 to 1: the root of a cubic, by the sine of a third of an angle (Viete)."""
+    return 0.5 - np.sin(np.arcsin(1 - 2 * s) / 3)
+
+
 def smooth_min(a: FloatArray, b: FloatArray, width: FloatArray | float) -> FloatArray:
     """Union of two fields, rounded where they differ by less than `width` [m] (Quilez, polynomial smooth minimum)."""
     overlap = np.maximum(width - np.abs(a - b), 0.0)
