@@ -41,6 +41,18 @@ def test_panels_and_seams_are_measured(vto):
     assert "100 units a metre, assumed" in lines
 
 
+def test_a_pattern_is_made_ready_for_the_cutter(vto):
+    write_discs(Path("discs.json"))
+    said = vto("pattern", "discs.json", "--allowance", "10", "-o", "cut.dxf", "--json")
+    assert said.code == 0
+    assert [one["seam_allowance_mm"] for one in said.data["panels"]] == [pytest.approx(10.0, abs=0.05)] * 2
+    blocks = [block for block in ezdxf.readfile("cut.dxf").blocks if block.name.startswith("P")]
+    assert [len(block.query(f'*[layer=="{layer}"]')) for block in blocks for layer in (4, 7, 14)] == [2, 1, 1] * 2
+    wrong = vto("pattern", "discs.json", "--allowance", "-3")
+    assert (wrong.code, "a seam allowance of -3 mm" in wrong.err) == (2, True)
+    assert vto("pattern", "discs.json", "--allowance", "10", "--sizes", "S,M").code == 2
+
+
 def test_a_drawing_is_sewn_by_a_plan(vto):
     head = 'xmlns="http://www.w3.org/2000/svg" width="500mm" height="500mm" viewBox="0 0 500 500"'
     Path("d.svg").write_text(f'<svg {head}><path id="body" d="M0,0 L400,0 L400,300 L0,300 Z"/></svg>')

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
+
 import ezdxf
 import numpy as np
 import pytest
 from ezdxf import recover
-from hypothesis import given, settings
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 from pattern_shapes import Foreign, half_disc, outline, panels, rich_pattern, shoelace
 
 from vto_pipeline.errors import FormatError, InputError
@@ -16,7 +20,7 @@ from vto_pipeline.io.patterns.read import read_pattern
 from vto_pipeline.io.patterns.record import pattern_of
 from vto_pipeline.io.patterns.write import write_pattern
 from vto_pipeline.model.job import Job
-from vto_pipeline.model.pattern import Pattern
+from vto_pipeline.model.pattern import Edge, InnerLine, Notch, Panel, Pattern, Side, Stitch
 
 SQUARE = [(0, 0), (300, 0), (300, 400), (0, 400)]
 
@@ -285,9 +289,46 @@ def test_all_that_dxf_holds_comes_back(tmp_path):
 def test_any_outline_comes_back(tmp_path_factory, panel):
     path = tmp_path_factory.mktemp("any") / "a.dxf"
     write_pattern(path, Pattern("any", (panel,)))
-    import json
-
     (back,) = pattern_of(json.loads(str(parse_dxf(str(path), "")["pattern"])), "a").panels
     assert len(back.edges) == len(panel.edges)
     assert edges_area(back.edges) == pytest.approx(edges_area(panel.edges), abs=1e-5 * edges_length(panel.edges))
     assert ezdxf.readfile(path).dxfversion
+
+
+WORDS = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=12).filter(
+    lambda text: text == text.strip() and ":" not in text
+)
+
+
+@settings(max_examples=30, deadline=None)
+@given(WORDS, WORDS, WORDS)
+@example("a\nb", "\U0001f600 x", "\\U+0041 \\M+1 %%d ^J")
+def test_any_words_come_back(tmp_path_factory, name, label, note):
+    path = tmp_path_factory.mktemp("words") / "a.dxf"
+    (first, *rest) = half_disc(0.3, name).edges
+    panel = Panel(name, (replace(first, label=label), *rest), size=label, notes=(note,))
+    write_pattern(path, Pattern(name, (panel,), (Stitch((Side(name, 0),), (Side(name, 1),)),)))
+    assert path.read_bytes().isascii()
+    back = pattern_of(json.loads(str(parse_dxf(str(path), "")["pattern"])), "a")
+    (now,) = back.panels
+    assert (back.name, now.name, now.size, now.notes) == (name, name, label, (note,))
+    assert [edge.label for edge in now.edges] == [label, ""]
+    assert back.stitches[0].first == (Side(name, 0),)
+
+
+def test_notches_and_sewing_lines_keep_their_kind(tmp_path):
+    kinds = [("slit", 0.0), ("v", np.pi), ("v", None), ("t", -0.5)]
+    notches = tuple(Notch(np.array([0.1 * k, 0.0]), angle, 0.003, kind) for k, (kind, angle) in enumerate(kinds))
+    pocket = np.array([[0.0, 0.1], [0.05, 0.1], [0.05, 0.15], [0.0, 0.1]])
+    lines = (InnerLine("sew", (Edge("polyline", pocket),)), InnerLine("sew", (Edge("polyline", pocket[:3] - 0.05),)))
+    disc = half_disc(0.3)
+    plain = Panel("plain", disc.edges, notches=notches, lines=lines)
+    wide = Panel("wide", disc.edges, lines=lines, cut=half_disc(0.35).edges)
+    write_pattern(tmp_path / "k.dxf", Pattern("k", (plain, wide)))
+    for now, was in zip(read_pattern(tmp_path / "k.dxf").panels, (plain, wide), strict=True):
+        assert [(n.kind, n.angle) for n in now.notches] == [
+            (n.kind, None if n.angle is None else pytest.approx(n.angle)) for n in was.notches
+        ]
+        assert [len(line.curves[0].points) for line in now.lines if line.kind == "sew"] == [4, 3]
+        assert edges_area(now.edges) == pytest.approx(0.5 * np.pi * 0.3**2, rel=1e-4)
+        assert bool(now.cut) == bool(was.cut)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -20,6 +21,7 @@ from vto_pipeline.io.patterns.write import write_pattern
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.pattern import Pattern
 
+BEANIES = Path(__file__).parents[3] / "shared/data/patterns/jarmo_svg_cc0/beanie"
 SPACE = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
 
 
@@ -116,6 +118,30 @@ def test_an_outline_drawn_in_pieces_is_joined(tmp_path):
     body += '<path d="M100,100.05 C 100,200 100,250 100,300"/>'
     (panel,) = read(tmp_path, body).panels
     assert edges_area(panel.edges) == pytest.approx(0.04, rel=1e-3)
+
+
+def test_where_no_line_is_a_panel_the_likeliest_are_named(tmp_path):
+    body = """<path id="pen" d="M100,100 h400 v4 h-400 z"/><rect id="dot" x="500" y="10" width="10" height="10"/>
+      <path id="half" d="M100,500 v300 h300"/><path id="tick" d="M800,500 v30"/>"""
+    with pytest.raises(FormatError, match="2 are closed, of which pen encloses most, 16 cm² and 4 mm wide") as raised:
+        read(tmp_path, body)
+    # a pen stroke of 400 by 4 mm is 2 x 1600 / 808 = 3.96 mm wide; the open line's ends are a diagonal apart
+    assert "2 are open, of which half is the longest, 600 mm, and ends 424 mm from its start" in raised.value.problem
+    assert (raised.value.where, "one closed line" in raised.value.hint) == ("d.svg", True)
+    with pytest.raises(FormatError, match="nothing is drawn"):
+        read(tmp_path, "")
+
+
+@pytest.mark.real_data
+@pytest.mark.skipif(not BEANIES.exists(), reason="the drawings are not here")
+@pytest.mark.parametrize(
+    ("name", "entity"),
+    [("beanie_g538.svg", "use281"), ("beanie_g542.svg", "path-1-05"), ("beanie_g543.svg", "path-1-9")],
+)
+def test_pen_strokes_by_others_are_refused_by_name(name, entity):
+    with pytest.raises(FormatError, match=f"of which {entity} ") as raised:
+        read_pattern(BEANIES / name)
+    assert raised.value.where == name
 
 
 def test_no_panels_no_svg_and_bombs_are_refused(tmp_path):

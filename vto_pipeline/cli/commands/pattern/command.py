@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 @click.option("--format", "form", type=click.Choice(("json", "dxf", "svg")), default="json", help="Of graded sizes.")
 @click.option("--unit", type=click.Choice(sorted(LENGTH_M)), help="Unit of length, in place of the file's.")
 @click.option("--plan", type=PATH, metavar="FILE", help="Where panels stand and what is sewn to what.")
+@click.option("--allowance", type=float, metavar="MM", help="Add cut lines so far outside, notches, and grain lines.")
 @click.option(
     "--seams",
     default="auto",
@@ -61,6 +62,7 @@ def pattern_command(
     form: str,
     unit: str | None,
     plan: Path | None,
+    allowance: float | None,
     seams: str,
     fabric: str,
 ) -> None:
@@ -74,6 +76,7 @@ def pattern_command(
     vto pattern P1043.dxf --type trousers
     vto pattern shirt.dxf --size M -o shirt_M.svg
     vto pattern tee.svg --plan sewing.yaml -o tee.json
+    vto pattern tee.json --allowance 10 -o tee.dxf
     vto pattern tee.json --sizes S,M,L,XL --base M -o tee_sizes/ --format dxf
     vto pattern patterns/
     vto pattern scanned_tee.ply --seams seams.yaml -o tee.json -o tee.svg
@@ -84,6 +87,8 @@ def pattern_command(
     from vto_pipeline.model.job import Job
 
     files = _files(paths)
+    if allowance is not None and (sizes is not None or len(files) != 1):
+        raise ConfigError("--allowance takes one pattern, and does not go with --sizes", hint="grade what it writes")
     if plan is not None and (sizes is not None or len(files) != 1):
         raise ConfigError("--plan takes one pattern, and does not go with --sizes")
     if sizes is not None:
@@ -100,12 +105,12 @@ def pattern_command(
             if size is not None or plan is not None:
                 raise ConfigError("--size and --plan go with patterns, and a mesh is given")
             taken = take_apart(files[0], seams, fabric, unit, job)
-            _describe(session, files[0], taken.pattern, outputs, kind, job, taken)
+            _describe(session, files[0], _finished(taken.pattern, allowance), outputs, kind, job, taken)
         else:
             pattern = _sized(read_pattern(files[0], unit=unit, job=job), size)
             if plan is not None:
                 pattern = _as_planned(pattern, plan, job)
-            _describe(session, files[0], pattern, outputs, kind, job, None)
+            _describe(session, files[0], _finished(pattern, allowance), outputs, kind, job, None)
         return
     if outputs:
         raise ConfigError(f"--output takes one pattern, and {len(files)} are given")
@@ -190,6 +195,12 @@ def _describe(
 
 def _sized(pattern: Pattern, size: str | None) -> Pattern:
     return pattern if size is None else pattern.of_size(size)
+
+
+def _finished(pattern: Pattern, allowance: float | None) -> Pattern:
+    from vto_pipeline.garment.pattern.finish import finished
+
+    return pattern if allowance is None else finished(pattern, 1e-3 * allowance)
 
 
 def _as_planned(pattern: Pattern, plan: Path, job: Job) -> Pattern:

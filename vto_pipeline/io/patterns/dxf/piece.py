@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -12,6 +13,7 @@ from vto_pipeline.io.patterns.dxf import layers
 from vto_pipeline.io.patterns.dxf.borders import split_at_borders
 from vto_pipeline.io.patterns.dxf.entities import Piece
 from vto_pipeline.io.patterns.dxf.placement_text import placement_of
+from vto_pipeline.io.patterns.dxf.remarks import is_said, with_texts
 from vto_pipeline.io.patterns.dxf.texts import key_and_value
 from vto_pipeline.io.patterns.fold import Fold, fold_of
 from vto_pipeline.io.patterns.loops import JOIN_M, Chain, Joined, anticlockwise, edges_area, join
@@ -20,6 +22,7 @@ from vto_pipeline.model.pattern import Edge, InnerLine, Notch, Panel
 
 _READ = {layers.BOUNDARY, layers.TURN_POINTS, layers.CURVE_POINTS, layers.MIRROR, layers.GRAIN, layers.DRILLS,
          layers.SEW, layers.ANNOTATION, *layers.NOTCH_KINDS, *layers.LINE_KINDS}  # fmt: skip
+_SEAM_SHARE = 0.3  # of what the boundary encloses, in a seam line all round; of a narrow strip an allowance takes half
 _NAMES = ("PIECE NAME", "SIZE")
 _DROPPED = {layers.GRADE_REFERENCE: "grade reference", **dict.fromkeys(layers.VALIDATION, "curves to validate with")}
 
@@ -43,10 +46,13 @@ def panel_of(piece: Piece, block: str, scale: float, notes: list[str]) -> Panel:
     outline, holes = _outline(join(chains.get(layers.BOUNDARY, [])), block, notes)
     sewn = join(chains.get(layers.SEW, []))
     cut: tuple[Edge, ...] = ()
-    if sewn.loops:
-        cut, outline = outline, _largest(sewn.loops)
+    inner = [*sewn.loops, *sewn.open, *sewn.branching]
+    seam = _largest(sewn.loops) if sewn.loops else ()
+    if seam and abs(edges_area(seam)) > _SEAM_SHARE * abs(edges_area(outline)):
+        cut, outline = outline, seam
+        inner = [line for line in inner if line.edges is not seam]
     lines = [InnerLine("cutout", hole.edges) for hole in holes]
-    lines += [InnerLine("sew", line.edges) for line in (*sewn.open, *sewn.branching)]
+    lines += [InnerLine("sew", line.edges) for line in inner]
     for layer, kind in layers.LINE_KINDS.items():
         lines += [InnerLine(kind, chain.edges) for chain in chains.get(layer, [])]
     drills = _places(piece, layers.DRILLS, scale)
@@ -69,6 +75,7 @@ def panel_of(piece: Piece, block: str, scale: float, notes: list[str]) -> Panel:
         placement=next(filter(None, (placement_of(text) for _, text in piece.texts)), None),
         notes=_remarks(piece),
     )
+    panel = with_texts(panel, (text for _, text in piece.texts))
     if mirror is None:
         return panel
     if Fold(mirror).cuts_off(edges):
@@ -81,7 +88,8 @@ def _remarks(piece: Piece) -> tuple[str, ...]:
     """Return what else the file says of a piece."""
     texts = [text for layer, text in piece.texts if layer in (layers.BOUNDARY, layers.ANNOTATION)]
     told = (*_NAMES, "UNITS")
-    return tuple(dict.fromkeys(t for t in texts if key_and_value(t)[0] not in told and placement_of(t) is None))
+    own = (t for t in texts if key_and_value(t)[0] not in told and placement_of(t) is None and not is_said(t))
+    return tuple(dict.fromkeys(own))
 
 
 def _outline(joined: Joined, block: str, notes: list[str]) -> tuple[tuple[Edge, ...], list[Chain]]:
@@ -135,11 +143,16 @@ def _notches(piece: Piece, chains: dict[int, list[Chain]], scale: float) -> tupl
     found = []
     for layer, kind in layers.NOTCH_KINDS.items():
         for place, angle, depth in piece.points.get(layer, ()):
-            found.append(Notch(scale * place, None if angle is None else float(np.deg2rad(angle)), scale * depth, kind))
+            found.append(Notch(scale * place, None if angle is None else _radians(angle), scale * depth, kind))
         for chain in chains.get(layer, ()):
             x, y = chain.end - chain.start
             found.append(Notch(chain.start, float(np.arctan2(y, x)), float(np.hypot(x, y)), kind))
     return tuple(found)
+
+
+def _radians(degrees: float) -> float:
+    """Return an angle within half a turn of zero."""
+    return math.radians(math.remainder(degrees, 360.0))
 
 
 def _note_the_rest(piece: Piece, block: str, notes: list[str]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from vto_pipeline.io.files import replacing
-from vto_pipeline.io.patterns.dxf import layers, placement_text
+from vto_pipeline.io.patterns.dxf import layers, placement_text, remarks
 from vto_pipeline.io.patterns.dxf.stitch_texts import text_of
 from vto_pipeline.io.patterns.loops import edges_points
 from vto_pipeline.model.arrays import FloatArray
@@ -27,6 +28,7 @@ _LAYER_OF_LINE = {kind: layer for layer, kind in layers.LINE_KINDS.items()} | {
     "sew": layers.SEW,
     "mirror": layers.MIRROR,
 }
+_ESCAPED = re.compile(r"\\(?=[UM]\+)")  # a backslash that a reader would take for the start of an escape
 
 
 def write_dxf(path: Path, pattern: Pattern) -> None:
@@ -67,6 +69,7 @@ def _draw(block: Any, panel: Panel) -> None:
     words = [f"PIECE NAME: {panel.name}", *([f"SIZE: {panel.size}"] if panel.size else []), *panel.notes]
     if panel.placement is not None:
         words.append(placement_text.text_of(panel.placement))
+    words += remarks.texts_of(panel)
     middle = _MM * edges_points(panel.edges, CURVE_M).mean(axis=0)
     for number, text in enumerate(words):
         _text(block, text, layers.BOUNDARY, (middle[0], middle[1] - 2.0 * _TEXT_MM * number))
@@ -86,7 +89,7 @@ def _draw(block: Any, panel: Panel) -> None:
         attributes: dict[str, Any] = {"layer": str(_LAYER_OF_NOTCH.get(notch.kind, layers.NOTCHES))}
         attributes["thickness"] = _MM * notch.depth
         if notch.angle is not None:
-            attributes["angle"] = float(np.rad2deg(notch.angle))
+            attributes["angle"] = float(np.rad2deg(notch.angle)) or 360.0  # ezdxf leaves out what is 0
         block.add_point(tuple(_MM * notch.position), dxfattribs=attributes)
     for place in () if panel.drills is None else panel.drills:
         block.add_point(tuple(_MM * place), dxfattribs={"layer": str(layers.DRILLS)})
@@ -118,5 +121,6 @@ def _text(block: Any, text: str, layer: int, place: tuple[float, float]) -> None
 
 
 def _ascii(text: str) -> str:
-    """Return a text in seven bits, other letters as DXF escapes them."""
-    return "".join(c if c.isascii() else f"\\U+{ord(c):04X}" if c <= "\uffff" else "?" for c in text)
+    """Return a text in seven bits and one line, other letters as DXF escapes them: by two where UTF-16 takes two."""
+    units = np.frombuffer(_ESCAPED.sub("\\\\U+005C", text).encode("utf-16-le", "surrogatepass"), "<u2")
+    return "".join(chr(unit) if 0x20 <= unit < 0x7F else f"\\U+{unit:04X}" for unit in units.tolist())

@@ -7,7 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from vto_pipeline.errors import FormatError
-from vto_pipeline.io.patterns.loops import JOIN_M, Chain, anticlockwise, edges_area, edges_points, join, moved_ends
+from vto_pipeline.io.patterns.loops import (
+    JOIN_M,
+    Chain,
+    Joined,
+    anticlockwise,
+    edges_area,
+    edges_length,
+    edges_points,
+    join,
+    moved_ends,
+)
 from vto_pipeline.io.patterns.svg.shapes import Drawing, Drawn
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.pattern import Edge, InnerLine, Panel, Pattern
@@ -17,6 +27,7 @@ _LEAST_M2 = 4e-4  # of a panel: a pocket flap has ten times that, a letter less
 _LEAST_WIDTH_M = 1e-2  # mean, of a panel: a pen stroke drawn as an area has less
 _TOLERANCE_M = 1e-4  # of outlines, to tell what lies inside
 _SPECK_M = 1e-5  # shorter edges are rounding
+_REDRAW = "draw each panel's outline as one closed line, not as the area of a pen stroke, and check the drawing's scale"
 _ASKED = 60  # points of a line of which it is asked whether they lie inside
 
 
@@ -46,10 +57,7 @@ def drawn_pattern(drawing: Drawing, name: str, notes: list[str]) -> Pattern:
         else:
             inner.setdefault(holder, []).append(InnerLine("internal", loop.edges))
     if not outer:
-        least = f"{1e4 * _LEAST_M2:g} cm² or more and {1e3 * _LEAST_WIDTH_M:g} mm wide on average"
-        counts = f"{len(joined.loops)} are closed, none of {least}, and {len(joined.open)} open"
-        problem = f"no line is a panel: {counts}"
-        raise FormatError(problem, hint="close the outlines, and check the scale of the drawing")
+        raise FormatError(f"no line is a panel: {_why_none(joined)}", hint=_REDRAW)
     stray = []
     for line in (*joined.open, *joined.branching):
         holder = _holder(outer, line.edges)
@@ -71,6 +79,28 @@ def drawn_pattern(drawing: Drawing, name: str, notes: list[str]) -> Pattern:
     ]
     notes.append("SVG by others names no seams, notches or grain; right sides are taken to face the viewer")
     return Pattern(name, tuple(panels), unit=drawing.unit)
+
+
+def _why_none(joined: Joined) -> str:
+    """Return what keeps the closed line that encloses most, and the longest open one, from being panels."""
+    said = []
+    if joined.loops:
+        most = max(joined.loops, key=lambda loop: abs(edges_area(loop.edges)))
+        area, length = abs(edges_area(most.edges)), edges_length(most.edges)
+        said.append(
+            f"{len(joined.loops)} are closed, of which {most.name} encloses most, {1e4 * area:.3g} cm² and "
+            f"{2e3 * area / length:.2g} mm wide on average, where a panel has {1e4 * _LEAST_M2:g} cm² and "
+            f"{1e3 * _LEAST_WIDTH_M:g} mm"
+        )
+    loose = (*joined.open, *joined.branching)
+    if loose:
+        longest = max(loose, key=lambda chain: edges_length(chain.edges))
+        gap = 1e3 * float(np.linalg.norm(longest.start - longest.end))
+        said.append(
+            f"{len(loose)} are open, of which {longest.name} is the longest, "
+            f"{1e3 * edges_length(longest.edges):.0f} mm, and ends {gap:.0f} mm from its start"
+        )
+    return "; ".join(said) or "nothing is drawn"
 
 
 def _closed(line: Drawn) -> tuple[Edge, ...]:
