@@ -24,6 +24,7 @@ from vto_pipeline.geometry.topology import (
     submesh,
     surface_area,
 )
+from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
@@ -32,6 +33,7 @@ _ACROSS = 3.0  # edges that a strap is wide at least: it needs finer triangles t
 _TRIES = 3  # each with half the edge of the one before
 _LEAST_EDGE_MM = 1.0  # the remesher's
 _CUT_SHORT = 0.15  # of a piece's area: chords take a few per cent, and folds tighter than the edges much more
+_IN_CORNERS = 0.5  # of the least angle, in a panel: sharp corners of its outline make sharp triangles
 _PINHOLE = 3.0  # edges around: what triangles of that size cannot go round, and no limb goes through
 
 
@@ -48,11 +50,20 @@ class SimulationMeshConfig(Config):
     )
 
 
-def remesh_for_simulation(garment: TriangleMesh, config: SimulationMeshConfig, job: Job) -> TriangleMesh:
+def remesh_for_simulation(
+    garment: TriangleMesh, config: SimulationMeshConfig, job: Job, laid: FloatArray | None = None
+) -> TriangleMesh:
     """Return the garment in near-equilateral triangles of the wanted size, its pieces and their openings kept.
 
     A piece that is good enough is used as it is, one too narrow for such triangles is given finer ones, and one that
     no size suits stays as it was. Pieces too small to be cloth are dropped. All of it is reported.
+
+    Args:
+        garment: Any triangles [m].
+        config: Settings.
+        job: Receives what was done.
+        laid: Corners of its triangles in the panels that it was sewn from, shape (F, 3, 2) [m]. They are judged there:
+            that is their shape without forces, and other triangles would lie across the seams.
 
     Raises:
         InputError: no face has an area.
@@ -60,11 +71,13 @@ def remesh_for_simulation(garment: TriangleMesh, config: SimulationMeshConfig, j
     usable = is_manifold(garment) and is_oriented(garment)
     sound = garment if usable else repair(garment, RepairConfig(), job)
     pieces = list(_pieces(sound, config, job))
+    corners = laid if sound is garment else None
     made = []
-    for k, piece in enumerate(pieces):
+    for k, (piece, own) in enumerate(pieces):
         job.progress(k / len(pieces), "remeshing")
-        made.append(_remesh_piece(piece, config, job))
-    if all(one is piece for one, piece in zip(made, pieces, strict=True)) and len(pieces) == face_components(sound)[0]:
+        made.append(_remesh_piece(piece, config, job, None if corners is None else corners[own]))
+    kept = all(one is piece for one, (piece, _) in zip(made, pieces, strict=True))
+    if kept and len(pieces) == face_components(sound)[0]:
         return sound
     whole = concatenate(made)
     length = 1e3 * edge_lengths(whole)
@@ -82,33 +95,37 @@ def remesh_for_simulation(garment: TriangleMesh, config: SimulationMeshConfig, j
     return whole
 
 
-def reason_to_skip_remeshing(mesh: TriangleMesh, config: SimulationMeshConfig) -> str | None:
-    """Return why a mesh can be simulated as it is, or None."""
+def reason_to_skip_remeshing(
+    mesh: TriangleMesh, config: SimulationMeshConfig, laid: FloatArray | None = None
+) -> str | None:
+    """Return why a mesh can be simulated as it is, or None; laid: corners of its triangles in panels, (F, 3, 2) [m]."""
     if not is_manifold(mesh):
         return None
     median = float(np.median(edge_lengths(mesh))) * 1e3
     if abs(median / config.edge_mm - 1.0) > config.tolerance:
         return None
-    sharpest = float(np.rad2deg(least_angles(mesh).min()))
-    if sharpest < config.least_angle_deg:
+    corners, share = (mesh.vertices[mesh.faces], 1.0) if laid is None else (laid, _IN_CORNERS)
+    sharpest = float(np.rad2deg(least_angles(corners).min()))
+    if sharpest < share * config.least_angle_deg:
         return None
     return f"edges are {median:.1f} mm at the median and no angle is below {sharpest:.0f}°: used as it is"
 
 
-def least_angles(mesh: TriangleMesh) -> NDArray[np.float64]:
-    """Return the least angle of each face [rad], shape (F,); zero for a face without area."""
-    corners = mesh.vertices[mesh.faces]
+def least_angles(corners: FloatArray) -> FloatArray:
+    """Return the least angle of triangles (F, 3, D) [rad], shape (F,); zero for one without area."""
     side = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     a, b, c = np.sort(side, axis=1).T  # the least angle lies opposite the shortest side
     cosine = (b**2 + c**2 - a**2) / np.maximum(2.0 * b * c, 1e-30)
     return np.where(b > 0.0, np.arccos(np.clip(cosine, -1.0, 1.0)), 0.0)
 
 
-def _pieces(mesh: TriangleMesh, config: SimulationMeshConfig, job: Job) -> Iterator[TriangleMesh]:
-    """Yield the pieces that are cloth, in the order of their first faces; the largest always is."""
+def _pieces(
+    mesh: TriangleMesh, config: SimulationMeshConfig, job: Job
+) -> Iterator[tuple[TriangleMesh, NDArray[np.bool_]]]:
+    """Yield the pieces that are cloth and their faces, in the order of these; the largest always is."""
     piece, area = component_areas(mesh)
     if len(area) == 1:
-        yield mesh
+        yield mesh, np.ones(len(mesh.faces), dtype=bool)
         return
     small = area < min(config.least_piece * (1e-3 * config.edge_mm) ** 2, float(area.max()))
     if small.any():
@@ -116,12 +133,12 @@ def _pieces(mesh: TriangleMesh, config: SimulationMeshConfig, job: Job) -> Itera
         least = f"{config.least_piece:g} squares of the target edge"
         job.note(f"dropped {int(small.sum())} of {len(area)} pieces smaller than {least}: {lost}")
     for k in np.flatnonzero(~small):
-        yield submesh(mesh, piece == k)[0]
+        yield submesh(mesh, piece == k)[0], piece == k
 
 
-def _remesh_piece(piece: TriangleMesh, config: SimulationMeshConfig, job: Job) -> TriangleMesh:
-    """Return a piece in even triangles."""
-    reason = reason_to_skip_remeshing(piece, config)
+def _remesh_piece(piece: TriangleMesh, config: SimulationMeshConfig, job: Job, laid: FloatArray | None) -> TriangleMesh:
+    """Return a piece in even triangles; laid: corners of those that it has in panels, (F, 3, 2) [m]."""
+    reason = reason_to_skip_remeshing(piece, config, laid)
     if reason and not job.force_all:
         job.leave_out("remeshing", reason)
         return piece

@@ -135,7 +135,10 @@ def _take_mesh(inputs: Inputs, settings: RepairConfig, job: Job) -> Outputs:
 
 
 def _simulation_mesh(inputs: Inputs, settings: SimulationMeshConfig, job: Job) -> Outputs:
-    return {"sim_mesh": remesh_for_simulation(inputs["garment"], settings, job)}
+    garment, laid = inputs["garment"], None
+    if "garment_pattern" in inputs and np.array_equal(inputs["garment_mesh"].faces, garment.faces):
+        laid = inputs["garment_mesh"].texture  # `sew` puts the panels there; what repairs a mesh drops it
+    return {"sim_mesh": remesh_for_simulation(garment, settings, job, laid)}
 
 
 def _rest_shape(inputs: Inputs, settings: RestShapeConfig, job: Job) -> Outputs:
@@ -220,6 +223,7 @@ STAGES: tuple[Stage, ...] = (
         name="simulation_mesh",
         about="the garment in even triangles, for simulation",
         needs=("garment",),
+        optional=("garment_pattern", "garment_mesh"),
         makes=("sim_mesh",),
         run=_simulation_mesh,
         settings=SimulationMeshConfig,

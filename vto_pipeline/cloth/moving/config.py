@@ -26,7 +26,7 @@ class FollowConfig(StepConfig, Materials):
     )
     finest: int = Field(64, ge=1, le=10000, description="Most steps per 1/60 s that one frame may take")
     attempts: int = Field(
-        4, ge=1, le=20, description="How often a frame is tried while cloth meets the body in it or overstretches"
+        8, ge=1, le=20, description="How often a frame is tried while cloth meets the body in it or overstretches"
     )
     stretch_limit: float = Field(
         1.0,

@@ -76,7 +76,8 @@ def triangulate_panel(panel: Panel, samples: Samples, edge: float) -> FlatPanel:
     flat = TriangleMesh(np.concatenate([points, np.zeros((len(points), 1))], axis=1), faces)
     fine = refine(flat, edge, np.zeros((len(points), len(points)), np.bool_))
     outline = len(loops[0])
-    return FlatPanel(panel.name, fine.vertices[:, :2], fine.faces, first.astype(np.int32), outline, least_angles(fine))
+    angles = least_angles(fine.vertices[fine.faces])
+    return FlatPanel(panel.name, fine.vertices[:, :2], fine.faces, first.astype(np.int32), outline, angles)
 
 
 def _evenly(points: FloatArray, edge: float) -> FloatArray:
