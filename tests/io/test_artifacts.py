@@ -52,6 +52,7 @@ VALUES: dict[str, Any] = {
     "garment_surface": TriangleMesh(POINTS, FACES, COLORS),
     "garment_scan_report": {"metric": True, "scale": {"source": "board", "error_percent": 0.01}},
     "garment_placement": POSES[0],
+    "source_turn": POSES[1],
     "labels": SurfaceLabels(RNG.random(8) > 0.5, RNG.random(8)),
     "garment_shell": MESH,
     "garment": MESH,

@@ -13,9 +13,10 @@ from vto_pipeline.io.meshes import read_mesh
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
-from vto_pipeline.stages import cloth
+from vto_pipeline.stages import CATALOGUE, avatar, cloth, outfit
 
 SAMPLES = Path(__file__).parents[2] / "sample_data" / "shirt_on_form"
+LAYERS = SimpleNamespace(meshes={}, audit={}, trace=())
 Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
@@ -32,10 +33,11 @@ def test_what_is_draped_stands_as_the_body_does(pair, turn: np.ndarray, monkeypa
     inputs = {
         "sim_mesh": garment,
         "rest_shape": RestShape(garment.vertices),
-        "mannequin_surface": TriangleMesh(form.vertices @ turn.T, form.faces),
         "collider": None,
         "fabric": None,
     }
+    source = {"mannequin_surface": TriangleMesh(form.vertices @ turn.T, form.faces)}
+    inputs |= avatar._stand_source(source, None, Job())
     seen = []
 
     def take(garment, *_):  # type: ignore[no-untyped-def]
@@ -47,7 +49,14 @@ def test_what_is_draped_stands_as_the_body_does(pair, turn: np.ndarray, monkeypa
     monkeypatch.setattr(cloth, "drape", take)
     inputs["worn_rest"] = cloth._grade(inputs, cloth.GradeConfig(), Job())["worn_rest"]
     cloth._drape(inputs, None, Job())
-    assert len(seen) == 2
+
+    monkeypatch.setattr(outfit, "assumption_notes", lambda fabric: ())
+    monkeypatch.setattr(outfit, "drape_layers", lambda layers, *_: take(layers[0].garment) and LAYERS)
+    rows = {row.name: row for row in outfit.outfit_tables(CATALOGUE, ("vest", "coat")).stages}
+    layered = {f"{name}_{key}": inputs[key] for name in ("vest", "coat") for key in ("sim_mesh", "worn_rest", "fabric")}
+    assert "source_turn" in rows["drape"].optional
+    rows["drape"].run({**layered, "collider": None, "source_turn": inputs["source_turn"]}, None, Job())
+    assert len(seen) == 3
     for given in seen:
         assert_allclose(given.mesh.vertices, shirt.vertices, rtol=0, atol=1e-12)
         assert_allclose(given.rest.positions, shirt.vertices, rtol=0, atol=1e-12)

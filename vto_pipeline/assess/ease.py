@@ -84,12 +84,9 @@ def ease_at(
     inner = max(body_hulls(body, origin, normal, body_faces), key=lambda hull: hull.perimeter, default=None)
     if inner is None:
         return None
-    section = plane_section(garment, origin, normal)
-    around = [
-        (hull, part)
-        for hull, part in _hulls(section, origin, normal)
-        if section.is_closed(part) and _alone(hull, inner, body_hulls(body, origin, normal))
-    ]
+    section, held = plane_section(garment, origin, normal), body_hulls(body, origin, normal)
+    lines = [(hull, part) for hull, part in _hulls(section, origin, normal) if section.is_closed(part)]
+    around = [(hull, part) for hull, part in lines if _alone(hull, inner, held)]
     if not around:
         section = plane_section(garment, origin, normal, garment_faces)
         around = [(hull, part) for hull, part in _hulls(section, origin, normal) if hull.encloses(inner.center)]

@@ -49,17 +49,17 @@ def stood_up(body: TriangleMesh, job: Job) -> TriangleMesh:
 
 
 def turn_of(source: TriangleMesh, job: Job) -> FloatArray:
-    """Return the turn (3, 3) that the avatar of a body has from its file: what makes +Y up.
+    """Return the turn that the avatar of a body has from its file: what makes +Y up, shape (4, 4).
 
     Args:
         source: The body that a garment was on, any axis up [m].
         job: Notified where that is a turn.
     """
-    found = best_axis(in_metres(source, Job()))
-    if found is None or found.name == "+Y":
-        return np.eye(3)
-    job.note(f"{found.name} of the body that the garment was on is up; both were turned so that +Y is up")
-    return found.turn
+    found, turn = best_axis(in_metres(source, Job())), np.eye(4)
+    if found is not None and found.name != "+Y":
+        job.note(f"{found.name} of the body that the garment was on is up; both were turned so that +Y is up")
+        turn[:3, :3] = found.turn
+    return turn
 
 
 def warn_of_several(body: TriangleMesh, job: Job) -> None:

@@ -14,6 +14,7 @@ from vto_pipeline.avatar.from_silhouettes import SilhouettesConfig, fit_silhouet
 from vto_pipeline.avatar.lifelike.lifelike import LifelikeConfig, lifelike_body
 from vto_pipeline.avatar.measuring.avatar_measurements import landmarks, measure_avatar
 from vto_pipeline.avatar.model.pose import clear_pose
+from vto_pipeline.avatar.standing import turn_of
 from vto_pipeline.io.captures.images import read_image
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.settings import Config
@@ -33,6 +34,10 @@ class PoseConfig(Config):
 
 def _register_mannequin(inputs: Inputs, settings: ScanConfig, job: Job) -> Outputs:
     return {"source_avatar": fit_scan(inputs["mannequin_surface"], settings, job)}
+
+
+def _stand_source(inputs: Inputs, settings: Config, job: Job) -> Outputs:
+    return {"source_turn": turn_of(inputs["mannequin_surface"], job)}
 
 
 def _shape_mannequin(inputs: Inputs, settings: MeasurementsConfig, job: Job) -> Outputs:
@@ -89,6 +94,13 @@ STAGES: tuple[Stage, ...] = (
         run=_register_mannequin,
         settings=ScanConfig,
         uses=("scipy", "libigl"),
+    ),
+    Stage(
+        name="stand_source",
+        about="the axis along which the body stands that the garment was on: both are turned alike",
+        needs=("mannequin_surface",),
+        makes=("source_turn",),
+        run=_stand_source,
     ),
     Stage(
         name="shape_mannequin",

@@ -11,13 +11,13 @@ from pydantic import Field
 
 from vto_pipeline.avatar.model.pose import morph
 from vto_pipeline.avatar.scan.body_transfer import transfer_motion
-from vto_pipeline.avatar.standing import stood_up, turn_of, warn_of_several
+from vto_pipeline.avatar.standing import stood_up, warn_of_several
 from vto_pipeline.cloth.drape import drape
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.placement.regrade import GradeConfig, worn_rest
 from vto_pipeline.geometry.metres import need_metres
+from vto_pipeline.geometry.rigid import transform_mesh
 from vto_pipeline.io.fabric_formats.assumed import assumption_notes
-from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.garment import Garment
 from vto_pipeline.model.job import Job
@@ -53,26 +53,24 @@ def _mesh_morph(inputs: Inputs, settings: MorphConfig, job: Job) -> Outputs:
     return {"collider": transfer_motion(body, motion)}
 
 
-def _turned(inputs: Inputs, job: Job) -> tuple[TriangleMesh, FloatArray]:
-    """Return the simulation mesh in the frame of the body that moves under it, and its turn into that, (3, 3)."""
-    mesh, source = inputs["sim_mesh"], inputs.get("mannequin_surface")
-    if source is None:
-        return mesh, np.eye(3)
-    turn = turn_of(source, job)
-    return replace(mesh, vertices=mesh.vertices @ turn.T), turn
+def in_body_frame(mesh: TriangleMesh, inputs: Inputs) -> TriangleMesh:
+    """Return a garment's mesh turned as the body that it was on, if that is known."""
+    turn = inputs.get("source_turn")
+    return mesh if turn is None else transform_mesh(mesh, turn)
 
 
 def _grade(inputs: Inputs, settings: GradeConfig, job: Job) -> Outputs:
-    mesh, turn = _turned(inputs, Job())
-    rest = inputs["rest_shape"]
-    garment = Garment(mesh, replace(rest, positions=rest.positions @ turn.T))
+    mesh, rest = inputs["sim_mesh"], inputs["rest_shape"]
+    lain = in_body_frame(TriangleMesh(rest.positions, mesh.faces), inputs)
+    garment = Garment(in_body_frame(mesh, inputs), replace(rest, positions=lain.vertices))
     return {"worn_rest": worn_rest(garment, inputs["collider"], settings, job)}
 
 
 def _drape(inputs: Inputs, settings: DrapeConfig, job: Job) -> Outputs:
     for text in assumption_notes(inputs["fabric"]):
         job.note(text)
-    garment = Garment(_turned(inputs, job)[0], inputs["worn_rest"], laid_out="garment_pattern" in inputs)
+    mesh = in_body_frame(inputs["sim_mesh"], inputs)
+    garment = Garment(mesh, inputs["worn_rest"], laid_out="garment_pattern" in inputs)
     draped = drape(garment, inputs["collider"], inputs["fabric"], settings, job)
     return {"draped": draped.mesh, "audit": dict(draped.audit), "trace": tuple(draped.trace)}
 
@@ -100,7 +98,7 @@ STAGES: tuple[Stage, ...] = (
         name="grade",
         about="the same garment, or the garment made in the customer's size",
         needs=("sim_mesh", "rest_shape", "collider"),
-        optional=("mannequin_surface",),
+        optional=("source_turn",),
         makes=("worn_rest",),
         run=_grade,
         settings=GradeConfig,
@@ -109,7 +107,7 @@ STAGES: tuple[Stage, ...] = (
         name="drape",
         about="the garment at rest on the body",
         needs=("sim_mesh", "worn_rest", "collider", "fabric"),
-        optional=("garment_pattern", "mannequin_surface"),
+        optional=("garment_pattern", "source_turn"),
         makes=("draped", "audit", "trace"),
         run=_drape,
         settings=DrapeConfig,

@@ -25,6 +25,7 @@ from vto_pipeline.model.outfit import Layer
 from vto_pipeline.pipeline.catalogue import Catalogue
 from vto_pipeline.pipeline.schema import json_schema
 from vto_pipeline.pipeline.stage import Stage
+from vto_pipeline.stages.cloth import in_body_frame
 from vto_pipeline.stages.outfit_page import OWN_PARTS, outfit_page
 
 Inputs = Mapping[str, Any]
@@ -215,7 +216,8 @@ def _drape_row(stage: Stage, names: Sequence[str]) -> Stage:
             fabric = inputs[_own("fabric", name)]
             job.notes += [f"{name}: {text}" for text in assumption_notes(fabric)]
             laid_out = _own("garment_pattern", name) in inputs
-            garment = Garment(inputs[_own("sim_mesh", name)], inputs[_own("worn_rest", name)], laid_out)
+            mesh = in_body_frame(inputs[_own("sim_mesh", name)], inputs)
+            garment = Garment(mesh, inputs[_own("worn_rest", name)], laid_out)
             layers.append(Layer(name, garment, fabric))
         outfit = drape_layers(layers, inputs["collider"], settings, job)
         meshes = {_own("draped", name): mesh for name, mesh in outfit.meshes.items()}
@@ -225,7 +227,7 @@ def _drape_row(stage: Stage, names: Sequence[str]) -> Stage:
         stage,
         about="the garments at rest on the body, in layers",
         needs=(*needs, "collider"),
-        optional=tuple(_own("garment_pattern", name) for name in names),
+        optional=(*(_own("garment_pattern", name) for name in names), "source_turn"),
         makes=(*(_own("draped", name) for name in names), "audit", "trace"),
         run=run,
     )

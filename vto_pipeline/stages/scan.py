@@ -79,7 +79,7 @@ STAGES: tuple[Stage, ...] = (
     ),
     *for_each_role(
         "scale",
-        "scale and floor, from the printed board, or scale from a stated length",
+        "scale and floor, from the printed board, or scale from a stated length or stature",
         needs=("photos", "sparse"),
         makes=("cameras", "points"),
         run=_scale,

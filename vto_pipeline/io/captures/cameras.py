@@ -91,7 +91,16 @@ def read_placement(path: Path) -> FloatArray:
     Raises:
         FormatError: there is none, or of another shape.
     """
-    found = _transforms(path, "mannequin_from_surface")
+    return read_transform(path, "mannequin_from_surface")
+
+
+def read_transform(path: Path, key: str) -> FloatArray:
+    """Read one transform of a JSON object, shape (4, 4).
+
+    Raises:
+        FormatError: there is none, or of another shape.
+    """
+    found = _transforms(path, key)
     if len(found) != 1:
         raise FormatError(f"{len(found)} transforms; expected one", where=str(path))
     return found[0]

@@ -218,6 +218,13 @@ ARTIFACTS: tuple[ArtifactKind, ...] = (
         lambda path, value: write_json(path, {"mannequin_from_surface": value}),
     ),
     ArtifactKind(
+        "source_turn",
+        "source_turn.json",
+        "avatar_from_source, a 4x4 transform: what stands up the body that the garment was on",
+        lambda path: cameras.read_transform(path, "avatar_from_source"),
+        lambda path, value: write_json(path, {"avatar_from_source": value}),
+    ),
+    ArtifactKind(
         "labels", "labels.npz", "vertices that are garment, and seen", garments.read_labels, garments.write_labels
     ),
     _mesh("garment_shell", "shell.ply", "the garment cut out of the surface"),

@@ -71,9 +71,7 @@ def scan_order(
         raise ConfigError("a distance is only valid with photos")
     written = mannequin is not None and mannequin.suffix.lower() in _MEASUREMENTS
     by_form = mannequin is not None and not written
-    scale = _scale_settings(kind, stature, lengths)
-    if by_form and stature is not None:
-        scale = _scale_settings(kind, None, lengths)
+    scale = _scale_settings(kind, None if by_form else stature, lengths)
     unscaled = kind == "photos" and not scale and not (source / BOARD_FILE).is_file()
     notes = [note]
     if by_form and stature is not None:
