@@ -18,9 +18,12 @@ from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.units import GRAVITY
 
 _PIXEL = 2.5e-4  # of the shadow [m]
 _UNEVENNESS = 1e-3  # of the start, of the specimen's radius: where the folds come from
+_COARSEST, _FINEST = 0.015, 0.004  # edges [m]: the ring needs a few rows, and below nothing changes that is measured
+_OF_LENGTH = 0.75  # edge to bending length: with longer ones the folds of limp cloth are held up by its triangles
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,19 @@ class DrapeTest:
         """Return the drape coefficient, a share, of a shadow's area [m²]."""
         inner = np.pi * self.support**2
         return float((shadow - inner) / (np.pi * self.radius**2 - inner))
+
+
+def resolving_edge(rigidity: float, areal_density: float) -> float:
+    """Return the edge of a mesh that shows a fabric's folds [m].
+
+    Their size is the bending length (B / w)^(1/3) of Peirce 1930, "The handle of cloth as a measurable quantity".
+
+    Args:
+        rigidity: B [N·m].
+        areal_density: [kg/m²].
+    """
+    length = (rigidity / (areal_density * GRAVITY)) ** (1.0 / 3.0)
+    return float(np.clip(_OF_LENGTH * length, _FINEST, _COARSEST))
 
 
 @dataclass(frozen=True)

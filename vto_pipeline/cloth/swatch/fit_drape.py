@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import t as student
 
-from vto_pipeline.cloth.swatch.disc import DrapeTest, at_minimum, drape_coefficient, specimen
+from vto_pipeline.cloth.swatch.disc import DrapeTest, at_minimum, drape_coefficient, resolving_edge, specimen
 from vto_pipeline.errors import ComputationError, DivergedError, InputError
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import Fabric
@@ -23,7 +23,6 @@ from vto_pipeline.units import GRAVITY
 RESOLVED = (0.2, 0.95)
 """Coefficients that say something about the rigidity."""
 
-_EDGE = 0.015  # of the mesh [m]
 _FALL = (0.72, 22.7, 0.22)  # a first guess: 72 % at Γ = w h³ / B = 22.7, less by 22 points where Γ is e times that
 _LEVELS = (-0.6, -0.2, 0.2, 0.6)  # of log B about the guess
 _ROUNDS = 6
@@ -79,7 +78,7 @@ def fit_drape(coefficient: float, drapes: int, fabric: Fabric, test: DrapeTest, 
             replace(fabric, bending_warp=rigidity, bending_weft=rigidity, bending_hysteresis=0.0),
             test,
             "irregular",
-            _EDGE,
+            resolving_edge(rigidity, fabric.areal_density),
             seed=seed,
         )
         try:

@@ -107,7 +107,8 @@ def runs(mesh: TriangleMesh, pieces: Sequence[Piece], corners: Sequence[Bools]) 
     for piece, sharp in zip(pieces, corners, strict=True):
         before, after = sewn[np.roll(piece.outline, 1)], sewn[piece.outline]
         goes_on = np.where(after >= 0, (before >= 0) & (follows[after] == before), before < 0)
-        begins[piece.outline[~goes_on | sharp]] = True
+        tip = after == np.roll(piece.outline, 1)  # of a dart, whose sides are sewn to each other
+        begins[piece.outline[~goes_on | sharp | tip]] = True
         both = sharp & goes_on & (after >= 0)  # a corner of one side ends the run of the other as well
         begins[before[both]] = True
     found: list[tuple[int, int, int, int]] = []

@@ -15,7 +15,7 @@ import numpy as np
 
 from vto_pipeline.bench.physics.cusick import GEOMETRIES, MEASURED
 from vto_pipeline.bench.printed_table import print_table
-from vto_pipeline.cloth.swatch.disc import at_minimum, drape_coefficient, specimen
+from vto_pipeline.cloth.swatch.disc import at_minimum, drape_coefficient, resolving_edge, specimen
 from vto_pipeline.cloth.swatch.fit_drape import fit_drape
 from vto_pipeline.errors import DivergedError
 from vto_pipeline.model.job import Job
@@ -28,18 +28,19 @@ _FRESH = 1000
 """First seed of the drapes anew: far from those of the fit."""
 
 
-def row(name: str, geometry: str, drapes: int, edge: float) -> tuple[str, ...]:
+def row(name: str, geometry: str, drapes: int, finer: float) -> tuple[str, ...]:
     """Return the figures of one fabric as words.
 
     Args:
         name: Of `MEASURED`.
         geometry: Of `GEOMETRIES`.
         drapes: How many anew.
-        edge: Of their mesh [m].
+        finer: How many times as fine as the fit's their mesh is.
     """
     real, test, began = MEASURED[name], GEOMETRIES[geometry], time.process_time()
     found = fit_drape(real.drape, 1, real.fabric(name), test, Job())
     fabric = replace(real.fabric(name), bending_warp=found.rigidity, bending_weft=found.rigidity)
+    edge = resolving_edge(found.rigidity, real.density) / finer
     anew = []
     for seed in range(_FRESH, _FRESH + drapes):
         one = specimen(fabric, test, "irregular", edge, seed=seed)
@@ -62,13 +63,13 @@ def main() -> int:
     parser.add_argument("--fabric", choices=list(MEASURED), nargs="+", default=list(MEASURED), help="only these")
     parser.add_argument("--test", choices=list(GEOMETRIES), nargs="+", default=["30/18"], help="sizes [cm]")
     parser.add_argument("--drapes", type=int, default=8, help="anew")
-    parser.add_argument("--edge-mm", type=float, default=15.0, help="of the mesh of the drapes anew [mm]")
+    parser.add_argument("--finer", type=float, default=1.25, help="times, the mesh of the drapes anew than the fit's")
     args = parser.parse_args()
 
     def rows() -> Iterator[tuple[str, ...]]:
         for name in args.fabric:
             for geometry in args.test:
-                yield row(name, geometry, args.drapes, 1e-3 * args.edge_mm)
+                yield row(name, geometry, args.drapes, args.finer)
 
     return print_table(_HEADS, rows())
 
