@@ -72,6 +72,6 @@ def test_map_coordinates_come_near_the_origin_alike(tmp_path: Path) -> None:
 
 
 def test_what_lies_near_stays_to_the_bit(tmp_path: Path) -> None:
-    body = points() + [400.0, 0.0, -120.0]
+    body = points() + np.array([400.0, 0.0, -120.0])
     np.savetxt(tmp_path / "a.xyz", body)
     assert_array_equal(read_cloud(tmp_path / "a.xyz").points, body)

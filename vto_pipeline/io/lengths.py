@@ -75,7 +75,9 @@ def near_origin(points: FloatArray, path: Path, job: Job | None) -> FloatArray:
     if not steps.any():
         return points
     if job is not None:
-        job.note(f"{path.name}: moved by {', '.join(f'{0.0 - step:.0f}' for step in steps)} km (x, y, z), near the origin")
+        job.note(
+            f"{path.name}: moved by {', '.join(f'{0.0 - step:.0f}' for step in steps)} km (x, y, z), near the origin"
+        )
     return points - _FAR_M * steps
 
 

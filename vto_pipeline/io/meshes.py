@@ -52,8 +52,8 @@ def read_mesh(path: Path, *, unit: str | None = None, job: Job | None = None) ->
         job: Notified of the guessed unit and of every change.
 
     Returns:
-        The mesh [m]; the axes are the file's, moved by whole kilometres where it lies far out. Without a unit, a file of
-        ours that says its unit is unknown stays so.
+        The mesh [m]; the axes are the file's, moved by whole kilometres where it lies far out. Without a unit, a
+        file of ours that says its unit is unknown stays so.
 
     Raises:
         InputError: no such file, or no unit fits; FormatError: the file breaks its format or holds no sound mesh.

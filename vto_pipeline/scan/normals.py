@@ -29,7 +29,9 @@ share of neighbours that point to the same side, 0.5 where the sides are left to
 
 
 def oriented_normals(cloud: PointCloud, neighbours: int, job: Job) -> FloatArray:
-    """The cloud's own normals where they stand on it, or normals of local planes with the signs that most pairs of neighbours agree on.
+    """The cloud's own normals, or normals of local planes with the signs that most pairs of neighbours agree on.
+
+    Its own are left aside where they do not stand on the surface, or point to any side of it.
 
     Signs spread along a tree (Hoppe et al. 1992) turn half a body inside out where a single pair is wrong, as where
     thighs nearly touch; here all pairs vote. The sign of the whole is the one that points away from the cloud's
