@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vto_pipeline.avatar.scan.initial_pose import best_axis, initial_poses
+from vto_pipeline.avatar.scan.initial_pose import CHILD_M, best_axis, initial_poses
 from vto_pipeline.avatar.scan.upright import AXES, in_metres
 from vto_pipeline.errors import AvatarError
 from vto_pipeline.geometry.topology import face_components
@@ -23,8 +23,6 @@ _AS_TALL = 0.6
 """A piece so tall, as a share of the whole, is no arm and no leg that was modelled by itself."""
 
 
-_STANDING_M = 0.8
-"""Nobody who stands for a scan is less tall."""
 _PERSON_M = 1.7
 _WHOLE_M = 0.045
 """Mean distance of the first guess at a person's size: whole bodies have 0.033 at most, parts 0.055 and more."""
@@ -51,7 +49,7 @@ def misread_unit(body: TriangleMesh) -> str | None:
         body: As it was read [m], any axis up.
     """
     extent = np.ptp(body.vertices, axis=0)
-    if extent.max() >= _STANDING_M:
+    if extent.max() >= CHILD_M:
         return None
     for name, turn in AXES.items():
         height = float(extent["XYZ".index(name[1])])
