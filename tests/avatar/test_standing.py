@@ -67,7 +67,11 @@ def scaled(body: TriangleMesh, factor: float) -> TriangleMesh:
 
 @pytest.mark.parametrize(
     ("unit", "read_as", "metres", "pose", "lying"),
-    [("in", 0.01, 0.0254, "t_pose", 0.0), ("in", 0.01, 0.0254, "a_pose", 90.0), ("ft", 0.1, 0.3048, "arms_down", 0.0)],
+    [
+        ("inches", 0.01, 0.0254, "t_pose", 0.0),
+        ("inches", 0.01, 0.0254, "a_pose", 90.0),
+        ("feet", 0.1, 0.3048, "arms_down", 0.0),
+    ],
 )
 def test_a_body_in_inches_or_feet_is_told_from_a_form(
     unit: str, read_as: float, metres: float, pose: str, lying: float
@@ -75,7 +79,7 @@ def test_a_body_in_inches_or_feet_is_told_from_a_form(
     posed = named_pose(template(), pose)
     body = turned(TriangleMesh(posed.vertices, posed.faces), "x", lying)
     stature = float(np.ptp(posed.vertices[:, 1]))
-    with pytest.raises(AvatarError, match=f"{stature:.2f} m where the file is in {unit}"):
+    with pytest.raises(AvatarError, match=f"{stature:.2f} m if the file is in {unit}"):
         refuse_misread_unit(scaled(body, read_as / metres))
     refuse_misread_unit(body)
 

@@ -26,8 +26,8 @@ _AS_TALL = 0.6
 _PERSON_M = 1.7
 _WHOLE_M = 0.045
 """Mean distance of the first guess at a person's size: whole bodies have 0.033 at most, parts 0.055 and more."""
-_TAKEN_FOR = {"in": "cm", "ft": "dm"}
-"""Units that nobody guesses -> the metric unit in which such a body has the size of a form without head and legs."""
+_TAKEN_FOR = {"in": ("inches", "cm"), "ft": ("feet", "dm")}
+"""Units that are not guessed -> their plural, and the metric unit in which a body has the size of a form."""
 
 
 def refuse_misread_unit(scan: TriangleMesh) -> None:
@@ -55,9 +55,9 @@ def misread_unit(body: TriangleMesh) -> str | None:
         height = float(extent["XYZ".index(name[1])])
         person = TriangleMesh((_PERSON_M / height) * body.vertices @ turn.T, body.faces)
         if height > 0.5 * extent.max() and initial_poses(person)[0].score < _WHOLE_M:
-            sizes = {unit: height * LENGTH_M[unit] / LENGTH_M[taken] for unit, taken in _TAKEN_FOR.items()}
-            others = " or ".join(f"{size:.2f} m where the file is in {unit}" for unit, size in sizes.items())
-            return f"a whole body of {height:.2f} m: no one who stands is so small; it would be {others}"
+            sizes = [(height * LENGTH_M[unit] / LENGTH_M[taken], name) for unit, (name, taken) in _TAKEN_FOR.items()]
+            others = ", ".join(f"{size:.2f} m if the file is in {name}" for size, name in sizes)
+            return f"a whole body of {height:.2f} m: no one who stands is so small ({others})"
     return None
 
 

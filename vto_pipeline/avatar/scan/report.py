@@ -185,8 +185,8 @@ def report_registration(scan: TriangleMesh, space: ShapeSpace, vertices: FloatAr
     if trunk < _WHOLE_TRUNK:
         hidden.append("part of the trunk not seen")
         job.warn(
-            f"{trunk:.0%} of the trunk is in the scan: its girths are estimates. Scan the body from all sides, or check "
-            "with a tape before choosing a size by it"
+            f"{trunk:.0%} of the trunk is in the scan: its girths are estimates. Scan the body from all sides, or "
+            "check with a tape before choosing a size by it"
         )
     for limb, own in _limbs(space).items():
         share = _shown(scan, vertices[own])
