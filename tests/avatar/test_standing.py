@@ -84,6 +84,15 @@ def test_a_body_in_inches_or_feet_is_told_from_a_form(
     refuse_misread_unit(body)
 
 
+@pytest.mark.real_data
+@pytest.mark.skipif(not BODIES.exists(), reason="the shared data are absent")
+@pytest.mark.parametrize("name", ["mh_female_maxweight", "mh_male_averageweight"])
+def test_a_body_by_others_in_inches_is_told(name: str) -> None:
+    body = read_mesh(BODIES / f"{name}.ply")
+    with pytest.raises(AvatarError, match=f"{np.ptp(body.vertices[:, 1]):.2f} m if the file is in inches"):
+        refuse_misread_unit(scaled(body, 0.01 / 0.0254))
+
+
 def test_a_small_body_under_a_drape_is_warned_of() -> None:
     job = Job()
     stood_up(scaled(BODY, 0.4), job)

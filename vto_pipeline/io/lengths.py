@@ -36,7 +36,9 @@ def to_metres(points: FloatArray, unit: str | None, path: Path, job: Job | None)
         InputError: no unit fits, or the given one gives an impossible size.
     """
     whole = longest = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
-    if len(points) and guess_unit(most := _without_strays(points)) is not None and most < _STRAY_SHARE * whole:
+    most = _without_strays(points) if len(points) else 0.0
+    # what is too large in any unit is a room, which has far corners: no unit is found by leaving them out
+    if most < _STRAY_SHARE * whole and guess_unit(most) is not None and (unit or guess_unit(whole)) is not None:
         longest = most
     if unit is not None:
         _check_unit(unit, longest, path)
