@@ -331,12 +331,13 @@ def test_two_pictures_from_one_side_are_told() -> None:
 
 @pytest.mark.parametrize("size", [(1.0, 1.0), (2.0, 3.0)])
 def test_the_overlap_of_two_boxes(size: tuple[float, float]) -> None:
-    """Closed form: at equal height, boxes of 20 by 100 and 30 by 100 have two thirds in common."""
+    """Closed form: at equal height, a box of 20 by 100 and one half as wide below its middle share three quarters."""
     rows, columns = (int(120 * one) for one in size)
     first, second = np.zeros((120, 60), bool), np.zeros((rows, columns), bool)
+    tall, wide = int(100 * size[0]), int(20 * size[0])
     first[10:110, 5:25] = True
-    second[: int(100 * size[0]), 3 : 3 + int(30 * size[0])] = True
-    assert_allclose(overlap(first, second), 2 / 3, rtol=0, atol=0.02)  # a pixel of 30
+    second[: tall // 2, 3 : 3 + wide] = second[:tall, 3 + wide // 4 : 3 + wide // 4 + wide // 2] = True
+    assert_allclose(overlap(first, second), 3 / 4, rtol=0, atol=0.02)  # a pixel of 20, in half of the rows
     assert overlap(first, first) == 1.0
 
 
