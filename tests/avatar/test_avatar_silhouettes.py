@@ -15,9 +15,10 @@ from vto_pipeline.avatar.from_silhouettes import SilhouettesConfig, fit_silhouet
 from vto_pipeline.avatar.measure import measure
 from vto_pipeline.avatar.measuring.population import population
 from vto_pipeline.avatar.model.fit import Fit
+from vto_pipeline.avatar.model.pose import named_pose
 from vto_pipeline.avatar.model.shape import shape_space
 from vto_pipeline.avatar.model.skinning import joint_transforms
-from vto_pipeline.avatar.silhouettes.backdrop import segment_person
+from vto_pipeline.avatar.silhouettes.backdrop import overlap, segment_person
 from vto_pipeline.avatar.silhouettes.fit import (
     SilhouetteView,
     _camera_rows,
@@ -318,6 +319,34 @@ def test_swapped_pictures_are_told() -> None:
     front, side = views(fit_measurements(Measurements(TRUTH, sex="female")))
     with pytest.raises(AvatarError, match="swapped"):
         fit_silhouettes(NAMES, side, front, SilhouettesConfig(sex="female"))
+
+
+def test_two_pictures_from_one_side_are_told() -> None:
+    body = fit_measurements(Measurements(TRUTH, sex="female"))
+    front, back = photograph(body, 0.0), photograph(body, np.pi)
+    for second in (front, back, front[:, ::-1]):
+        with pytest.raises(AvatarError, match="from the same side"):
+            fit_silhouettes(NAMES, front, second, SilhouettesConfig(sex="female"))
+
+
+@pytest.mark.parametrize("size", [(1.0, 1.0), (2.0, 3.0)])
+def test_the_overlap_of_two_boxes(size: tuple[float, float]) -> None:
+    """Closed form: at equal height, a box of 20 by 100 and one half as wide below its middle share three quarters."""
+    rows, columns = (int(120 * one) for one in size)
+    first, second = np.zeros((120, 60), bool), np.zeros((rows, columns), bool)
+    tall, wide = int(100 * size[0]), int(20 * size[0])
+    first[10:110, 5:25] = True
+    second[: tall // 2, 3 : 3 + wide] = second[:tall, 3 + wide // 4 : 3 + wide // 4 + wide // 2] = True
+    assert_allclose(overlap(first, second), 3 / 4, rtol=0, atol=0.02)  # a pixel of 20, in half of the rows
+    assert overlap(first, first) == 1.0
+
+
+@pytest.mark.parametrize("pose", ["a_pose", "arms_down"])
+@pytest.mark.parametrize("waist", [0.65, 0.80, 1.20])
+def test_front_and_side_are_unlike(pose: str, waist: float) -> None:
+    body = named_pose(fit_measurements(Measurements({"stature": 1.68, "waist_girth": waist}, sex="female")), pose)
+    front, side = (segment_person(photograph(body, yaw), "here") for yaw in (0.0, np.pi / 2))
+    assert overlap(front, side) < 0.6
 
 
 def backdrop(noise: float = 3.0) -> np.ndarray:

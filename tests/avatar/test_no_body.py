@@ -7,12 +7,14 @@ import trimesh
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.from_scan import ScanConfig, fit_scan
 from vto_pipeline.avatar.model.shape import SEX_SHARE, shape_space
-from vto_pipeline.avatar.scan.report import refuse_garment, refuse_shape_of_no_body
+from vto_pipeline.avatar.scan.report import refuse_garment, refuse_shape_of_no_body, report_registration
 from vto_pipeline.avatar.template.template import JOINT_KINDS
 from vto_pipeline.bench.samples.garments.top import make_shirt
 from vto_pipeline.bench.samples.garments.wearer import wearer
 from vto_pipeline.errors import AvatarError
+from vto_pipeline.geometry.topology import face_normals, submesh
 from vto_pipeline.model.body import Measurements
+from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
 TRUNK_ENDS = ("head", "elbow", "wrist", "hip", "knee", "ankle")
@@ -114,3 +116,16 @@ def test_the_likely_cause_is_named() -> None:
         with pytest.raises(AvatarError, match="not a body") as refused:
             refuse_shape_of_no_body(TriangleMesh(vertices, faces), SPACE, posed)
         assert cause in refused.value.hint
+
+
+def test_a_trunk_seen_from_one_side_is_told() -> None:
+    """Of a closed trunk about half faces each way; the rest is beyond 10 mm of it where the trunk is wide."""
+    whole = TriangleMesh(PERSON.vertices, PERSON.faces)
+    front, job = submesh(whole, face_normals(whole)[:, 2] > 0.0)[0], Job()
+    hidden = report_registration(front, SPACE, PERSON.vertices, job)
+    assert 0.35 < job.metrics["trunk_covered"] < 0.7
+    assert hidden[0] == "part of the trunk not seen"
+    assert any("of the trunk is in the scan" in warning for warning in job.warnings)
+    job = Job()
+    assert report_registration(whole, SPACE, PERSON.vertices, job) == []
+    assert not job.warnings

@@ -9,8 +9,9 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from vto_pipeline.avatar.model.pose import named_pose
-from vto_pipeline.avatar.standing import stood_up, turn_of, warn_of_several
+from vto_pipeline.avatar.standing import refuse_misread_unit, stood_up, turn_of, warn_of_several
 from vto_pipeline.avatar.template.template import template
+from vto_pipeline.errors import AvatarError
 from vto_pipeline.geometry.rigid import transform_mesh
 from vto_pipeline.io.meshes import read_mesh
 from vto_pipeline.model.job import Job
@@ -58,6 +59,54 @@ def test_another_facing_is_told_and_kept(degrees: float, front: str) -> None:
     away = turned(BODY, "y", degrees)
     assert stood_up(away, job) is away
     assert any(f"the body faces {front}" in warning for warning in job.warnings)
+
+
+def scaled(body: TriangleMesh, factor: float) -> TriangleMesh:
+    return TriangleMesh(factor * body.vertices, body.faces)
+
+
+@pytest.mark.parametrize(
+    ("unit", "read_as", "metres", "pose", "lying"),
+    [
+        ("inches", 0.01, 0.0254, "t_pose", 0.0),
+        ("inches", 0.01, 0.0254, "a_pose", 90.0),
+        ("feet", 0.1, 0.3048, "arms_down", 0.0),
+    ],
+)
+def test_a_body_in_inches_or_feet_is_told_from_a_form(
+    unit: str, read_as: float, metres: float, pose: str, lying: float
+) -> None:
+    posed = named_pose(template(), pose)
+    body = turned(TriangleMesh(posed.vertices, posed.faces), "x", lying)
+    stature = float(np.ptp(posed.vertices[:, 1]))
+    with pytest.raises(AvatarError, match=f"{stature:.2f} m if the file is in {unit}"):
+        refuse_misread_unit(scaled(body, read_as / metres))
+    refuse_misread_unit(body)
+
+
+@pytest.mark.real_data
+@pytest.mark.skipif(not BODIES.exists(), reason="the shared data are absent")
+@pytest.mark.parametrize("name", ["mh_female_maxweight", "mh_male_averageweight"])
+def test_a_body_by_others_in_inches_is_told(name: str) -> None:
+    body = read_mesh(BODIES / f"{name}.ply")
+    with pytest.raises(AvatarError, match=f"{np.ptp(body.vertices[:, 1]):.2f} m if the file is in inches"):
+        refuse_misread_unit(scaled(body, 0.01 / 0.0254))
+
+
+def test_a_small_body_under_a_drape_is_warned_of() -> None:
+    job = Job()
+    stood_up(scaled(BODY, 0.4), job)
+    assert "no one who stands is so small" in job.warnings[0]
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.42, 0.84), (0.42, 1.0), (0.0, 0.84)])
+def test_a_form_or_a_part_of_a_body_may_be_small(low: float, high: float) -> None:
+    height = (BODY.vertices[BODY.faces].mean(axis=1)[:, 1] - BODY.vertices[:, 1].min()) / np.ptp(BODY.vertices[:, 1])
+    part = TriangleMesh(BODY.vertices, BODY.faces[(height > low) & (height < high)])
+    used = TriangleMesh(
+        BODY.vertices[np.unique(part.faces)], np.unique(part.faces, return_inverse=True)[1].reshape(-1, 3)
+    )
+    refuse_misread_unit(scaled(used, 0.4))
 
 
 def test_what_is_no_body_stays_as_it_is() -> None:

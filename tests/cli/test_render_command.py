@@ -37,6 +37,16 @@ def test_views_are_drawn_beside_a_mesh(vto, tent):
             assert np.asarray(picture).min() < 240
 
 
+def test_a_file_in_the_place_of_a_folder_is_refused_and_stays(vto, tent):
+    before = tent.read_bytes()
+    for place in (tent, tent / "pictures"):
+        said = vto("render", tent, "--views", "front", "--size", 64, "-o", place)
+        assert said.code == 3
+        assert "a file stands where a folder is meant" in said.err
+        assert str(tent) in said.err
+    assert tent.read_bytes() == before
+
+
 @pytest.mark.parametrize("name", ["turn.gif", "turn.mp4"])
 def test_a_turn_has_all_its_frames(vto, tent, name):
     import cv2

@@ -29,6 +29,11 @@ def make(folder: Path) -> None:
     (folder / "scan.xyz").write_text("0 0 0\n")
     (folder / "scan.pcd").write_text("VERSION 0.7\n")
     (folder / "notes.docx").write_text("no")
+    (folder / "poplin.yaml").write_text("areal_density_gsm: 120")
+    (folder / "wool.yaml").write_text("instrument: KES-FB")
+    (folder / "wool.csv").write_text("\ufeffinstrument; KES-FB\nW; 16,29\n")
+    (folder / "lining.u3m").write_text('{"schema": "1.1", "material": {}}')
+    (folder / "lining.json").write_text('{"schema": "1.0", "raw_data": {}}')
     write_arrays(folder / "avatar.npz", {})
     write_ply(folder / "cloud.ply", PointCloud(np.zeros((3, 3))))
     write_all_formats(folder)
@@ -41,6 +46,11 @@ def make(folder: Path) -> None:
         ("depth", "depth", "intrinsics.json and depth/"),
         ("silhouettes", "silhouettes", "front and side"),
         ("customer.yaml", "measurements", "key measurements"),
+        ("poplin.yaml", "fabric", "areal_density_gsm"),
+        ("wool.yaml", "fabric", "key instrument"),
+        ("wool.csv", "fabric", "sheet"),
+        ("lining.u3m", "fabric", "U3M"),
+        ("lining.json", "fabric", "U3M"),
         ("scan.xyz", "cloud", ".xyz"),
         ("scan.pcd", "cloud", ".pcd"),
         ("cloud.ply", "cloud", "points and no faces"),

@@ -52,6 +52,18 @@ def test_a_table_changes_keys_and_leaves_the_rest(tmp_path: Path) -> None:
     assert second.where.endswith("table.csv, row 3")
 
 
+def test_blank_rows_of_a_spreadsheet_are_no_rows(tmp_path: Path) -> None:
+    rows = order(tmp_path, f"{RUN}rows: table.csv\n", table="name,seed\n\na,1\n,\n , \nb,2\n,\n")
+    assert [(row.name, row.data["seed"]) for row in rows] == [("a", 1), ("b", 2)]
+    assert [row.where.rsplit(" ", 1)[1] for row in rows] == ["3", "6"]  # as a spreadsheet numbers them
+
+
+def test_a_name_stays_as_it_is_written(tmp_path: Path) -> None:
+    names = ["1e3", "007", "1.50", "true", "18"]
+    table = "name,seed\n" + "".join(f"{name},1\n" for name in names)
+    assert [row.name for row in order(tmp_path, f"{RUN}rows: table.csv\n", table=table)] == names
+
+
 def test_every_combination_becomes_a_row(tmp_path: Path) -> None:
     text = (
         RUN
@@ -81,6 +93,7 @@ def test_a_table_in_parquet_is_the_same_as_in_csv(tmp_path: Path) -> None:
         (f"{RUN}rows: table.csv\n", "name\n../a\n", "'../a' is not a valid name"),
         (f"{RUN}rows: table.csv\n", "fabric\ndenim\n", "'fabric' is not a key of a pipeline document"),
         (f"{RUN}rows: table.csv\n", "name\na,b\n", "more cells than the head"),
+        (f"{RUN}rows: table.csv\n", "name,seed,seed\na,1,2\n", "the column 'seed' is there 2 times"),
         (f"{RUN}rows: nowhere.csv\n", "", "no such file"),
         (f"{RUN}every: {{seed: {list(range(400))}, stages.add.offset: {list(range(400))}}}\n", "", "160000 rows"),
         (f"{RUN}cows: table.csv\n", "", "cows: unknown key"),

@@ -65,6 +65,45 @@ def test_given_normals_are_used():
     assert ((face_normals(mesh) * centers).sum(1) < 0).mean() > 0.99
 
 
+WRONG = {
+    "anything": lambda true, random: random.normal(size=true.shape),
+    "of any sign": lambda true, random: true * np.where(random.random(len(true)) < 0.5, -1.0, 1.0)[:, None],
+    "other axes": lambda true, random: true[:, [0, 2, 1]],
+    "all alike": lambda true, random: np.tile([0.0, 0.0, 1.0], (len(true), 1)),
+}
+"""What programs write in place of the normals of a ball."""
+
+
+@pytest.mark.parametrize("kind", WRONG)
+def test_normals_that_are_not_of_the_surface_are_not_used(kind: str) -> None:
+    points = bowl(6_000, 2e-4)
+    true = points / np.linalg.norm(points, axis=1, keepdims=True)
+    given = WRONG[kind](true, np.random.default_rng(6))
+    job = Job()
+    found = oriented_normals(PointCloud(points, given / np.linalg.norm(given, axis=1, keepdims=True)), 20, job)
+    assert np.percentile((found * true).sum(axis=1), 1) > 0.9
+    assert any("normals are not used" in note for note in job.notes)
+
+
+@pytest.mark.parametrize("noise", [0.0, 2e-3])
+def test_normals_of_the_surface_are_kept_to_the_bit(noise: float) -> None:
+    points = bowl(6_000, noise)  # 6 mm apart
+    true = points / np.linalg.norm(points, axis=1, keepdims=True)
+    job = Job()
+    assert oriented_normals(PointCloud(points, true), 20, job).tobytes() == true.tobytes()
+    assert not job.notes + job.warnings
+
+
+def test_inward_normals_and_coarse_points_are_warned_of() -> None:
+    points = bowl(200, 0.0)
+    job = Job()
+    reconstruct_cloud(PointCloud(points, -points / np.linalg.norm(points, axis=1, keepdims=True)), SurfaceConfig(), job)
+    inwards, coarse = sorted(job.warnings, key=len, reverse=False)
+    apart = np.sqrt(0.8 * 4 * np.pi * 0.2**2 / 200)  # the sphere's area for each point [m]
+    assert float(coarse.split(" mm apart")[0].split()[-1]) == pytest.approx(1000 * apart, rel=0.2)
+    assert "point inwards" in inwards
+
+
 def test_outliers_are_left_out(mesh):
     random = np.random.default_rng(3)
     points = np.concatenate([bowl(20_000, 2e-4), random.uniform(-0.5, 0.5, (60, 3))])

@@ -35,6 +35,7 @@ from vto_pipeline.avatar.scan.report import (
 from vto_pipeline.avatar.scan.tangential_slide import slide_along_surface
 from vto_pipeline.avatar.scan.unobserved_uncertainty import unseen_sigmas
 from vto_pipeline.avatar.scan.upright import in_metres
+from vto_pipeline.avatar.standing import refuse_misread_unit
 from vto_pipeline.avatar.template.template import JOINT_KINDS
 from vto_pipeline.geometry.closest import closest_points
 from vto_pipeline.model.arrays import FloatArray
@@ -90,7 +91,9 @@ def fit_scan(
     """
     config, job = config or ScanConfig(), job or Job()
     job.progress(0.0, "finding the body's facing and size")
-    kept, guesses = upright_initial_poses(in_metres(scan, job), job)
+    metric = in_metres(scan, job)
+    refuse_misread_unit(metric)
+    kept, guesses = upright_initial_poses(metric, job)
     target = Target(kept, config.probes, job.seed)
     space = shape_space(SEX_SHARE[config.sex])
     tries = [_pose_and_shape(space, target, guess, config, job, steps=8) for guess in guesses[:2]]

@@ -23,7 +23,7 @@ from vto_pipeline.avatar.model.stance import stance
 from vto_pipeline.avatar.scan.bind_pose import to_bind_pose
 from vto_pipeline.avatar.scan.report import extremity_weights
 from vto_pipeline.avatar.scan.tangential_slide import slide_along_surface
-from vto_pipeline.avatar.silhouettes.backdrop import segment_person
+from vto_pipeline.avatar.silhouettes.backdrop import overlap, segment_person
 from vto_pipeline.avatar.silhouettes.fit import Evidence, Solution, run_steps
 from vto_pipeline.avatar.silhouettes.initial_pose import initial_views, mean_body
 from vto_pipeline.errors import AvatarError
@@ -41,6 +41,8 @@ that survey (a hip's girth is 1.03 to 1.07 times its ellipse's, a chest's 1.04 t
 """
 _POOR_M, _BETTER = 0.012, 0.7
 """Outlines this far apart (both views together) raise the question whether the pictures are swapped."""
+_SAME_VIEW = 0.8
+"""Outlines of front and back have nine tenths in common at equal height, those of front and side half at most."""
 _ENDS_SHARE = 0.25
 """How much head, hands and feet count: hair, fingers and shoes are not modelled."""
 
@@ -83,6 +85,12 @@ def fit_silhouettes(
     """
     config, job = config or SilhouettesConfig(), job or Job()
     front, side = segment_person(front_image, str(silhouettes.front)), segment_person(side_image, str(silhouettes.side))
+    if overlap(front, side) > _SAME_VIEW:
+        raise AvatarError(
+            "both pictures show the person from the same side, or from front and back",
+            where=f"{silhouettes.front}, {silhouettes.side}",
+            hint="take the second one after a quarter turn",
+        )
     noise = config.outline_sigma_mm * 1e-3
     job.progress(0.0, "finding the pose")
     space, evidence = shape_space(SEX_SHARE[config.sex]), _evidence(config.sex, silhouettes, config)

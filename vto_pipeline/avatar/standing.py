@@ -1,15 +1,17 @@
-"""A body mesh that others made: the axis along which it stands, its facing, and whether it is one."""
+"""A body mesh that others made: the axis along which it stands, its facing, its size, and whether it is one."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from vto_pipeline.avatar.scan.initial_pose import best_axis
-from vto_pipeline.avatar.scan.upright import in_metres
+from vto_pipeline.avatar.scan.initial_pose import CHILD_M, best_axis, initial_poses
+from vto_pipeline.avatar.scan.upright import AXES, in_metres
+from vto_pipeline.errors import AvatarError
 from vto_pipeline.geometry.topology import face_components
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.units import LENGTH_M
 
 _LIKE_A_BODY_M = 0.06
 """Mean distance of the first guess: bodies of 20 to 200 kg that stand have 0.05 at most, lying ones 0.08 and more."""
@@ -21,6 +23,44 @@ _AS_TALL = 0.6
 """A piece so tall, as a share of the whole, is no arm and no leg that was modelled by itself."""
 
 
+_PERSON_M = 1.7
+_WHOLE_M = 0.045
+"""Mean distance of the first guess at a person's size: whole bodies have 0.033 at most, parts 0.055 and more."""
+_TAKEN_FOR = {"in": ("inches", "cm"), "ft": ("feet", "dm")}
+"""Units that are not guessed -> their plural, and the metric unit in which a body has the size of a form."""
+
+
+def refuse_misread_unit(scan: TriangleMesh) -> None:
+    """Refuse a whole body that is smaller than anybody who stands: its unit was misread.
+
+    Raises:
+        AvatarError: with the units in which it would be a person.
+    """
+    if (problem := misread_unit(scan)) is not None:
+        raise AvatarError(problem, hint="give the unit; in a document: {file: body.ply, unit: in}")
+
+
+def misread_unit(body: TriangleMesh) -> str | None:
+    """Return what is wrong with the size of a whole body that is smaller than anybody who stands, else None.
+
+    Forms are as small, but have no head, arms and legs.
+
+    Args:
+        body: As it was read [m], any axis up.
+    """
+    extent = np.ptp(body.vertices, axis=0)
+    if extent.max() >= CHILD_M:
+        return None
+    for name, turn in AXES.items():
+        height = float(extent["XYZ".index(name[1])])
+        person = TriangleMesh((_PERSON_M / height) * body.vertices @ turn.T, body.faces)
+        if height > 0.5 * extent.max() and initial_poses(person)[0].score < _WHOLE_M:
+            sizes = [(height * LENGTH_M[unit] / LENGTH_M[taken], name) for unit, (name, taken) in _TAKEN_FOR.items()]
+            others = ", ".join(f"{size:.2f} m if the file is in {name}" for size, name in sizes)
+            return f"a whole body of {height:.2f} m: no one who stands is so small ({others})"
+    return None
+
+
 def stood_up(body: TriangleMesh, job: Job) -> TriangleMesh:
     """Return a body mesh turned so that +Y is up: cloth falls along -Y. It stays whole; what is no body stays as it is.
 
@@ -28,8 +68,10 @@ def stood_up(body: TriangleMesh, job: Job) -> TriangleMesh:
 
     Args:
         body: In metres, any axis up.
-        job: Notified of the turn, warned of the facing.
+        job: Notified of the turn, warned of the facing, and of a whole body that is too small for a person.
     """
+    if (problem := misread_unit(body)) is not None:
+        job.warn(f"{problem}. If that is so, give the unit in a document: {{file: body.ply, unit: in}}")
     found = best_axis(body)
     if found is None or found.guesses[0].score > _LIKE_A_BODY_M:
         return body

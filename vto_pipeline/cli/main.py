@@ -57,6 +57,9 @@ ADVICE = {
         (errno.EIO, errno.ESTALE, errno.ETIMEDOUT, errno.EHOSTDOWN, errno.ENOTCONN),
         STALLED,
     ),
+    **dict.fromkeys(
+        (errno.EEXIST, errno.ENOTDIR, errno.EISDIR), "a file stands where a folder is meant, or the reverse"
+    ),
     errno.EMFILE: "raise the limit of open files: ulimit -n",
 }
 """What an operating system answers when a file, a right or the disk is at fault, and not our own code -> what to do."""

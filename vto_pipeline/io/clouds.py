@@ -17,7 +17,7 @@ from vto_pipeline.io.formats.pcd import parse_pcd
 from vto_pipeline.io.formats.ply import parse_ply
 from vto_pipeline.io.formats.pts import parse_pts
 from vto_pipeline.io.formats.xyz import parse_xyz
-from vto_pipeline.io.lengths import to_metres
+from vto_pipeline.io.lengths import near_origin, to_metres
 from vto_pipeline.io.sandbox import run_limited
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
@@ -46,7 +46,8 @@ def read_cloud(path: Path, *, unit: str | None = None, job: Job | None = None) -
         job: Notified of the guessed unit and of every change.
 
     Returns:
-        The cloud [m]; the axes are the file's; normals of unit length, or None where the file has none that are usable.
+        The cloud [m]; the axes are the file's, moved by whole kilometres where it lies far out; normals of unit length,
+        or None where the file has none that are usable.
 
     Raises:
         InputError: no such file, or no unit fits; FormatError: the file breaks its format.
@@ -67,7 +68,7 @@ def read_cloud(path: Path, *, unit: str | None = None, job: Job | None = None) -
             notes.append("ignored the normals, as some are zero or not finite")
         normals = normals / lengths if usable else None
     known = str(arrays["unit"]) if "unit" in arrays else None
-    points = to_metres(arrays["vertices"], unit or known, path, job)
+    points = near_origin(to_metres(arrays["vertices"], unit or known, path, job), path, job)
     if job is not None:
         for note in notes:
             job.note(f"{path.name}: {note}")

@@ -14,6 +14,9 @@ from vto_pipeline.units import LENGTH_M
 _LIKELY_M = (0.3, 2.5)  # a garment or a body, or both with a stand
 _POSSIBLE_M = (0.05, 10.0)  # what a user may insist on
 _GUESSED = ("m", "dm", "cm", "mm")  # apart by tens, so no two fit
+_STRAY_PERCENT = 1.0  # at either end of each axis
+_STRAY_SHARE = 0.5  # without strays it is less than this long
+_FAR_M = 1000.0  # single precision, as glTF and Poisson have it, resolves 0.1 mm so far out
 
 
 def to_metres(points: FloatArray, unit: str | None, path: Path, job: Job | None) -> FloatArray:
@@ -21,9 +24,10 @@ def to_metres(points: FloatArray, unit: str | None, path: Path, job: Job | None)
 
     Args:
         points: In the file's unit, finite, shape (N, 3).
-        unit: One of `units.LENGTH_M`, or None: the metric unit in which the longest side is 0.3 to 2.5 m is taken.
+        unit: One of `units.LENGTH_M`, or None: the metric unit in which the longest side is 0.3 to 2.5 m is taken. A
+            few stray points, or a floor of a few corners, do not count.
         path: The file, for messages.
-        job: Notified of a guess.
+        job: Notified of a guess, warned of one that leaves out strays.
 
     Returns:
         Points [m], shape (N, 3).
@@ -31,7 +35,11 @@ def to_metres(points: FloatArray, unit: str | None, path: Path, job: Job | None)
     Raises:
         InputError: no unit fits, or the given one gives an impossible size.
     """
-    longest = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
+    whole = longest = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
+    most = _without_strays(points) if len(points) else 0.0
+    # what is too large in any unit is a room, which has far corners: no unit is found by leaving them out
+    if most < _STRAY_SHARE * whole and guess_unit(most) is not None and (unit or guess_unit(whole)) is not None:
+        longest = most
     if unit is not None:
         _check_unit(unit, longest, path)
         return points * LENGTH_M[unit]
@@ -44,7 +52,41 @@ def to_metres(points: FloatArray, unit: str | None, path: Path, job: Job | None)
     if job is not None:
         override = "" if guess == "m" else "; set unit: m to override"
         job.note(f"{path.name}: unit: assumed to be {guess} (longest side {longest:.4g}){override}")
+        if longest < whole:
+            job.warn(
+                f"{path.name}: {100 - 2 * _STRAY_PERCENT:.0f} % of the points measure {longest:.4g}, all {whole:.4g}: "
+                "the unit was guessed without the others; remove what stands around, or give the unit"
+            )
     return points * LENGTH_M[guess]
+
+
+def near_origin(points: FloatArray, path: Path, job: Job | None) -> FloatArray:
+    """Move points that lie kilometres away, as in map coordinates, near the origin by whole kilometres.
+
+    Files that share their coordinates are moved alike, as long as they do not lie on both sides of such a step.
+
+    Args:
+        points: [m], shape (N, 3).
+        path: The file, for messages.
+        job: Notified of a move.
+
+    Returns:
+        Points [m], shape (N, 3): the same where they lie near.
+    """
+    steps = np.round(np.median(points, axis=0) / _FAR_M) if len(points) else np.zeros(3)
+    if not steps.any():
+        return points
+    if job is not None:
+        job.note(
+            f"{path.name}: moved by {', '.join(f'{0.0 - step:.0f}' for step in steps)} km (x, y, z), near the origin"
+        )
+    return points - _FAR_M * steps
+
+
+def _without_strays(points: FloatArray) -> float:
+    """Return the longest side without the outermost points of each axis."""
+    ends = np.percentile(points, [_STRAY_PERCENT, 100.0 - _STRAY_PERCENT], axis=0)
+    return float((ends[1] - ends[0]).max())
 
 
 def guess_unit(longest: float) -> str | None:

@@ -24,7 +24,7 @@ from vto_pipeline.io.formats.ply import parse_ply
 from vto_pipeline.io.formats.ply_header import ARBITRARY
 from vto_pipeline.io.formats.stl import parse_stl
 from vto_pipeline.io.gltf.read import parse_gltf
-from vto_pipeline.io.lengths import to_metres
+from vto_pipeline.io.lengths import near_origin, to_metres
 from vto_pipeline.io.sandbox import run_limited
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud, Skin, TriangleMesh
@@ -52,7 +52,8 @@ def read_mesh(path: Path, *, unit: str | None = None, job: Job | None = None) ->
         job: Notified of the guessed unit and of every change.
 
     Returns:
-        The mesh [m]; the axes are the file's. Without a unit, a file of ours that says its unit is unknown stays so.
+        The mesh [m]; the axes are the file's, moved by whole kilometres where it lies far out. Without a unit, a
+        file of ours that says its unit is unknown stays so.
 
     Raises:
         InputError: no such file, or no unit fits; FormatError: the file breaks its format or holds no sound mesh.
@@ -72,7 +73,9 @@ def read_mesh(path: Path, *, unit: str | None = None, job: Job | None = None) ->
     arrays, needless = drop_degenerate(arrays)
     arrays, turned = turn_outward(arrays)
     metric = unit is not None or "arbitrary" not in arrays
-    vertices = to_metres(arrays["vertices"], unit, path, job) if metric else arrays["vertices"]
+    vertices = arrays["vertices"]
+    if metric:
+        vertices = near_origin(to_metres(vertices, unit, path, job), path, job)
     if job is not None:
         for note in notes + needless + turned:
             job.note(f"{path.name}: {note}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from vto_pipeline.io.bodies import makehuman
 from vto_pipeline.io.captures import images, photos, video
 from vto_pipeline.io.captures.rgbd_layouts import find_layout
 from vto_pipeline.io.documents import load_yaml
+from vto_pipeline.io.fabric_formats.u3m import is_u3m
 from vto_pipeline.io.files import listed
 from vto_pipeline.io.formats.ply_header import read_header
 from vto_pipeline.io.patterns.read import is_pattern
@@ -19,7 +21,12 @@ _WANTED = (
     "a folder of photos, of depth frames, of front and side pictures, or of MakeHuman; a video, a point cloud, a mesh, "
     "a body model, a measurements file, a fabric file, a sewing pattern, or an avatar"
 )
-_TOLD_BY = {"measurements": "measurements", "size": "measurements", "areal_density_gsm": "fabric"}
+_TOLD_BY = {
+    "measurements": "measurements",
+    "size": "measurements",
+    "areal_density_gsm": "fabric",
+    "instrument": "fabric",
+}
 """Key of a document -> what such a document holds."""
 
 
@@ -77,8 +84,14 @@ def _file(path: Path) -> tuple[str, str] | None:
         return "pattern", "it holds panels"
     if suffix in (".yaml", ".yml", ".json"):
         data = load_yaml(path, error=InputError).data
+        if is_u3m(data):
+            return "fabric", "it is a U3M material, or an analyser's file"
         told = [key for key in _TOLD_BY if isinstance(data, dict) and key in data]
         return (_TOLD_BY[told[0]], f"it has the key {told[0]}") if told else None
+    if suffix == ".u3m":
+        return "fabric", "it is a U3M material"
+    if suffix == ".csv" and _first_word(path) == "instrument":
+        return "fabric", "it is an instrument's sheet"
     if suffix == ".ply":
         return _ply(path)
     if suffix in video.SUFFIXES:
@@ -96,6 +109,11 @@ def _members(path: Path) -> list[str]:
             return archive.namelist()
     except (zipfile.BadZipFile, OSError):
         return []
+
+
+def _first_word(path: Path) -> str:
+    with path.open(encoding="utf-8-sig", errors="replace") as stream:
+        return re.split("[,;]", stream.readline(100))[0].strip()
 
 
 def _ply(path: Path) -> tuple[str, str]:

@@ -19,9 +19,19 @@ _VOTERS, _NEAR_VOTERS = 50_000, 8
 _CLOSE, _STEPS = 1e-4, 20_000
 """Relative residual of the votes' solution, of which only signs are used, and the most steps it may take."""
 
+_CLEAR_SHARE = 0.7
+"""So much of the normals has to point away from the axis, or towards it, to tell inside from outside."""
+
+_PROBES, _NEIGHBOURS = 1000, 8
+_SQUARE, _ALIKE = 0.85, 0.75
+"""Of a file's normals: median cosine to the planes through its points, 0.5 where they have nothing to do with them; and
+share of neighbours that point to the same side, 0.5 where the sides are left to chance."""
+
 
 def oriented_normals(cloud: PointCloud, neighbours: int, job: Job) -> FloatArray:
     """The cloud's own normals, or normals of local planes with the signs that most pairs of neighbours agree on.
+
+    Its own are left aside where they do not stand on the surface, or point to any side of it.
 
     Signs spread along a tree (Hoppe et al. 1992) turn half a body inside out where a single pair is wrong, as where
     thighs nearly touch; here all pairs vote. The sign of the whole is the one that points away from the cloud's
@@ -30,21 +40,20 @@ def oriented_normals(cloud: PointCloud, neighbours: int, job: Job) -> FloatArray
     Args:
         cloud: Points [m].
         neighbours: Points a plane is fitted to.
-        job: Receives how sure the sign is.
+        job: Receives how sure the sign is; notified where the cloud's own normals are not used.
 
     Returns:
         Unit normals, shape (N, 3).
     """
-    if cloud.normals is not None:
-        return cloud.normals
+    given_normals = _plausible(cloud, neighbours, job)
+    if given_normals is not None:
+        return given_normals
     import open3d as o3d
 
     given = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.array(cloud.points)))
     given.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(neighbours))
     normals = np.array(given.normals)
-    outwards = cloud.points - np.median(cloud.points, axis=0)
-    outwards[:, 1] = 0.0
-    agree = (normals * outwards).sum(1)
+    agree = _outward(cloud.points, normals)
     voters = np.arange(len(normals))
     if len(voters) > _VOTERS:
         voters = np.sort(np.random.default_rng(job.seed).choice(voters, _VOTERS, replace=False))
@@ -56,12 +65,50 @@ def oriented_normals(cloud: PointCloud, neighbours: int, job: Job) -> FloatArray
         votes = _agreement(cloud.points, normals, row, voters[column.ravel()]).reshape(-1, _NEAR_VOTERS).sum(axis=1)
         votes[voters] = 1.0
         normals *= np.where(votes < 0.0, -1.0, 1.0)[:, None]
-    agree = (normals * outwards).sum(1)
-    share = float(agree[agree > 0].sum() / max(np.abs(agree).sum(), 1e-12))
+    share = _outward_share(cloud.points, normals)
     job.measure(normals_outward_share=round(share, 3))
-    if share < 0.7:
+    if share < _CLEAR_SHARE:
         job.warn(f"inside and outside are hard to tell apart: {100 * share:.0f} % of the normals agree")
     return normals
+
+
+def _plausible(cloud: PointCloud, neighbours: int, job: Job) -> FloatArray | None:
+    """Return the file's own normals, or None where they are not of the surface that its points lie on.
+
+    A surface solved through wrong normals is torn, and nothing else tells.
+    """
+    if cloud.normals is None:
+        return None
+    chosen = np.random.default_rng(job.seed).permutation(len(cloud.points))[:_PROBES]
+    near = cKDTree(cloud.points).query(cloud.points[chosen], k=min(neighbours, len(cloud.points) - 1) + 1)[1]
+    local = cloud.points[near] - cloud.points[near].mean(axis=1, keepdims=True)
+    flattest = np.linalg.eigh(np.einsum("nki,nkj->nij", local, local))[1][:, :, 0]
+    square = float(np.median(np.abs((flattest * cloud.normals[chosen]).sum(axis=1))))
+    beside = cloud.normals[near[:, 1 : _NEIGHBOURS + 1]]
+    alike = float(((beside * cloud.normals[chosen, np.newaxis]).sum(axis=2) > 0.0).mean())
+    if square < _SQUARE:
+        job.note(f"the file's normals are not used: they do not stand on the surface (median cosine {square:.2f})")
+        return None
+    if alike < _ALIKE:
+        job.note(f"the file's normals are not used: only {100 * alike:.0f} % of neighbours point to the same side")
+        return None
+    if _outward_share(cloud.points, cloud.normals) < 1.0 - _CLEAR_SHARE:
+        job.warn("the file's normals point inwards, and so does the surface: turn them over if that is not meant")
+    return cloud.normals
+
+
+def _outward(points: FloatArray, normals: FloatArray) -> FloatArray:
+    """Return how far each normal points away from the cloud's vertical axis [m], shape (N,)."""
+    outwards = points - np.median(points, axis=0)
+    outwards[:, 1] = 0.0
+    agree: FloatArray = (normals * outwards).sum(axis=1)
+    return agree
+
+
+def _outward_share(points: FloatArray, normals: FloatArray) -> float:
+    """Return the share of the normals that points outwards; those count that lie far out."""
+    agree = _outward(points, normals)
+    return float(agree[agree > 0].sum() / max(np.abs(agree).sum(), 1e-12))
 
 
 def _voted(points: FloatArray, normals: FloatArray, agree: FloatArray, neighbours: int) -> FloatArray:

@@ -23,6 +23,9 @@ from vto_pipeline.scan.normals import oriented_normals
 MIN_POINTS = 100
 """Fewer points are no surface."""
 
+COARSE_M = 0.02
+"""Points further apart leave girths and lengths uncertain by as much."""
+
 MAX_DEPTH = 11
 """Of the octree; one more takes four times the memory."""
 
@@ -58,6 +61,11 @@ def reconstruct_cloud(cloud: PointCloud, config: SurfaceConfig, job: Job) -> Tri
     o3d.utility.set_verbosity_level(o3d.utility.VerbosityLevel.Error)
     cloud = _without_outliers(_distinct(cloud), config, job)
     spacing = _spacing(cloud.points)
+    if spacing > COARSE_M:
+        job.warn(
+            f"the points lie {1000 * spacing:.0f} mm apart: the surface between them is a guess, and what is measured "
+            "on it may be off by as much"
+        )
     job.progress(0.1, f"normals of {len(cloud.points)} points")
     normals = oriented_normals(cloud, config.neighbours, job)
     job.progress(0.5, "Poisson")

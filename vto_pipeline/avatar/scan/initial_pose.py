@@ -19,7 +19,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 _PROBES = 300
 _CAP_M = 0.15
-_SURELY_WHOLE_M, _CHILD_M = 1.30, 0.80
+_SURELY_WHOLE_M, CHILD_M = 1.30, 0.80
 """A scan this tall is of a whole body; one less tall is of a child or of a part; a smaller one is of a part."""
 _SURE_M = 0.035
 """A body that is matched so well by the first guess stands along +Y."""
@@ -155,7 +155,7 @@ def _sizes(points: FloatArray, height: float, stature: float) -> list[tuple[floa
     if height > _SURELY_WHOLE_M:
         return whole
     parts = [(scale, floor_y) for scale in _PART_SCALES for floor_y in low - _PART_BOTTOMS * scale]
-    return parts + (whole if height > _CHILD_M else [])
+    return parts + (whole if height > CHILD_M else [])
 
 
 def _about_y(angle: float) -> NDArray[np.float64]:

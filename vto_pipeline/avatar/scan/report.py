@@ -27,6 +27,8 @@ CORE = 0.3
 """A vertex belongs to trunk and limbs when it belongs less than this to head, hands and feet."""
 _TRUNK = 0.8
 _MIN_TRUNK, _MIN_LIMB = 0.3, 0.5
+_WHOLE_TRUNK = 0.8
+"""Of a trunk seen from one side only there is half; a dress form shows more than nine tenths."""
 _LIKE_A_BODY = 2 / 3
 """So much of a person lies near the model's body: of people 94 % and more, of a dress form on its stand 89 %."""
 _STANDS_M, _REACH = 0.75, 1.2
@@ -177,8 +179,15 @@ def report_registration(scan: TriangleMesh, space: ShapeSpace, vertices: FloatAr
                 }
             )
     job.measure(explained_share=round(float(explained.mean()), 3))
-    job.measure(trunk_covered=round(_trunk_covered(scan, space, vertices), 3))
+    trunk = _trunk_covered(scan, space, vertices)
+    job.measure(trunk_covered=round(trunk, 3))
     hidden = []
+    if trunk < _WHOLE_TRUNK:
+        hidden.append("part of the trunk not seen")
+        job.warn(
+            f"{trunk:.0%} of the trunk is in the scan: its girths are estimates. Scan the body from all sides, or "
+            "check with a tape before choosing a size by it"
+        )
     for limb, own in _limbs(space).items():
         share = _shown(scan, vertices[own])
         if share < _MIN_LIMB:

@@ -16,7 +16,7 @@ from vto_pipeline.numerics.volume import axis_volumes
 HEIGHT_M = (0.35, 2.30)
 """Of a form without neck and legs, and of the tallest people."""
 _UNITS_M = {"metres": 1.0, "decimetres": 0.1, "centimetres": 0.01, "millimetres": 0.001}
-_AXES = {
+AXES = {
     "+Y": np.eye(3),
     "+Z": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]),
     "-Z": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
@@ -72,7 +72,7 @@ def in_metres(scan: TriangleMesh, job: Job) -> TriangleMesh:
 def candidate_up_rotations(scan: TriangleMesh) -> dict[str, FloatArray]:
     """Return axis -> the turn that makes it +Y, shape (3, 3), for all axes along which the scan is tall enough."""
     tall = np.ptp(scan.vertices, axis=0)
-    return {name: turn for name, turn in _AXES.items() if tall["XYZ".index(name[1])] > HEIGHT_M[0]}
+    return {name: turn for name, turn in AXES.items() if tall["XYZ".index(name[1])] > HEIGHT_M[0]}
 
 
 def without_floor(scan: TriangleMesh) -> TriangleMesh:

@@ -13,6 +13,7 @@ _BORDER = 0.03
 _MIN_SHARE = 0.3
 _CONTRAST = 3.0
 _SECOND = 0.25
+_TALL = 200
 _HINT = "show one whole person in front of a plain backdrop of a different colour"
 
 
@@ -89,3 +90,26 @@ def _otsu(values: FloatArray) -> float:
         between = low * high * (sums / low - (sums[-1] - sums) / high) ** 2
     # a picture of one colour is one class: no value parts it in two
     return float(centers[int(np.nanargmax(between))]) if np.isfinite(between).any() else np.inf
+
+
+def overlap(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
+    """Return how much two outlines have in common at equal height, 0 to 1; mirrored where that is more.
+
+    Args:
+        one: Whether a pixel is of the person, shape (H, W).
+        other: The same of another picture, of any size.
+    """
+    first, second = _at_equal_height(one), _at_equal_height(other)
+    return max(float((first & turned).sum() / (first | turned).sum()) for turned in (second, second[:, ::-1]))
+
+
+def _at_equal_height(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return a mask cut to the person, 200 pixels tall and 400 wide, the person in the middle."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    top, tall = rows[0], rows[-1] - rows[0] + 1
+    middle = (columns[0] + columns[-1]) / 2.0
+    y = top + ((np.arange(_TALL) + 0.5) * tall / _TALL).astype(int)
+    x = np.rint(middle + (np.arange(2 * _TALL) - _TALL + 0.5) * tall / _TALL).astype(int)
+    inside = (x >= 0) & (x < mask.shape[1])
+    found: NDArray[np.bool_] = mask[np.ix_(y, np.clip(x, 0, mask.shape[1] - 1))] & inside
+    return found

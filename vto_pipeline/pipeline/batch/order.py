@@ -134,30 +134,42 @@ def _word(value: Any) -> str:
 def _table(path: Path) -> Iterator[tuple[dict[str, Any], str]]:
     """Yield the rows of a table and where each stands; empty cells change nothing."""
     path = check_file(path, {".csv", ".yaml", ".yml", ".parquet"}, _TABLE_BYTES, error=ConfigError)
+    rows: Iterator[tuple[int, dict[str, Any]]]
     if path.suffix.lower() == ".csv":
-        rows, first = _csv_rows(path), 2
+        rows = _csv_rows(path)
     elif path.suffix.lower() == ".parquet":
-        rows, first = _parquet_rows(path), 1
+        rows = enumerate(_parquet_rows(path), start=1)
     else:
         data = load_yaml(path).data
         if not isinstance(data, list) or not all(isinstance(row, dict) for row in data):
             raise ConfigError("a table in YAML is a list of mappings", where=str(path))
-        rows, first = data, 1
-    for number, row in enumerate(rows, start=first):
+        rows = enumerate(data, start=1)
+    for number, row in rows:
         yield {str(key): value for key, value in row.items() if value not in (None, "")}, f"{path}, row {number}"
 
 
-def _csv_rows(path: Path) -> list[dict[str, Any]]:
-    """Rows of a CSV file with a head; a cell is a number, true, false, or a word."""
+def _csv_rows(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Yield the rows of a CSV file with a head, and their numbers in a spreadsheet; what is blank there is no row.
+
+    A cell is a number, true, false, or a word; a name is a word.
+    """
     try:
         with path.open(encoding="utf-8-sig", newline="") as stream:
-            read = csv.DictReader(stream, strict=True)
-            rows = list(read)
-        if any(None in row for row in rows):
-            raise ConfigError("a row has more cells than the head", where=str(path))
-        return [{key: number_or_word(cell) if cell else None for key, cell in row.items()} for row in rows]
+            head, *rows = list(csv.reader(stream, strict=True)) or [[]]
     except (csv.Error, UnicodeDecodeError) as e:
         raise ConfigError(f"not a CSV table in UTF-8: {e}", where=str(path)) from None
+    twice = [key for key, times in Counter(head).items() if times > 1]
+    if twice:
+        raise ConfigError(f"the column {twice[0]!r} is there {head.count(twice[0])} times", where=f"{path}, row 1")
+    for number, row in enumerate(rows, start=2):
+        if len(row) > len(head):
+            raise ConfigError("a row has more cells than the head", where=f"{path}, row {number}")
+        if any(cell.strip() for cell in row):
+            cells = dict(zip(head, row, strict=False))
+            yield (
+                number,
+                {key: cell if key == "name" or not cell else number_or_word(cell) for key, cell in cells.items()},
+            )
 
 
 def _parquet_rows(path: Path) -> list[dict[str, Any]]:

@@ -10,6 +10,7 @@ from typing import Any
 
 from vto_pipeline.errors import ConfigError, InputError
 from vto_pipeline.io.captures.photos import BOARD_FILE
+from vto_pipeline.io.clouds import PARSERS as CLOUDS
 from vto_pipeline.io.documents import Document
 from vto_pipeline.io.files import resolved
 from vto_pipeline.io.patterns.read import PARSERS as PATTERNS
@@ -87,7 +88,8 @@ def scan_order(
         wanted = ["garment", "openings"]
     if "garment" in wanted and kind in ("photos", "video"):
         wanted.append("garment_texture")
-    given = {f"mannequin.{'dressed' if written else 'surface'}": mannequin, f"{role}.{kind}": source}
+    form = "dressed" if written else _or_cloud(mannequin, "surface")
+    given = {f"mannequin.{form}": mannequin, f"{role}.{kind}": source}
     # what a scan makes of a body or a form has one name, whichever it was
     copies = {} if role == "garment" else {own: f"{role}_{own}" for own in ("surface.ply", "scan_report.json")}
     document = _document(name, given, [*wanted, f"{role}_scan_report", "page"], scale)
@@ -192,8 +194,8 @@ def drape_order(
         raise ConfigError("give either a body or measurements")
     given = {
         **_garments(garments, fabrics),
-        f"mannequin.{'avatar' if _is_avatar(source_body) else 'surface'}": source_body,
-        f"body.{'avatar' if _is_avatar(body) else 'mesh'}": body,
+        f"mannequin.{'avatar' if _is_avatar(source_body) else _or_cloud(source_body, 'surface')}": source_body,
+        f"body.{'avatar' if _is_avatar(body) else _or_cloud(body, 'mesh')}": body,
         "body.measurements": measurements,
         "motion": motion,
         "lifelike": lifelike,
@@ -228,6 +230,13 @@ def _garments(garments: Sequence[Path], fabrics: Sequence[str]) -> dict[str, Any
 def _garment_kind(path: Path) -> str:
     """Return the key of a garment file: a pattern or a mesh."""
     return "pattern" if path.suffix.lower() in PATTERNS else "mesh"
+
+
+def _or_cloud(path: Path | None, mesh: str) -> str:
+    """Return the key of a form's or a body's file: a point cloud, or what meshes are called there."""
+    if path is None or path.suffix.lower() not in CLOUDS or not path.is_file():  # what is missing is told later
+        return mesh
+    return "cloud" if find_kind(path)[0] == "cloud" else mesh
 
 
 def _is_avatar(path: Path | None) -> bool:
