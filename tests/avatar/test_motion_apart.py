@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from body_judges import cross
+from scipy.spatial import cKDTree
 
 from vto_pipeline.avatar.model.pose import pose_avatar
 from vto_pipeline.avatar.motion.apart import Apart
@@ -93,3 +94,11 @@ def test_a_hand_that_passes_through_the_hips_goes_around_in_every_frame_without_
     cleared = kept(Arms(avatar), avatar, poses, np.ones((frames, 2)))
     assert not any(cross(part(avatar, pose, hand), part(avatar, pose, hips)) for pose in cleared[::2])
     assert spikes(posed_joints(avatar, cleared, root)[1], FRAME_TIME) == 0
+
+
+def test_no_part_of_a_hand_is_far_from_what_is_looked_at():
+    avatar = template(0.0)
+    for side, looked_at in zip(("left", "right"), Arms(avatar).parts, strict=True):
+        hand = avatar.weights[:, avatar.joint_names.index(f"{side}_wrist")] >= 0.95
+        away, _ = cKDTree(avatar.bind_vertices[looked_at.places]).query(avatar.bind_vertices[hand])
+        assert away.max() < 0.03  # a finger is half as thick, and its room is half of that

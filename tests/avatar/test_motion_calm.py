@@ -61,9 +61,10 @@ def test_a_knee_that_slips_comes_back_to_its_course(frames):
     np.testing.assert_allclose(here[far], there[far], rtol=0, atol=1e-9)  # as it came
 
 
-def test_missing_frames_are_passed_without_a_jerk_and_both_ends_stay():
+@pytest.mark.parametrize("at", [15, SLIP, FRAMES - 15])
+def test_missing_frames_are_passed_without_a_jerk_and_both_ends_stay(at):
     body, (poses, root) = template(0.5), swinging()
-    root[SLIP:, 2] += 0.1  # a tenth of a second is missing
+    root[at:, 2] += 0.1  # a tenth of a second is missing
     calmed, moved = calm(body, poses, root, 1 / RATE)
     assert jerks(posed_joints(body, poses, root)[1]) > 0
     assert jerks(posed_joints(body, calmed, moved)[1]) == 0

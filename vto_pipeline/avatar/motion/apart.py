@@ -26,9 +26,8 @@ _MORE_M = 2e-3
 """What is aimed at beyond the room, so that few rounds do."""
 _SPACING_M = 0.05
 """Of the places that are looked at, and the reach of each as a part of the surface."""
-_REACH_M = 0.09  # a place that is farther from all of them is beside the body: their planes say nothing there,
-_BEHIND = 0.5  # unless it lies behind them, by so much of the way
-_FAR_M = 0.2  # so deep inside at most; what is farther from all of a part is left out
+_REACH_M = 0.09  # a place that is farther from all of them is beside the body: their planes say nothing there
+_FAR_M = 0.2  # what is farther from all of a part on any axis is left out
 _ROUNDS = 12
 _TURN_RAD = 0.15  # of a round, at most
 _DEEPEST = 4  # power of what places lack by which they count: larger ones let the deepest lead alone
@@ -64,11 +63,11 @@ class Apart:
 
     Args:
         avatar: Any of our bodies.
-        parts: Of it.
+        parts: Of it, each of which is kept off its others.
     """
 
     def __init__(self, avatar: Avatar, parts: Sequence[Part]) -> None:
-        self._avatar, self._parts = avatar, parts
+        self._avatar, self.parts = avatar, parts
         self._normals = vertex_normals(TriangleMesh(avatar.bind_vertices, avatar.faces))
 
     def kept(
@@ -103,11 +102,11 @@ class Apart:
             turn: World rotations of the joints relative to the bind pose, shape (T, J, 3, 3).
             place: World places of the joints [m], shape (T, J, 3).
         """
-        found = np.zeros((len(turn), len(self._parts), 3))
+        found = np.zeros((len(turn), len(self.parts), 3))
         for first in range(0, len(turn), _FRAMES):
             some = slice(first, first + _FRAMES)
             moves = self._moves(turn[some], place[some])
-            for k, part in enumerate(self._parts):
+            for k, part in enumerate(self.parts):
                 places, _ = self._skin(part.places, *moves)
                 found[some, k] = _swing(places, place[some][:, part.pivot], *self._skin(part.others, *moves), part.room)
         return found
@@ -115,7 +114,7 @@ class Apart:
     def swung(self, turn: FloatArray, swings: FloatArray) -> FloatArray:
         """Return rotations of a motion whose parts are turned so, shape (T, J, 3, 3)."""
         turned = turn.copy()
-        for k, part in enumerate(self._parts):
+        for k, part in enumerate(self.parts):
             turned[:, part.moved] = vector_matrices(swings[:, k])[:, None] @ turn[:, part.moved]
         return turned
 
@@ -212,9 +211,7 @@ def _heights(points: FloatArray, body: FloatArray, normals: FloatArray) -> tuple
     normal = share @ normals
     planes = np.einsum("tmi,tmi->tm", body, normals)
     height = np.einsum("tni,tni->tn", points, normal) - (share @ planes[:, :, None])[:, :, 0]
-    nearest = np.sqrt(np.maximum(nearest[:, :, 0], 0.0))
-    inside = (nearest < _FAR_M) & (height < -_BEHIND * nearest)
-    return np.where((nearest < _REACH_M) | inside, height, np.inf), normal
+    return np.where(nearest[:, :, 0] < _REACH_M**2, height, np.inf), normal
 
 
 def spread(vertices: NDArray[np.int64], places: FloatArray, spacing: float = _SPACING_M) -> NDArray[np.int64]:

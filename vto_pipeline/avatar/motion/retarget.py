@@ -153,11 +153,11 @@ def _mended(
     """
     legs, both, one = Legs(avatar), np.ones((len(poses), 2)), np.ones((len(poses), 1))
     stands = grounded(planted, frame_time) if hold else 0.0 * both
-    poses, _ = legs.kept(poses, root, both * stands.prod(axis=1, keepdims=True), frame_time)
+    poses, _ = legs.kept(poses, root, _halves(both * stands.prod(axis=1, keepdims=True)), frame_time)
     if hold:
         poses, root, planted = calm_on_held_feet(avatar, poses, root, planted, frame_time)
         stands = grounded(planted, frame_time)
-    poses, _ = legs.kept(poses, root, 1.0 - stands, frame_time)
+    poses, _ = legs.kept(poses, root, _halves(1.0 - stands), frame_time)
     poses, _ = Trunk(avatar).kept(poses, root, one, frame_time)
     poses, close = Arms(avatar).kept(poses, root, both, frame_time)
     if hold:
@@ -165,6 +165,12 @@ def _mended(
     else:
         poses, root = calm(avatar, poses, root, frame_time)
     return poses, root, planted, float(close.mean())
+
+
+def _halves(free: FloatArray) -> FloatArray:
+    """Return how much of the way each of two legs goes: half, where both are free, shape (T, 2)."""
+    shared: FloatArray = free / np.maximum(free.sum(axis=1, keepdims=True), 1.0)
+    return shared
 
 
 def _report(figures: MotionFigures, contacts: FloatArray, place: FloatArray, frame_time: float, job: Job) -> None:
