@@ -8,10 +8,10 @@ from body_judges import cross
 from scipy.spatial import cKDTree
 
 from vto_pipeline.avatar.model.pose import pose_avatar
-from vto_pipeline.avatar.motion.apart import Apart
 from vto_pipeline.avatar.motion.figures import spikes
 from vto_pipeline.avatar.motion.joint_places import posed_joints
-from vto_pipeline.avatar.motion.parts import Arms, Legs, Trunk
+from vto_pipeline.avatar.motion.room.apart import Apart
+from vto_pipeline.avatar.motion.room.parts import Arms, Legs, Trunk
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.geometry.topology import submesh
 from vto_pipeline.model.body import Avatar

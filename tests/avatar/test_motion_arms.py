@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.model.pose import pose_avatar
-from vto_pipeline.avatar.motion.apart import eased
 from vto_pipeline.avatar.motion.joint_places import posed_joints
-from vto_pipeline.avatar.motion.parts import Arms
 from vto_pipeline.avatar.motion.retarget import retarget
+from vto_pipeline.avatar.motion.room.apart import eased
+from vto_pipeline.avatar.motion.room.parts import Arms
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import submesh

@@ -5,8 +5,7 @@ align: turns and places carried over from another skeleton
 limits, joint_limits.yaml: how far joints turn
 soles, plants: where a foot touches the floor, and when it stands still
 foot_skate, leg_reach: feet that stand still are held there
-apart: parts of a body that are swung off others
-parts: which: arms off trunk, head and legs, a leg off the other, the trunk off the legs
+room: limbs and trunk that are kept off each other
 calm: jerks that are smoothed away
 joint_places: where joints are in many poses
 timing: another frame rate; a smooth start from a pose, and a smooth end; a last pose that is held

@@ -15,8 +15,8 @@ from vto_pipeline.avatar.motion.figures import plant_drift, spikes, worst_leap
 from vto_pipeline.avatar.motion.foot_skate import grounded
 from vto_pipeline.avatar.motion.joint_places import posed_joints
 from vto_pipeline.avatar.motion.limits import limit_turns
-from vto_pipeline.avatar.motion.parts import Arms, Legs, Trunk
 from vto_pipeline.avatar.motion.plants import find_plants, runs, speeds
+from vto_pipeline.avatar.motion.room.parts import Arms, Legs, Trunk
 from vto_pipeline.avatar.motion.soles import contact_places
 from vto_pipeline.avatar.motion.timing import lead_in, resample
 from vto_pipeline.io.motion.joint_map import JointMap

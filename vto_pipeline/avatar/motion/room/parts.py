@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from vto_pipeline.avatar.motion.apart import Apart, Part, spread
+from vto_pipeline.avatar.motion.room.apart import Apart, Part, spread
 from vto_pipeline.model.body import Avatar
 
 _SIDES = ("left", "right")
