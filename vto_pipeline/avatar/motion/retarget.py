@@ -11,7 +11,7 @@ from pydantic import Field
 from vto_pipeline.avatar.motion.align import carry_over
 from vto_pipeline.avatar.motion.balance import Balance, balance
 from vto_pipeline.avatar.motion.calm import calm, calm_on_held_feet
-from vto_pipeline.avatar.motion.figures import plant_drift, spikes, worst_leap
+from vto_pipeline.avatar.motion.figures import jerked_joints, plant_drift, spikes, worst_leap
 from vto_pipeline.avatar.motion.foot_skate import grounded
 from vto_pipeline.avatar.motion.joint_places import posed_joints
 from vto_pipeline.avatar.motion.limits import limit_turns
@@ -157,12 +157,12 @@ def _mended(
     if hold:
         poses, root, planted = calm_on_held_feet(avatar, poses, root, planted, frame_time)
         stands = grounded(planted, frame_time)
-    poses, _ = legs.kept(poses, root, _halves(1.0 - stands), frame_time)
+    poses, around = legs.kept(poses, root, _halves(1.0 - stands), frame_time)
     poses, _ = Trunk(avatar).kept(poses, root, one, frame_time)
     poses, close = Arms(avatar).kept(poses, root, both, frame_time)
-    if hold:
+    if hold and (around.any() or jerked_joints(posed_joints(avatar, poses, root)[1], frame_time).any()):
         poses, root, planted = calm_on_held_feet(avatar, poses, root, planted, frame_time)
-    else:
+    elif not hold:
         poses, root = calm(avatar, poses, root, frame_time)
     return poses, root, planted, float(close.mean())
 
