@@ -22,6 +22,33 @@ def meet(one: TriangleMesh, other: TriangleMesh) -> bool:
     return crossing(np.vstack([one.vertices, other.vertices]), faces)
 
 
+def cross(one: TriangleMesh, other: TriangleMesh) -> bool:
+    """Whether two surfaces pass through each other; what passes through itself does not count.
+
+    All edges of the one are held against all triangles of the other.
+    """
+    return _pierced(one, other) or _pierced(other, one)
+
+
+def _pierced(one: TriangleMesh, other: TriangleMesh) -> bool:
+    """Whether an edge of the one goes through a triangle of the other, by signed volumes."""
+    low, high = other.vertices.min(axis=0), other.vertices.max(axis=0)
+    edges = trimesh.Trimesh(one.vertices, one.faces, process=False).edges_unique
+    ends = one.vertices[edges]
+    ends = ends[((ends.max(axis=1) >= low) & (ends.min(axis=1) <= high)).all(axis=1)]
+    for p, q in ends:
+        a, b, c = other.vertices[other.faces.T]
+        near = ((np.maximum(p, q) >= np.minimum(np.minimum(a, b), c)).all(axis=1)) & (
+            (np.minimum(p, q) <= np.maximum(np.maximum(a, b), c)).all(axis=1)
+        )
+        a, b, c = a[near], b[near], c[near]
+        sides = [(np.cross(b - a, c - a) * (end - a)).sum(axis=1) > 0 for end in (p, q)]
+        turns = [(np.cross(v - p, w - p) @ (q - p)) > 0 for v, w in ((a, b), (b, c), (c, a))]
+        if ((sides[0] != sides[1]) & (turns[0] == turns[1]) & (turns[1] == turns[2])).any():
+            return True
+    return False
+
+
 def independent_girth(vertices: np.ndarray, faces: np.ndarray, height: float, near: float | None) -> float:
     """Hull of the trimesh section's loop whose middle is nearest to x = near; of the whole section without one."""
     cut = trimesh.Trimesh(vertices, faces, process=False).section([0, 1, 0], [0, height, 0])

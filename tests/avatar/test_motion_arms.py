@@ -11,8 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.model.pose import pose_avatar
-from vto_pipeline.avatar.motion.arms import Arms, eased
-from vto_pipeline.avatar.motion.retarget import posed_joints, retarget
+from vto_pipeline.avatar.motion.joint_places import posed_joints
+from vto_pipeline.avatar.motion.retarget import retarget
+from vto_pipeline.avatar.motion.room.apart import eased
+from vto_pipeline.avatar.motion.room.parts import Arms
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import submesh
@@ -115,7 +117,7 @@ def test_eased_swings_are_whole_where_they_are_largest_and_never_jump():
     swings = np.zeros((40, 2, 3))
     swings[20, 0] = [0.0, 0.3, 0.4]
     swings[:, 1] = [0.1, 0.0, -0.2]
-    found = eased(swings, 1 / 30)
+    found = eased(swings, 0.15, 1 / 30)
     np.testing.assert_allclose(found[:, 1], swings[:, 1], rtol=0, atol=1e-15)
     np.testing.assert_allclose(found[20, 0], swings[20, 0], rtol=0, atol=1e-15)
     size = np.linalg.norm(found[:, 0], axis=1)

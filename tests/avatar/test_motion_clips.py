@@ -12,7 +12,8 @@ import trimesh
 
 from vto_pipeline.avatar.model.pose import pose_avatar
 from vto_pipeline.avatar.motion.align import carry_over
-from vto_pipeline.avatar.motion.retarget import RetargetConfig, posed_joints, retarget
+from vto_pipeline.avatar.motion.joint_places import posed_joints
+from vto_pipeline.avatar.motion.retarget import RetargetConfig, retarget
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.io.motion.read import read_motion
 from vto_pipeline.model.job import Job

@@ -10,10 +10,10 @@ from vto_pipeline.avatar.model.skinning import joint_transforms
 from vto_pipeline.avatar.motion.balance import balance, part_masses, zero_moment_point
 from vto_pipeline.avatar.motion.figures import plant_drift, spikes
 from vto_pipeline.avatar.motion.foot_skate import fade_out, hold_feet
+from vto_pipeline.avatar.motion.joint_places import posed_joints
 from vto_pipeline.avatar.motion.leg_reach import lowering, two_bones
 from vto_pipeline.avatar.motion.limits import limit_turns
 from vto_pipeline.avatar.motion.plants import find_plants
-from vto_pipeline.avatar.motion.retarget import posed_joints
 from vto_pipeline.avatar.motion.soles import contact_places
 from vto_pipeline.avatar.motion.timing import hold_last, lead_in, resample
 from vto_pipeline.avatar.template.template import template
@@ -87,6 +87,27 @@ def test_sliding_feet_are_held_and_bones_keep_their_length():
     assert plant_drift(after, planted) < 1e-9
     assert abs(after[..., 1]).max() < 1e-9
     assert spikes(places, dt) == 0
+
+
+def test_a_foot_that_comes_down_through_the_floor_slides_onto_it():
+    """The left leg is lifted by its knee, and dips by 2 cm before it stands from frame 60 on."""
+    frames, dt = 120, 1 / 60
+    (turn, place), body = standing(frames, np.zeros((frames, 3)))
+    left = [body.joint_names.index(f"left_{joint}") for joint in ("knee", "ankle")]
+    away = np.clip((59 - np.arange(frames)) / 60, 0.0, 1.0)
+    place[:, left[1], 1] += 0.3 * away * (away - 0.5)  # below the floor in the last half second
+    planted = np.ones((frames, 4), dtype=bool)
+    planted[:60, :2] = False
+    sunk = contact_places(turn, place, body)
+    assert sunk[..., 1].min() < -0.015
+    turned, root = hold_feet(turn, place, planted, body, dt)
+    offsets = np.array([body.joints[j] - body.joints[max(p, 0)] for j, p in enumerate(body.parents)])
+    places = np.empty_like(place)
+    for j, parent in enumerate(body.parents):
+        places[:, j] = root if parent < 0 else places[:, parent] + turned[:, parent] @ offsets[j]
+    after = contact_places(turned, places, body)
+    assert after[..., 1].min() > -1e-6  # a leg that is almost straight
+    assert abs(after[60:] - after[60]).max() < 1e-9
 
 
 def test_corrections_fade_without_a_jump_of_place_or_speed():

@@ -11,7 +11,8 @@ import pytest
 
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.motion.figures import crossing_frames
-from vto_pipeline.avatar.motion.retarget import RetargetConfig, posed_joints, retarget
+from vto_pipeline.avatar.motion.joint_places import posed_joints
+from vto_pipeline.avatar.motion.retarget import RetargetConfig, retarget
 from vto_pipeline.avatar.motion.soles import contact_places
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.errors import InputError
@@ -26,8 +27,6 @@ from vto_pipeline.numerics.kinematics import matrix_quaternions, quaternion_matr
 REAL = Path(__file__).parents[2].parent / "shared" / "data" / "motion"
 CLIPS = ("cmu_131_bvh/131_01", "cmu_131_bvh/131_02", "cmu_131_bvh/131_03", "pymo_bvh/AV_8Walk_Meredith_HVHA_Rep1")
 BONES = (("shoulder", "elbow"), ("elbow", "wrist"))
-MORE_JERKS = 2
-"""Frames with a jerk that may come on top of the recording's own: a held foot passes them on to its knee."""
 
 
 @cache
@@ -62,8 +61,9 @@ def test_a_motion_onto_the_body_it_came_from_is_the_same():
             poses[:, avatar.joint_names.index(f"{side}_{kind}"), 1:] *= 0.3
             x = poses[:, avatar.joint_names.index(f"{side}_{kind}"), 0]
             x[:] = abs(x) * (1 if kind == "knee" else -1)
-    for side, sign in (("left", 1.0), ("right", -1.0)):  # no arm near the trunk: it would be moved off
+    for side, sign in (("left", 1.0), ("right", -1.0)):  # no limb near the trunk or another: it would be moved off
         poses[:, avatar.joint_names.index(f"{side}_shoulder"), 2] += sign * 0.6
+        poses[:, avatar.joint_names.index(f"{side}_hip"), 2] += sign * 0.2
     places = rng.uniform(-0.3, 0.3, (12, 3))
     clip = clip_of(avatar, poses, places)
     motion, figures = retarget(clip, mapped(clip), avatar, RetargetConfig(hold_feet=False))
@@ -185,6 +185,7 @@ def test_planted_feet_of_real_clips_drift_by_less_than_two_millimetres(clip, nam
     assert drift <= 0.002
     assert figures.plants > 10
     assert figures.drift_before > 0.01
-    assert figures.spikes_after <= figures.spikes_before + MORE_JERKS
-    assert figures.below_floor < 0.02
+    assert figures.spikes_after == 0
+    assert contacts[..., 1].min() > -1e-3
+    assert crossing_frames(motion, avatar, 6)[0] == 0
     assert abs(contacts[..., 1][motion.planted]).max() < 0.001

@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from vto_pipeline.avatar.template.implicit import smoothstep, unsmoothed
 from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.numerics.kinematics import matrix_quaternions, quaternion_matrices
 
 _ARM = ("shoulder", "elbow", "wrist")
 _LEAST_BELOW = 0.1  # sine of the angle below level at which arms of a bind pose are taken to hang at least
@@ -109,18 +110,18 @@ def _untwisted(
 
 
 def blend_transforms(weights: FloatArray, rotation: FloatArray, offset: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return what happens to each vertex, x -> R x + t, shapes (V, 3, 3) and (V, 3): always a rigid motion.
+    """Return what happens to each vertex, x -> R x + t, shapes (..., V, 3, 3) and (..., V, 3): always a rigid motion.
 
     Dual quaternion linear blending (Kavan et al. 2007, eq. 18); weights need not sum to 1.
 
     Args:
         weights: Shape (V, J).
-        rotation: Of the joints, shape (J, 3, 3).
-        offset: Of the joints [m], shape (J, 3).
+        rotation: Of the joints, of one pose or of many, shape (..., J, 3, 3).
+        offset: Of the joints [m], shape (..., J, 3).
     """
-    real = Rotation.from_matrix(rotation).as_quat()
-    x, y, z, w = real.T
-    tx, ty, tz = offset.T
+    real = matrix_quaternions(rotation)
+    x, y, z, w = np.moveaxis(real, -1, 0)
+    tx, ty, tz = np.moveaxis(offset, -1, 0)
     dual = np.stack(  # half of translation times rotation
         [
             tx * w + ty * z - tz * y,
@@ -128,16 +129,16 @@ def blend_transforms(weights: FloatArray, rotation: FloatArray, offset: FloatArr
             tz * w + tx * y - ty * x,
             -tx * x - ty * y - tz * z,
         ],
-        axis=1,
+        axis=-1,
     )
     # q and -q are one rotation: take those that lie on the side of the vertex's main joint
-    side = np.where(real @ real.T < 0, -1.0, 1.0)
-    shares = weights * side[np.argmax(weights, axis=1)]
+    side = np.where(real @ np.swapaxes(real, -1, -2) < 0, -1.0, 1.0)
+    shares = weights * side[..., np.argmax(weights, axis=1), :]
     mixed, moved = shares @ real, shares @ dual
-    length = np.linalg.norm(mixed, axis=1, keepdims=True)
+    length = np.linalg.norm(mixed, axis=-1, keepdims=True)
     mixed, moved = mixed / length, moved / length
-    v, s, d, e = mixed[:, :3], mixed[:, 3:], moved[:, :3], moved[:, 3:]
-    return Rotation.from_quat(mixed).as_matrix(), s * d - e * v + np.cross(v, d)
+    v, s, d, e = mixed[..., :3], mixed[..., 3:], moved[..., :3], moved[..., 3:]
+    return quaternion_matrices(mixed), s * d - e * v + np.cross(v, d)
 
 
 def linear_blend_skinning(

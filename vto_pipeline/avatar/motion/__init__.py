@@ -5,7 +5,9 @@ align: turns and places carried over from another skeleton
 limits, joint_limits.yaml: how far joints turn
 soles, plants: where a foot touches the floor, and when it stands still
 foot_skate, leg_reach: feet that stand still are held there
-arms: arms that are kept off trunk and thighs
+room: limbs and trunk that are kept off each other
+calm: jerks that are smoothed away
+joint_places: where joints are in many poses
 timing: another frame rate; a smooth start from a pose, and a smooth end; a last pose that is held
 path: the avatar at any time of its motion
 live: an avatar that follows a person frame by frame

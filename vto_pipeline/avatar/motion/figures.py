@@ -57,7 +57,14 @@ def spikes(places: FloatArray, frame_time: float) -> int:
         places: Of the joints [m], shape (T, J, 3).
         frame_time: [s].
     """
-    return int(_jerked(_off_course(places), frame_time).any(axis=1).sum())
+    return int(jerked_joints(places, frame_time).any(axis=1).sum())
+
+
+def jerked_joints(places: FloatArray, frame_time: float) -> NDArray[np.bool_]:
+    """Return which joints are jerked in which frames, shape (T, J); see `spikes`."""
+    jerked = np.zeros(places.shape[:2], dtype=bool)
+    jerked[1:-1] = _jerked(_off_course(places), frame_time)
+    return jerked
 
 
 def worst_leap(places: FloatArray, frame_time: float) -> Leap | None:

@@ -86,6 +86,17 @@ def hold_feet(
     return turn, root
 
 
+def grounded(planted: NDArray[np.bool_], frame_time: float) -> FloatArray:
+    """Return how much the left and the right foot stand: 1 while they do, 0 a while before and after, shape (T, 2).
+
+    Args:
+        planted: Which of `model.motion.CONTACTS` stand still, shape (T, 4).
+        frame_time: [s].
+    """
+    fade, one = max(1, round(_FADE_S / 2 / frame_time)), np.ones((len(planted), 1))
+    return np.concatenate([fade_out(one, np.any(planted[:, k : k + 2], axis=1), fade) for k in (0, 2)], axis=1)
+
+
 def _bones(avatar: Avatar, side: str) -> tuple[FloatArray, FloatArray]:
     hip, knee, ankle = (
         avatar.joints[avatar.joint_names.index(f"{side}_{joint}")] for joint in ("hip", "knee", "ankle")
@@ -108,11 +119,19 @@ def _hold(turn: FloatArray, ankle: FloatArray, planted: NDArray[np.bool_], point
     goal = anchor - np.einsum("tab,cb->tca", turn, points)
     wanted = np.where(planted[:, :1], goal[:, 0], goal[:, 1])
     ankle = ankle + fade_out(wanted - ankle, either, fade)
-    lowest = (ankle[:, None, 1] + np.einsum("tb,cb->tc", turn[:, 1], points)).min(axis=1)
-    lift = lowering(np.where(either, 0.0, np.maximum(-lowest, 0.0)), fade // 3)
-    grounded = fade_out(np.ones((len(lift), 1)), either, max(1, fade // 2))[:, 0]
-    ankle = ankle + ((1.0 - grounded) * lift)[:, None] * [0.0, 1.0, 0.0]
+    sunk = _sunk(turn, ankle, points)
+    lift = lowering(np.where(either, 0.0, sunk), fade // 3)
+    near = fade_out(np.ones((len(lift), 1)), either, max(1, fade // 2))[:, 0]
+    ankle = ankle + ((1.0 - near) * lift)[:, None] * [0.0, 1.0, 0.0]
+    ankle = ankle + np.where(either, 0.0, _sunk(turn, ankle, points))[:, None] * [0.0, 1.0, 0.0]
     return Held(turn, ankle)
+
+
+def _sunk(turn: FloatArray, ankle: FloatArray, points: FloatArray) -> FloatArray:
+    """Return how far heel or ball of a foot are below the floor [m], shape (T,)."""
+    lowest = (ankle[:, None, 1] + np.einsum("tb,cb->tc", turn[:, 1], points)).min(axis=1)
+    sunk: FloatArray = np.maximum(-lowest, 0.0)
+    return sunk
 
 
 def _stance(

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from vto_pipeline.avatar.motion.align import Fit, carried, fit_of
-from vto_pipeline.avatar.motion.arms import Arms
+from vto_pipeline.avatar.motion.joint_places import posed_joints
 from vto_pipeline.avatar.motion.limits import limit_turns
-from vto_pipeline.avatar.motion.retarget import posed_joints
+from vto_pipeline.avatar.motion.room.parts import Arms
 from vto_pipeline.avatar.motion.timing import brought_to
 from vto_pipeline.io.motion.joint_map import JointMap
 from vto_pipeline.io.motion.read import clip_of, understood

@@ -5,15 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from vto_pipeline.avatar.motion.align import carry_over
-from vto_pipeline.avatar.motion.arms import Arms, eased
 from vto_pipeline.avatar.motion.balance import Balance, balance
-from vto_pipeline.avatar.motion.figures import plant_drift, spikes, worst_leap
-from vto_pipeline.avatar.motion.foot_skate import hold_feet
+from vto_pipeline.avatar.motion.calm import calm, calm_on_held_feet
+from vto_pipeline.avatar.motion.figures import jerked_joints, plant_drift, spikes, worst_leap
+from vto_pipeline.avatar.motion.foot_skate import grounded
+from vto_pipeline.avatar.motion.joint_places import posed_joints
 from vto_pipeline.avatar.motion.limits import limit_turns
 from vto_pipeline.avatar.motion.plants import find_plants, runs, speeds
+from vto_pipeline.avatar.motion.room.parts import Arms, Legs, Trunk
 from vto_pipeline.avatar.motion.soles import contact_places
 from vto_pipeline.avatar.motion.timing import lead_in, resample
 from vto_pipeline.io.motion.joint_map import JointMap
@@ -22,7 +25,7 @@ from vto_pipeline.model.body import Avatar
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.motion import AvatarMotion, Clip
 from vto_pipeline.model.settings import Config
-from vto_pipeline.numerics.kinematics import local_rotations, matrix_vectors, vector_matrices, world_transforms
+from vto_pipeline.numerics.kinematics import local_rotations, matrix_vectors
 
 _OFTEN = 0.05
 _DRIFT_M = 0.002
@@ -91,18 +94,12 @@ def retarget(
     poses, limited = limit_turns(poses, avatar.joint_names)
     turn, place = posed_joints(avatar, poses, root)
     before = contact_places(turn, place, avatar)
-    planted = find_plants(before, clip.frame_time)
     spikes_before, leap = spikes(place, clip.frame_time), worst_leap(place, clip.frame_time)
-    if config.hold_feet:
-        job.progress(0.4, "hold the feet")
-        turn, root = hold_feet(turn, place, planted, avatar, clip.frame_time)
-        poses = matrix_vectors(local_rotations(avatar.parents.tolist(), turn))
-        turn, place = posed_joints(avatar, poses, root)
-    job.progress(0.5, "keep the arms off the body")
-    arms = Arms(avatar)
-    swings = arms.swings(turn, place)
-    turn = arms.swung(turn, eased(swings, clip.frame_time))
-    poses = matrix_vectors(local_rotations(avatar.parents.tolist(), turn))
+    poses, root = calm(avatar, poses, root, clip.frame_time)
+    calmed = contact_places(*posed_joints(avatar, poses, root), avatar)
+    planted = find_plants(calmed, clip.frame_time)
+    job.progress(0.3, "keep the limbs off the body")
+    poses, root, planted, arms_moved = _mended(avatar, poses, root, planted, clip.frame_time, config.hold_feet)
     turn, place = posed_joints(avatar, poses, root)
     after = contact_places(turn, place, avatar)
     job.progress(0.7, "find the zero moment point")
@@ -115,7 +112,7 @@ def retarget(
         below_floor=float(max(-after[..., 1].min(), 0.0)),
         balance=balance(turn, place, avatar, clip.frame_time),
         limited=limited,
-        arms_moved=float(swings.any(axis=(1, 2)).mean()),
+        arms_moved=arms_moved,
     )
     _report(figures, before, place, clip.frame_time, job)
     if leap is not None:
@@ -131,19 +128,49 @@ def retarget(
     return motion, figures
 
 
-def posed_joints(avatar: Avatar, poses: FloatArray, root: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return world rotations relative to the bind pose, and places of the joints, (T, J, 3, 3) and (T, J, 3).
+def _mended(
+    avatar: Avatar,
+    poses: FloatArray,
+    root: FloatArray,
+    planted: NDArray[np.bool_],
+    frame_time: float,
+    hold: bool,
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], float]:
+    """Return a motion whose feet stand, whose limbs have room, and that is calm.
+
+    Feet that stand in a leg are set down beside it; where they stand, only the leg that is in the air goes around.
 
     Args:
         avatar: Any of our bodies.
         poses: Rotation vectors in the parents' frames [rad], shape (T, J, 3).
         root: Places of the root [m], shape (T, 3).
+        planted: Which of `model.motion.CONTACTS` stand still, shape (T, 4).
+        frame_time: [s].
+        hold: Whether feet are held.
+
+    Returns:
+        Poses, places of the root, what is planted, and the share of frames in which an arm had no room.
     """
-    parents = avatar.parents.tolist()
-    offsets = np.array([avatar.joints[j] - avatar.joints[max(parent, 0)] for j, parent in enumerate(parents)])
-    local = np.tile(offsets, (len(poses), 1, 1))
-    local[:, [j for j, parent in enumerate(parents) if parent < 0]] = root[:, None]
-    return world_transforms(parents, vector_matrices(poses), local)
+    legs, both, one = Legs(avatar), np.ones((len(poses), 2)), np.ones((len(poses), 1))
+    stands = grounded(planted, frame_time) if hold else 0.0 * both
+    poses, _ = legs.kept(poses, root, _halves(both * stands.prod(axis=1, keepdims=True)), frame_time)
+    if hold:
+        poses, root, planted = calm_on_held_feet(avatar, poses, root, planted, frame_time)
+        stands = grounded(planted, frame_time)
+    poses, around = legs.kept(poses, root, _halves(1.0 - stands), frame_time)
+    poses, _ = Trunk(avatar).kept(poses, root, one, frame_time)
+    poses, close = Arms(avatar).kept(poses, root, both, frame_time)
+    if hold and (around.any() or jerked_joints(posed_joints(avatar, poses, root)[1], frame_time).any()):
+        poses, root, planted = calm_on_held_feet(avatar, poses, root, planted, frame_time)
+    elif not hold:
+        poses, root = calm(avatar, poses, root, frame_time)
+    return poses, root, planted, float(close.mean())
+
+
+def _halves(free: FloatArray) -> FloatArray:
+    """Return how much of the way each of two legs goes: half, where both are free, shape (T, 2)."""
+    shared: FloatArray = free / np.maximum(free.sum(axis=1, keepdims=True), 1.0)
+    return shared
 
 
 def _report(figures: MotionFigures, contacts: FloatArray, place: FloatArray, frame_time: float, job: Job) -> None:

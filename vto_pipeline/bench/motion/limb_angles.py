@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vto_pipeline.avatar.motion.retarget import posed_joints
+from vto_pipeline.avatar.motion.joint_places import posed_joints
 from vto_pipeline.io.motion.read import MotionFile
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Avatar

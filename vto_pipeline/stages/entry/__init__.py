@@ -9,5 +9,6 @@ shown, pictures: what of it can be drawn, and a small picture of that
 cards: what a notebook shows of it
 moving: its garment and avatar in motion, frame by frame
 live: the same, moved by a person before a camera
+pace: when the frames of that begin
 try_ons: a batch of drapes as a page with sliders
 """

@@ -26,9 +26,10 @@ from vto_pipeline.render.dress import BODY
 from vto_pipeline.report.layers import PageLayer, list_layers
 from vto_pipeline.report.live.page import LivePage, live_page
 from vto_pipeline.stages.entry.outcome import Outcome
+from vto_pipeline.stages.entry.pace import Pace
 
-_LONGEST = 3.0
-"""Frames' lengths that a late frame counts as, at most: a pause is no leap."""
+_SHORTEST, _LONGEST = 0.5, 3.0
+"""Frames' lengths that a frame counts as: at least, where frames catch up, and at most, as a pause is no leap."""
 _MORE = 1.15  # times the vertices that were asked for: with fewer, a garment is taken as it is
 _NOBODY_S = 0.2  # between looks whether somebody has come
 
@@ -140,8 +141,8 @@ def follow_live(
 ) -> None:
     """Move the avatar and its garment until the feed is over.
 
-    A frame takes the newest skeleton, or holds the last. Frames come at even times; where one takes too long, those
-    that it has missed are left out, and the next one is as much longer.
+    A frame takes the newest skeleton, or holds the last. Frames come at even times (see `Pace`), and each is as long as
+    it is since the one before.
 
     Args:
         dressed: What moves.
@@ -160,21 +161,20 @@ def follow_live(
     while frame is None and not feed.over:
         frame = feed.take(_NOBODY_S)
     period, body = 1.0 / rate, dressed.avatar.vertices
-    first = due = before = time.perf_counter()
+    first = before = time.perf_counter()
+    pace = Pace(period, first)
     while not feed.over or frame is not None:
         began = time.perf_counter()
         if frame is not None:
             body = posed_vertices(dressed.avatar, *pose.at(frame.places, began - first))
         report.held += frame is None
-        cloth.advance(body, min(max(began - before, period), _LONGEST * period))
+        cloth.advance(body, min(max(began - before, _SHORTEST * period), _LONGEST * period))
         before = began
         show(dressed.shown(cloth.positions, body))
         now = time.perf_counter()
         report.frame_s.append(now - began)
-        missed = max(0, int((now - due) / period))
-        report.late += missed
-        due += (missed + 1) * period
-        time.sleep(max(0.0, due - now))
+        report.late += pace.made(now)
+        time.sleep(max(0.0, pace.due - now))
         report.seconds = time.perf_counter() - first
         frame = feed.take()
     if not report.frame_s:
