@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-PANTS = Path("/work/shared/data/garments/berkeley/pants/pants-iso.obj")
+PANTS = Path(__file__).parents[3] / "shared" / "data" / "garments" / "berkeley" / "pants" / "pants-iso.obj"
 
 
 @pytest.mark.slow
