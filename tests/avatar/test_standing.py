@@ -17,7 +17,7 @@ from vto_pipeline.io.meshes import read_mesh
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
-BODIES = Path("/work/shared/data/bodies")
+BODIES = Path(__file__).parents[3] / "shared" / "data" / "bodies"
 POSED = named_pose(template(), "t_pose")
 BODY = TriangleMesh(POSED.vertices, POSED.faces)
 
