@@ -10,7 +10,8 @@ from scipy.spatial import cKDTree
 from vto_pipeline.avatar.model.pose import pose_avatar
 from vto_pipeline.avatar.motion.figures import spikes
 from vto_pipeline.avatar.motion.joint_places import posed_joints
-from vto_pipeline.avatar.motion.room.apart import Apart
+from vto_pipeline.avatar.motion.retarget import _halves
+from vto_pipeline.avatar.motion.room.apart import Apart, _heights
 from vto_pipeline.avatar.motion.room.parts import Arms, Legs, Trunk
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.geometry.topology import submesh
@@ -102,3 +103,20 @@ def test_no_part_of_a_hand_is_far_from_what_is_looked_at():
         hand = avatar.weights[:, avatar.joint_names.index(f"{side}_wrist")] >= 0.95
         away, _ = cKDTree(avatar.bind_vertices[looked_at.places]).query(avatar.bind_vertices[hand])
         assert away.max() < 0.03  # a finger is half as thick, and its room is half of that
+
+
+def test_a_place_beside_a_surface_is_as_high_above_it_as_it_is():
+    """Over a level grid: that it lies in no common box with the place, and another one far away, change nothing."""
+    x, z = (part.ravel() for part in np.meshgrid(*2 * [np.arange(-0.3, 0.31, 0.05)]))
+    level = np.column_stack([x, 0.0 * x, z])
+    far = level + np.array([0.0, 1.0, 0.0])
+    body = np.concatenate([level, far])[None]
+    normals = np.broadcast_to([0.0, 1.0, 0.0], body.shape)
+    height, away = _heights(np.array([[[0.01, 0.05, 0.02], [0.01, 0.3, 0.02]]]), body, normals)
+    np.testing.assert_allclose(height, [[0.05, np.inf]], rtol=1e-9)
+    np.testing.assert_allclose(away[0, 0], [0.0, 1.0, 0.0], rtol=0, atol=1e-12)
+
+
+def test_two_legs_that_are_free_go_half_the_way_each():
+    free = np.array([[1.0, 1.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0], [0.5, 0.5]])
+    np.testing.assert_array_equal(_halves(free), [[0.5, 0.5], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0], [0.5, 0.5]])

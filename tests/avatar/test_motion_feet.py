@@ -64,6 +64,15 @@ def test_a_point_is_planted_while_it_stands():
     assert not planted[105:195, 0].any()
 
 
+def joint_by_joint(body, turned, root):
+    """Where the joints are, each by its parent, shape (T, J, 3)."""
+    offsets = np.array([body.joints[j] - body.joints[max(p, 0)] for j, p in enumerate(body.parents)])
+    places = np.empty((len(root), len(offsets), 3))
+    for j, parent in enumerate(body.parents):
+        places[:, j] = root if parent < 0 else places[:, parent] + turned[:, parent] @ offsets[j]
+    return places
+
+
 def standing(frames: int, root: np.ndarray, body=None):
     """Rotations and places of a body in the bind pose whose root moves."""
     body = body or template(0.5)
@@ -79,10 +88,7 @@ def test_sliding_feet_are_held_and_bones_keep_their_length():
     assert planted.all()
     assert plant_drift(before, planted) == pytest.approx(0.1 * (frames - 1) * dt / 2, rel=1e-6)
     turned, root = hold_feet(turn, place, planted, body, dt)
-    offsets = np.array([body.joints[j] - body.joints[max(p, 0)] for j, p in enumerate(body.parents)])
-    places = np.empty_like(place)
-    for j, parent in enumerate(body.parents):
-        places[:, j] = root if parent < 0 else places[:, parent] + turned[:, parent] @ offsets[j]
+    places = joint_by_joint(body, turned, root)
     after = contact_places(turned, places, body)
     assert plant_drift(after, planted) < 1e-9
     assert abs(after[..., 1]).max() < 1e-9
@@ -101,10 +107,7 @@ def test_a_foot_that_comes_down_through_the_floor_slides_onto_it():
     sunk = contact_places(turn, place, body)
     assert sunk[..., 1].min() < -0.015
     turned, root = hold_feet(turn, place, planted, body, dt)
-    offsets = np.array([body.joints[j] - body.joints[max(p, 0)] for j, p in enumerate(body.parents)])
-    places = np.empty_like(place)
-    for j, parent in enumerate(body.parents):
-        places[:, j] = root if parent < 0 else places[:, parent] + turned[:, parent] @ offsets[j]
+    places = joint_by_joint(body, turned, root)
     after = contact_places(turned, places, body)
     assert after[..., 1].min() > -1e-6  # a leg that is almost straight
     assert abs(after[60:] - after[60]).max() < 1e-9

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from vto_pipeline.stages.entry import live
 from vto_pipeline.stages.entry.pace import Pace
 
 PERIOD = 0.05
@@ -50,3 +53,40 @@ def test_after_a_pause_frames_come_at_even_times_again():
     late = began / PERIOD % 1.0
     np.testing.assert_allclose(np.minimum(late, 1.0 - late)[25:], 0.0, rtol=0, atol=1e-6)
     assert np.diff(began)[24:] == pytest.approx(PERIOD)
+
+
+class Feed:
+    """So many skeletons, and then nobody."""
+
+    def __init__(self, count: int) -> None:
+        self.left = count
+
+    @property
+    def over(self) -> bool:
+        return self.left == 0
+
+    def take(self, wait: float = 0.0) -> SimpleNamespace | None:
+        if self.over:
+            return None
+        self.left -= 1
+        return SimpleNamespace(places={})
+
+
+def test_the_cloth_goes_on_by_the_time_that_passes(monkeypatch):
+    """Frames of 1.4 periods and 0.5 in turn: those that catch up are short, as the time between them is."""
+    now, lengths = [0.0], []
+
+    def advance(body, seconds):
+        lengths.append(seconds)
+        now[0] += (1.4 if len(lengths) % 2 else 0.5) * PERIOD
+
+    def sleep(seconds):
+        now[0] += seconds
+
+    monkeypatch.setattr(live, "time", SimpleNamespace(perf_counter=lambda: now[0], sleep=sleep))
+    monkeypatch.setattr(live, "posed_vertices", lambda avatar, *pose: np.zeros((1, 3)))
+    dressed = SimpleNamespace(avatar=SimpleNamespace(vertices=np.zeros((1, 3))), shown=lambda cloth, body: body)
+    cloth = SimpleNamespace(positions=np.zeros((1, 3)), advance=advance)
+    pose = SimpleNamespace(at=lambda places, seconds: ())
+    live.follow_live(dressed, cloth, pose, Feed(20), 1.0 / PERIOD, lambda frame: None, live.LiveReport())
+    np.testing.assert_allclose(lengths[1:], np.tile([1.4, 0.6], 10)[:19] * PERIOD, rtol=1e-9)
