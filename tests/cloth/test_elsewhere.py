@@ -53,6 +53,15 @@ def test_what_ends_elsewhere_is_told_with_girths(risen, told):
         assert f"Its upper opening is {own} around, and the body {ended} there, {began} where" in job.warnings[0]
 
 
+def test_what_only_an_arm_took_along_is_not_elsewhere():
+    """The upper third went down, laid on an arm; the rest stays."""
+    garment, job = tube(0.1, 0.3, CORNERS, 7, base=0.5), Job()
+    led = garment.vertices - np.where(garment.vertices[:, 1:2] > 0.7, [0.0, 0.4, 0.0], 0.0)
+    found = warn_if_elsewhere(garment, TriangleMesh(led, garment.faces), RestShape(garment.vertices), bottle(), job)
+    assert_allclose(found["risen_mm"], -400.0, rtol=0, atol=1e-6)
+    assert job.warnings == []
+
+
 def test_the_girth_of_a_garment_with_panels_is_theirs():
     """Sewn, it lay half as large as it is cut."""
     garment, job = tube(0.1, 0.3, CORNERS, 7, base=0.5), Job()

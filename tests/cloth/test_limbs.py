@@ -8,9 +8,10 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from vto_pipeline.avatar.from_measurements import fit_measurements
-from vto_pipeline.cloth.placement.body_growth import Thinning, _least_faulty, plan_body_growth
+from vto_pipeline.cloth.placement.body_growth import _least_faulty, plan_body_growth
 from vto_pipeline.cloth.placement.limbs.limbs import Limbs
 from vto_pipeline.cloth.placement.limbs.openings import pieces_with_limbs
+from vto_pipeline.cloth.placement.thinning import Thinning
 from vto_pipeline.errors import IntersectingError
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import boundary_loops

@@ -9,9 +9,9 @@ from figures import figure, tunic
 from numpy.testing import assert_allclose
 
 from vto_pipeline.avatar.from_measurements import fit_measurements
-from vto_pipeline.cloth.placement.body_growth import Thinning
 from vto_pipeline.cloth.placement.orientation import as_files_have_it
 from vto_pipeline.cloth.placement.place import PlaceConfig, find_placement
+from vto_pipeline.cloth.placement.thinning import Thinning
 from vto_pipeline.cloth.placement.voxel_fit import BodyCubes, quarter_turns
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.remeshing.remesh import RemeshConfig, remesh

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
 from vto_pipeline.cloth.drape import drape
-from vto_pipeline.cloth.placement.body_growth import plan_body_growth
+from vto_pipeline.cloth.placement.body_growth import lead_to_body
 from vto_pipeline.cloth.placement.rigid_escape import escape_rigidly
 from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
@@ -73,7 +73,7 @@ def test_a_garment_with_no_cloth_in_the_body_stays():
 def test_cloth_that_cuts_only_into_a_limb_that_can_be_thinned_is_not_led():
     job, body, garment = Job(), trunk_and_limb(), moved(bodice_and_sleeve(), 0.03, 0.0, 0.0)
     assert len(intersecting_faces(garment, body)) > 0
-    found = plan_body_growth(body, garment, job)
+    found = lead_to_body(body, garment, job)
     assert_array_equal(found.garment.vertices, garment.vertices)
     assert job.warnings == []
 

@@ -19,7 +19,7 @@ _AROUND = 0.1  # m: shorter openings go around no trunk, neck or limb
 def warn_if_elsewhere(
     start: TriangleMesh, draped: TriangleMesh, rest: RestShape, body: TriangleMesh, job: Job
 ) -> dict[str, object]:
-    """Warn if a garment slid far up or down the body, with girths that tell why, and return how far.
+    """Warn if a garment as a whole slid far up or down the body, with girths that tell why, and return how far.
 
     Args:
         start: The garment where it was put on [m].
@@ -38,7 +38,8 @@ def warn_if_elsewhere(
     top, own = max(around, key=lambda one: float(start.vertices[one[0], 1].mean()))
     began, ended = (mesh.vertices[top].mean(axis=0) for mesh in (start, draped))
     risen = float(ended[1] - began[1])
-    if abs(risen) > _FAR * float(np.ptp(body.vertices[:, 1])):
+    whole = float(np.median(draped.vertices[:, 1] - start.vertices[:, 1]))  # cuffs go down with an arm, and nothing else
+    if min(abs(risen), abs(whole)) > _FAR * float(np.ptp(body.vertices[:, 1])):
         way = "above" if risen > 0 else "below"
         job.warn(
             f"it is worn elsewhere: it ended {100 * abs(risen):.0f} cm {way} where it was put on. Its upper opening is "

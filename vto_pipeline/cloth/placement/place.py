@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import Field
 
-from vto_pipeline.cloth.placement.body_growth import Thinning, plan_body_growth
+from vto_pipeline.cloth.placement.body_growth import lead_to_body
 from vto_pipeline.cloth.placement.orientation import (
     FALLING,
     LARGER,
@@ -23,6 +23,7 @@ from vto_pipeline.cloth.placement.orientation import (
     other_way_up,
     promising_orientations,
 )
+from vto_pipeline.cloth.placement.thinning import Thinning
 from vto_pipeline.cloth.placement.voxel_fit import BodyCubes, VoxelPlacement, quarter_turns
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
@@ -208,7 +209,7 @@ def _as_laid_out(garment: TriangleMesh, body: BodyCubes, job: Job) -> Placement 
     thinning = Thinning(body.mesh)
 
     def pierced(there: TriangleMesh) -> int:
-        return thinning.limbs_astray(there) or plan_body_growth(body.mesh, there, Job()).pierced  # the dearer one last
+        return thinning.limbs_astray(there) or lead_to_body(body.mesh, there, Job()).pierced  # the dearer one last
 
     best = _least_pierced(best, at_other_heights, garment, pierced, job)
     job.note(

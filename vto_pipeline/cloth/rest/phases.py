@@ -129,7 +129,7 @@ class Phases:
             self._job.leave_out(what, f"no cloth is deeper inside than {1e3 * max(depth, 0):.1f} mm")
             return state
         self._job.progress(0.05, what)
-        growth = plan_body_growth(body, mesh, self._job)
+        growth = plan_body_growth(body, mesh, self._job, self._fabric.thickness)
         growth.refuse_pierced()
         times = float(np.median(edge_stretches(growth.garment.vertices, self._rest.positions, mesh.faces)))
         if times > _LARGER:

@@ -1,0 +1,53 @@
+"""What crosses a body is untangled from it, so that the body begins thick and has little to grow."""
+
+import numpy as np
+from cloth_scenes import moved, tube
+from numpy.testing import assert_allclose
+from test_rigid_escape import AROUND, bodice_and_sleeve, trunk_and_limb, turns_about_the_limb
+
+from vto_pipeline.cloth.placement import body_growth
+from vto_pipeline.cloth.placement.body_growth import lead_to_body, plan_body_growth
+from vto_pipeline.cloth.placement.clear_body import edge_stretches
+from vto_pipeline.cloth.placement.collision_free_start import Start
+from vto_pipeline.cloth.placement.thinning import Thinning
+from vto_pipeline.geometry.intersections import intersecting_faces, self_intersections
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
+
+
+def limb_girth(growth):
+    """The mean distance of the limb's middle from its axis, as the body begins [m]."""
+    thick = growth.body.keyframes[-1]
+    limb = (thick[:, 1] > 0.15) & (thick[:, 1] < 0.3)
+    around = growth.body.keyframes[0][limb][:, [0, 2]]
+    return float(np.linalg.norm(around, axis=1).mean())
+
+
+def test_a_sleeve_that_cuts_into_its_limb_begins_about_a_thick_one():
+    body, garment = trunk_and_limb(), moved(bodice_and_sleeve(), 0.03, 0.0, 0.0)
+    led, freed = lead_to_body(body, garment, Job()), plan_body_growth(body, garment, Job(), 3e-4)
+    assert freed.thinned < led.thinned
+    assert limb_girth(freed) > 1.5 * limb_girth(led)
+    begin = TriangleMesh(freed.body.keyframes[0], body.faces)
+    assert len(intersecting_faces(freed.garment, begin)) == len(self_intersections(freed.garment)) == 0
+    assert not SurfaceDistance(begin).inside(freed.garment.vertices).any()
+    assert_allclose(abs(turns_about_the_limb(freed.garment.vertices)), 1.0, rtol=0, atol=1e-9)
+    assert edge_stretches(freed.garment.vertices, garment.vertices, garment.faces).max() < 1.5
+
+
+def test_cloth_that_stays_in_a_limb_waits_for_a_thinner_one(monkeypatch):
+    """What lies wholly in the body crosses nothing; untangling does not promise to take it out."""
+
+    def as_it_is(positions, *_others):
+        return Start(positions, 1, 0, np.zeros(len(positions), bool))
+
+    monkeypatch.setattr(body_growth, "find_collision_free_start", as_it_is)
+    body, outer = trunk_and_limb(), moved(bodice_and_sleeve(), 0.02, 0.0, 0.0)
+    inner = tube(0.016, 0.04, AROUND, 4, base=0.2)
+    faces = np.vstack([outer.faces, inner.faces + np.int32(len(outer.vertices))])
+    garment = TriangleMesh(np.vstack([outer.vertices, inner.vertices]), faces)
+    growth = Thinning(body).growth(garment)
+    assert SurfaceDistance(body).inside(inner.vertices).all()
+    assert growth.thinned > 1
+    assert body_growth._freed(growth, 3e-4) is growth
