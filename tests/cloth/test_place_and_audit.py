@@ -18,6 +18,7 @@ from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
 from vto_pipeline.cloth.judge.audit import audit
 from vto_pipeline.cloth.judge.gap import gaps_within
 from vto_pipeline.cloth.judge.residual import ElasticEnergies, covers_all_energies
+from vto_pipeline.cloth.judge.too_small import warn_if_too_small
 from vto_pipeline.cloth.model.build import at_rest, build_cloth
 from vto_pipeline.cloth.model.materials import Materials
 from vto_pipeline.cloth.placement.body_growth import plan_body_growth
@@ -56,6 +57,19 @@ def test_a_garment_through_the_heart_of_the_body_is_warned_of():
     through = moved(sheet(40, 40, 0.6, 0.6, upright=False), -0.3, 0.5, -0.3)
     plan_body_growth(skittle(), through, job)
     assert "does not surround the body" in job.warnings[0]
+
+
+def test_a_sliver_tells_no_strain():
+    """Its height is a millionth of its length; all else is 5% longer than at rest."""
+    rest = np.array([[0.0, 0, 0], [0.02, 0, 0], [0.01, 0.02, 0], [0.01, -1e-8, 0]])
+    faces = np.array([[0, 1, 2], [0, 3, 1]], np.int32)
+    draped = 1.05 * rest
+    draped[3] += [0.0, -1e-3, 0.0]
+    found = audit(TriangleMesh(draped, faces), RestShape(rest), None, settled=True, energy=0.0, residual=0.0)
+    assert_allclose([found["largest_strain"], found["least_strain"]], 0.05, rtol=1e-9)
+    job = Job()
+    assert warn_if_too_small(TriangleMesh(draped, faces), RestShape(rest), 0.04, job)["too_small"]
+    assert "by up to 5% near" in job.warnings[0]
 
 
 def test_the_judge_sees_what_was_done_to_the_cloth():

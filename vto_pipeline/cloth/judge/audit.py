@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from vto_pipeline.cloth.judge.crossings import crossings_between, self_crossings
 from vto_pipeline.cloth.judge.gap import gaps_within
 from vto_pipeline.cloth.judge.residual import ElasticEnergies, judged_residual
-from vto_pipeline.cloth.judge.strain import gradients, principal_strains, rest_triangles, warp_weft_strains
+from vto_pipeline.cloth.judge.strain import cloth_triangles, gradients, principal_strains, warp_weft_strains
 from vto_pipeline.geometry.signed_distance import SurfaceDistance, SurfacePoints
 from vto_pipeline.geometry.topology import laid_edge_lengths
 from vto_pipeline.model.arrays import FloatArray
@@ -126,7 +126,7 @@ def _against_body(mesh: TriangleMesh, body: TriangleMesh | None, nearest: Surfac
 
 
 def _strains(mesh: TriangleMesh, rest: RestShape) -> dict[str, object]:
-    laid = rest_triangles(rest.corners(mesh.faces))
+    laid = cloth_triangles(rest.corners(mesh.faces))
     gradient = gradients(mesh.vertices, mesh.faces, laid)
     share = laid.area / laid.area.sum()
     found: dict[str, object] = {}

@@ -38,7 +38,7 @@ def warn_if_elsewhere(
     top, own = max(around, key=lambda one: float(start.vertices[one[0], 1].mean()))
     began, ended = (mesh.vertices[top].mean(axis=0) for mesh in (start, draped))
     risen = float(ended[1] - began[1])
-    whole = float(np.median(draped.vertices[:, 1] - start.vertices[:, 1]))  # cuffs go down with an arm, and nothing else
+    whole = float(np.median(draped.vertices[:, 1] - start.vertices[:, 1]))  # a cuff alone goes down with its arm
     if min(abs(risen), abs(whole)) > _FAR * float(np.ptp(body.vertices[:, 1])):
         way = "above" if risen > 0 else "below"
         job.warn(

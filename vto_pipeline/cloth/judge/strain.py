@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vto_pipeline.cloth.constraints.membrane.slivers import SLIVER, slenderness
 from vto_pipeline.model.arrays import FloatArray, IntArray
 
 _FLAT = 1e-12  # of the largest: a triangle of less area at rest carries nothing
@@ -41,6 +42,20 @@ def rest_triangles(corners: FloatArray) -> RestTriangles:
     axes = np.stack([warp, np.cross(normal, warp)], axis=1)  # (T, thread, 3)
     flat = axes @ np.stack([one, two], axis=2)
     return RestTriangles(solid, 0.5 * double_area[solid], np.linalg.inv(flat))
+
+
+def cloth_triangles(corners: FloatArray) -> RestTriangles:
+    """Return the triangles that stand for cloth: as `rest_triangles`, but slivers, whose strain tells nothing.
+
+    A move of a corner by a hair strains them without end; the cloth about them shows what there is.
+    """
+    laid = rest_triangles(corners)
+    wide = slenderness(corners[laid.solid]) >= SLIVER
+    if not wide.any():
+        return laid
+    solid = laid.solid.copy()
+    solid[solid] = wide
+    return RestTriangles(solid, laid.area[wide], laid.inverse[wide])
 
 
 def gradients(positions: FloatArray, faces: IntArray, rest: RestTriangles) -> FloatArray:

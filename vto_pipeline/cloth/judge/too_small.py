@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from vto_pipeline.cloth.judge.strain import gradients, principal_strains, rest_triangles
+from vto_pipeline.cloth.judge.strain import cloth_triangles, gradients, principal_strains
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -22,7 +22,7 @@ def warn_if_too_small(draped: TriangleMesh, rest: RestShape, limit: float, job: 
     Returns:
         stretch_limit, over_limit_share (of the area), too_small.
     """
-    laid = rest_triangles(rest.corners(draped.faces))
+    laid = cloth_triangles(rest.corners(draped.faces))
     strain = principal_strains(gradients(draped.vertices, draped.faces, laid)).max(axis=1)
     over = strain > limit
     share = float(laid.area[over].sum() / laid.area.sum())
