@@ -31,7 +31,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 _FEW = 1500  # vertices of a garment that is led
 _LED_BY = (0, 3, 6)  # steps of thinning after which the garment is led about the body: the thin one leaves room
 _STILL_WORN = 0.5  # of the body's surface that was in the garment: with less, it is led to another part of the body
-_SOON = 0.03  # pairs for each triangle of the garment: so few are soon parted
+_SOON = 0.01  # pairs for each triangle of the garment: so few are soon parted
 _LARGER = (1.1, 1.2, 1.35, 1.5)  # times: so much it may start larger than it is
 _LED_LARGER = 1.2  # times, to be led: small enough for sleeves to stay near their arms
 

@@ -13,7 +13,7 @@ from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
-_HOPELESS = 1.0  # pairs that meet for each triangle: no tangle, but cloth put into a point or a plane
+_HOPELESS = 1.0  # places that meet for each triangle: no tangle, but cloth put into a point or a plane
 
 
 class Start(NamedTuple):
@@ -52,8 +52,10 @@ def find_collision_free_start(
     """
     mesh = TriangleMesh(positions, faces)
     pairs = left = self_intersections(mesh)
-    count = remaining = len(pairs) + (0 if body is None else len(intersecting_faces(mesh, body)))
-    if 0 < count <= _HOPELESS * len(faces):
+    outer = np.empty((0, 2), np.int32) if body is None else intersecting_faces(mesh, body)
+    count = remaining = len(pairs) + len(outer)
+    places = len(pairs) + len(np.unique(outer[:, 0]))  # a body's triangles may be fine, and many in one of the cloth
+    if 0 < count and places <= _HOPELESS * len(faces):
         untangled = untangle(positions, faces, body=body, rest=rest, thickness=thickness, job=job)
         positions, left, remaining = untangled.positions, untangled.pairs, untangled.crossings_left
     elif count > 0:
