@@ -42,10 +42,10 @@ def drape(
 
     When the body moves, the garment is where its first keyframe has it and rides along; where the body changes much,
     the garment is reshaped with it instead and starts on the body as it ends. When the body is at rest, the garment is
-    put in its place first: unit, axes, shift. Where it then cuts deep into the body, the body grows inside it; where
-    even the thinnest would cross it, the garment is led about the body as a whole first. Where the garment crosses
-    itself, it is untangled before. Then all settles under gravity, and a last pass takes the remaining crossings with
-    the body out.
+    put in its place first: unit, axes, shift. Where it then cuts deep into the body, the body grows inside it, from the
+    thickest that it can be untangled from; where even the thinnest would cross it, the garment is led about the body
+    first. Where the garment crosses itself, it is untangled before. Then all settles under gravity, and a last pass
+    takes the remaining crossings with the body out.
 
     Args:
         garment: The simulation mesh where it is now, and its rest shape; a mesh alone is its own rest shape.
