@@ -136,6 +136,12 @@ def test_a_web_is_cut_back_to_the_crease(tmp_path, shade):
     assert 15.0 < job.metrics["carved_p95_mm"] <= 1e3 * REACH
 
 
+def test_the_same_bits_on_one_core(photos, monkeypatch):
+    _, _, found, _ = carved(photos)
+    monkeypatch.setattr("os.cpu_count", lambda: 1)
+    assert carved(photos)[2].vertices.tobytes() == found.vertices.tobytes()
+
+
 def test_what_is_right_stays(photos):
     """Cloth where it truly is hides no wall."""
     mesh, observed = webbed()

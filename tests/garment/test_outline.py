@@ -14,7 +14,11 @@ from numpy.testing import assert_allclose
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.align import AlignConfig, PosedPhotos, align_to_mannequin
+from vto_pipeline.garment.outline.contour import ContourMesh
+from vto_pipeline.garment.outline.edges import load_edges
+from vto_pipeline.garment.outline.fit import OutlineProblem
 from vto_pipeline.geometry.rigid import transform_mesh
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import submesh
 from vto_pipeline.model.camera import CameraSet, Intrinsics
 from vto_pipeline.model.job import Job
@@ -121,6 +125,25 @@ def test_a_cluttered_backdrop_does_no_harm(scene, worn, tmp_path):
     cameras = photographs(tmp_path, scene.form, scene.shirt, clutter=True)
     surface, photos = in_scan_frame(worn, cameras, tmp_path)
     assert misplacement(scene.form, align_to_mannequin(surface, scene.form, QUICK, Job(), photos)) < PIXEL
+
+
+def test_same_bits_on_one_core(scene, shots, monkeypatch):
+    """Photos are read and asked side by side."""
+    folder, cameras = shots
+    paths, start = [folder / name for name in cameras.names], dressed_form.rigid([1, 3, 0], [0.01, 0.0, 0.02])
+
+    def fit():
+        edges = load_edges(paths, cameras, scene.shirt)
+        forms, distance = [ContourMesh(scene.form)], SurfaceDistance(scene.form)
+        return OutlineProblem(forms, distance, scene.shirt.vertices, edges).step(start, 0.05, range(7))
+
+    first = fit()
+    monkeypatch.setattr("os.cpu_count", lambda: 1)
+    again = fit()
+    assert again.scan_from_form.tobytes() == first.scan_from_form.tobytes()
+    assert again.covariance.tobytes() == first.covariance.tobytes()
+    assert (again.support, again.rms, again.photos) == (first.support, first.rms, first.photos)
+    assert first.photos == 12
 
 
 def test_photos_of_another_form_are_refused(scene, worn, tmp_path):

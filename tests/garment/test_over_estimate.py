@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import trimesh
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.subtraction.color_model import color_overlap
@@ -55,6 +56,24 @@ def test_colour_finds_what_distance_cannot(scene, placed, estimate, ends):
     labels = label_over_estimate(placed, estimate, ends, SubtractConfig(), job)
     assert 0.95 < iou(labels.garment, scene.is_shirt) < 1.0
     assert any("not scanned bare" in text for text in job.warnings)
+
+
+def test_what_stands_beside_is_no_cloth_and_teaches_no_colours(scene, placed, estimate, ends):
+    """A block of the form's grey, larger than what shows of the form's ends: all of it passed for cloth."""
+    colored = dyed(scene, placed, (140, 40, 40), (150, 150, 150))
+    block = trimesh.creation.box((0.06, 0.4, 0.12), trimesh.transformations.translation_matrix((0.9, 0.5, 0.0)))
+    block = block.subdivide_to_size(0.02)
+    grey = np.random.default_rng(2).normal(130, 12, (len(block.vertices), 1)).repeat(3, axis=1)
+    both = TriangleMesh(
+        np.vstack([colored.vertices, block.vertices]),
+        np.vstack([colored.faces, block.faces + len(colored.vertices)]),
+        np.vstack([colored.colors, grey.clip(0, 255)]).astype(np.uint8),
+    )
+    labels = label_over_estimate(both, estimate, ends, SubtractConfig(), job := Job())
+    alone = label_over_estimate(colored, estimate, ends, SubtractConfig(), Job())
+    assert not labels.garment[len(colored.vertices) :].any()
+    assert iou(labels.garment[: len(colored.vertices)], alone.garment) > 0.999
+    assert job.metrics["colors_alike"] < 0.35
 
 
 def test_cloth_of_nearly_the_same_lightness(scene, placed, estimate, ends):

@@ -109,6 +109,16 @@ def test_an_opening_without_the_straps_that_parted_it_is_refused_and_named(dress
     assert caught.value.partial["garment"] is lost
 
 
+def test_photos_show_the_same_on_one_core(dressed, monkeypatch):
+    body, top, photos = dressed
+    observed = np.ones(len(top.vertices), dtype=bool)
+    first = look_at_mannequin(top, observed, body, photos, Job())
+    monkeypatch.setattr("os.cpu_count", lambda: 1)
+    again = look_at_mannequin(top, observed, body, photos, Job())
+    assert first.points.tobytes() == again.points.tobytes()
+    assert first.cloth.tobytes() == again.cloth.tobytes()
+
+
 def test_one_lost_strap_is_enough(dressed):
     body, top, photos = dressed
     middle = top.vertices[top.faces].mean(axis=1)

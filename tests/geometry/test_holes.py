@@ -29,6 +29,7 @@ from vto_pipeline.geometry.topology import (
 )
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.numerics.cpu_threads import limited_threads
 
 
 def ball_with_hole(subdivisions, angle):
@@ -147,6 +148,17 @@ def test_a_flat_star_is_covered_just_once(seed):
     wanted = np.cross(points, np.roll(points, -1, axis=0))[:, 2].sum()
     assert_allclose(np.abs(twice).sum(), wanted, rtol=1e-12)
     assert twice.min() > 0.0
+
+
+def test_a_long_loop_gets_the_same_triangles_on_any_number_of_threads():
+    rng = np.random.default_rng(7)
+    turn = np.linspace(0, 2 * np.pi, 150, endpoint=False)
+    points = rng.uniform(0.5, 1.0, (150, 1)) * np.column_stack([np.cos(turn), np.sin(turn), 0.3 * np.sin(3 * turn)])
+    rim, forbidden = np.tile([0.0, 0.0, 1.0], (150, 1)), rng.random((150, 150)) < 0.1
+    faces = triangulate_loop(points, rim, forbidden | forbidden.T)
+    assert sorted(np.unique(faces)) == list(range(150))
+    with limited_threads(1):
+        assert_array_equal(triangulate_loop(points, rim, forbidden | forbidden.T), faces)
 
 
 def test_a_forbidden_chord_is_not_used():

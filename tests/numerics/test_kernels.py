@@ -9,6 +9,7 @@ import pytest
 from numba import njit, prange
 from numpy.testing import assert_allclose, assert_array_equal
 
+import vto_pipeline
 from vto_pipeline.numerics.cpu_threads import limited_threads
 from vto_pipeline.numerics.linear.coloured_blocks import blocks
 from vto_pipeline.numerics.mechanics.friction import friction_shift
@@ -78,3 +79,11 @@ def test_thread_limit_ends_with_its_block():
     with limited_threads(1):
         assert numba.get_num_threads() == 1
     assert numba.get_num_threads() == before
+
+
+def test_what_may_be_rounded_in_another_way_is_compiled_into_its_caller():
+    """Else a process that compiles it and one that loads its caller from the cache run two copies: other bits."""
+    package = Path(vto_pipeline.__file__).parent
+    marked = [line for path in package.rglob("*.py") for line in path.read_text().splitlines() if "fastmath" in line]
+    assert len(marked) > 2
+    assert [line for line in marked if "forceinline=True" not in line] == []

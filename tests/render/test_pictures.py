@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from vto_pipeline.model.mesh import TriangleMesh
-from vto_pipeline.numerics.rasterise import rasterise
+from vto_pipeline.numerics.rasterise import rasterise, rasterise_depth
 from vto_pipeline.render.frames import BACK, FRONT, LEFT, Frame, bounds, frame_box
 from vto_pipeline.render.marks import mark_places
 from vto_pipeline.render.pictures import render_picture
@@ -55,6 +55,25 @@ def test_rasterised_disc_has_its_area() -> None:
     face, _, depth = rasterise(corners, 401, 401)
     assert_allclose((face >= 0).sum(), np.pi * 180**2, rtol=0.003, err_msg="192-gon 0.02 %, pixel lattice 0.1 %")
     assert_allclose(depth[200, 200], -180.0, rtol=1e-3, err_msg="the near pole, seen through a facet")
+
+
+def test_depth_of_triangles_in_any_order_is_that_of_each_plane_at_each_pixel() -> None:
+    """Brute force: of all triangles that hold a pixel by their half-planes, the nearest plane; none behind the eye."""
+    rng = np.random.default_rng(4)
+    points = np.column_stack([rng.uniform(-8, 48, 60), rng.uniform(-8, 40, 60), rng.uniform(1, 3, 60)])
+    points[-1, 2] = 0.0
+    faces = np.array([rng.choice(60, 3, replace=False) for _ in range(80)], dtype=np.int32)
+    v, u = np.mgrid[:32, :40]
+    nearest = np.full((32, 40), np.inf)
+    for face in faces[(points[faces, 2] > 0).all(axis=1)]:
+        corners = points[face]
+        weights = np.linalg.solve(np.vstack([corners[:, :2].T, np.ones(3)]), np.stack([u, v, 1 + 0 * u]).reshape(3, -1))
+        depth = np.where((weights >= 0).all(axis=0), corners[:, 2] @ weights, np.inf).reshape(32, 40)
+        nearest = np.minimum(nearest, depth)
+    found = rasterise_depth(points, faces, 40, 32)
+    assert 0.3 < np.isfinite(found).mean() < 1.0
+    assert_allclose(found, nearest, rtol=1e-9, err_msg="rounding")
+    assert_array_equal(found, rasterise(points[faces[(points[faces, 2] > 0).all(axis=1)]], 40, 32)[2])
 
 
 def test_two_triangles_of_a_square_leave_no_gap() -> None:

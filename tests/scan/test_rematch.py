@@ -17,11 +17,12 @@ from vto_pipeline.errors import ScanError
 from vto_pipeline.model.camera import CameraSet
 from vto_pipeline.model.frames import DepthMaps
 from vto_pipeline.model.job import Job
+from vto_pipeline.numerics.cpu_threads import limited_threads
 from vto_pipeline.scan.photos.rematch.guess import guess_surface
 from vto_pipeline.scan.photos.rematch.look import RematchConfig
 from vto_pipeline.scan.photos.rematch.patches import best_mean, correlations
 from vto_pipeline.scan.photos.rematch.rematch import rematch
-from vto_pipeline.scan.photos.rematch.smooth_choice import MOST_COST, STEP_COST, peak, smooth_choice
+from vto_pipeline.scan.photos.rematch.smooth_choice import CHUNK, MOST_COST, STEP_COST, peak, smooth_choice
 
 PIXEL = 0.0019
 """On the tube [m]."""
@@ -201,6 +202,37 @@ def test_a_chain_gets_the_cheapest_labels():
         energy = costs[np.arange(6), every].sum(axis=1) + jumps
         found = np.rint(smooth_choice(costs, start, both[:, 1].copy(), back)).astype(int)
         assert energy[(every == found).all(axis=1)] <= energy.min() + 1e-6
+
+
+def test_a_long_chain_gets_the_cheapest_labels_on_any_number_of_threads():
+    """Viterbi's algorithm, along a chain that several threads share."""
+    count, labels = 3 * CHUNK, 9
+    costs = np.random.default_rng(5).uniform(0, 1, (count, labels)).astype(np.float32)
+    jump = np.minimum(STEP_COST * np.abs(np.subtract.outer(np.arange(labels), np.arange(labels))), MOST_COST)
+    least, came = costs[0].astype(float), np.zeros((count, labels), int)
+    for node in range(1, count):
+        came[node] = (least[:, None] + jump).argmin(axis=0)
+        least = (least[:, None] + jump).min(axis=0) + costs[node]
+    cheapest = np.full(count, least.argmin())
+    for node in range(count - 1, 0, -1):
+        cheapest[node - 1] = came[node, cheapest[node]]
+    pairs = np.stack([np.arange(count - 1), np.arange(1, count)], axis=1)
+    both = np.concatenate([pairs, pairs[:, ::-1]])
+    both = both[np.lexsort(both.T[::-1])]
+    start = np.searchsorted(both[:, 0], np.arange(count + 1))
+    key = both[:, 0] * count + both[:, 1]
+    back = np.searchsorted(key, both[:, 1] * count + both[:, 0])
+    found = smooth_choice(costs, start, both[:, 1].copy(), back)
+    assert np.abs(found - cheapest).max() <= 0.5  # of its parabola
+    with limited_threads(1):
+        assert smooth_choice(costs, start, both[:, 1].copy(), back).tobytes() == found.tobytes()
+
+
+def test_the_best_of_some_values_are_those_of_a_sort():
+    rng = np.random.default_rng(6)
+    for held in (1, 2, 3):
+        values = rng.choice([-0.5, 0.25, 0.5, np.nan], 12)
+        assert_allclose(best_mean(values, held), np.sort(values[~np.isnan(values)])[-held:].mean(), rtol=1e-12)
 
 
 def test_a_parabola_has_its_peak_where_it_has():

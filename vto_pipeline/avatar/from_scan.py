@@ -34,7 +34,7 @@ from vto_pipeline.avatar.scan.report import (
 )
 from vto_pipeline.avatar.scan.tangential_slide import slide_along_surface
 from vto_pipeline.avatar.scan.unobserved_uncertainty import unseen_sigmas
-from vto_pipeline.avatar.scan.upright import in_metres
+from vto_pipeline.avatar.scan.upright import in_metres, without_surroundings
 from vto_pipeline.avatar.standing import refuse_misread_unit
 from vto_pipeline.avatar.template.template import JOINT_KINDS
 from vto_pipeline.geometry.closest import closest_points
@@ -101,6 +101,9 @@ def fit_scan(
     fit = _pose_and_shape(space, target, tries[int(np.argmin(scores))], config, job, steps=config.iterations)
     job.progress(0.6, "fitting the surface to the scan")
     posed = separate_thighs(space, fit, posed_vertices(space, fit))
+    whole, kept = kept, without_surroundings(kept, TriangleMesh(posed, space.base.faces), job)
+    if kept is not whole:
+        target = Target(kept, config.probes, job.seed)
     if not config.clothed:
         refuse_shape_of_no_body(kept, space, posed)
     vertices, softest = _displaced(space, fit, target, posed, config.stiffness, config.rounds)

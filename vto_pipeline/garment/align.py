@@ -178,7 +178,7 @@ class _Scan:
     def _starts(self, rotations: list[FloatArray]) -> list[FloatArray]:
         """The best translation of each rotation, best first."""
         search = PlacementSearch(self.points, self.mannequin, self.distance, COARSE_CELL)
-        scored = sorted((search.best(rotation) for rotation in rotations), key=lambda found: -found[0])
+        scored = sorted(search.best_of(rotations), key=lambda found: -found[0])
         return [placement for _, placement in scored]
 
     def _sized(self, count: int) -> list[FloatArray]:

@@ -7,6 +7,8 @@ rotation the scores of all translations are one correlation, done by FFT.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy import fft
 from scipy.spatial.transform import Rotation
@@ -14,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.numerics.cpu_threads import in_order
 
 INSIDE_PENALTY = 2.0
 LARGEST_GRID = 120
@@ -70,6 +73,10 @@ class PlacementSearch:
         away = distance.signed(self._low + (grid + 0.5) * self._cell).distance
         field = np.where(away < -self._cell, -INSIDE_PENALTY, np.exp(-np.square(away / self._cell)))
         self._field = fft.rfftn(field.reshape(size), self._shape)
+
+    def best_of(self, rotations: Sequence[FloatArray]) -> list[tuple[float, FloatArray]]:
+        """Return what `best` does of each of some rotations, sought side by side."""
+        return list(in_order(lambda k: self.best(rotations[k]), len(rotations)))
 
     def best(self, rotation: FloatArray) -> tuple[float, FloatArray]:
         """Return the best score of any translation, and that placement as mannequin_from_surface, shape (4, 4)."""

@@ -41,10 +41,10 @@ def scaled_starts(
     """
     on_mannequin, _, _ = sample_surface(mannequin, MANNEQUIN_SAMPLES, seed=0)
     usual = _spread(on_mannequin) / _spread(points)
-    found = []
+    found, turns = [], upright_rotations(YAWS)
     for scale in usual * np.exp(np.arange(np.log(RANGE[0]), np.log(RANGE[1]), STEP)):
-        search = PlacementSearch(scale * points, mannequin, distance, CELL, LARGEST_GRID)
-        score, placement = max((search.best(turn) for turn in upright_rotations(YAWS)), key=lambda one: one[0])
+        best = PlacementSearch(scale * points, mannequin, distance, CELL, LARGEST_GRID).best_of(turns)
+        score, placement = max(best, key=lambda one: one[0])
         if score < least_share:
             continue
         found.append((score * scale, placement @ np.diag([scale, scale, scale, 1.0])))

@@ -5,6 +5,7 @@ predicates, intersections: exact signs; triangles that pass through each other
 signed_distance, closest, geodesic, sampling, laplace, smooth: distances and functions on a surface
 section, hull: where a plane cuts; the path of a taut tape
 metres: surfaces of unknown unit, refused
+apart: what stands beside a body
 rigid: moving a mesh, or cameras, as a whole
 floor: the floor under a scan
 riding/: one mesh rides on another

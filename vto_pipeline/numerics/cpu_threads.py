@@ -1,14 +1,20 @@
-"""The thread pool of the kernels; results do not depend on the number of threads."""
+"""Threads of the kernels, and of work done side by side; results do not depend on their number."""
 
 from __future__ import annotations
 
 import ctypes
+import os
 import sys
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import TypeVar
 
 import numba
+
+T = TypeVar("T")
 
 
 def load_tbb() -> None:
@@ -35,3 +41,25 @@ def limited_threads(count: int | None) -> Iterator[None]:
         yield
     finally:
         numba.set_num_threads(before)
+
+
+def in_order(work: Callable[[int], T], count: int) -> Iterator[T]:
+    """Yield work(0), work(1), ... work(count - 1); what one raises is raised in its turn.
+
+    Only a few results are in memory: no more are made ahead than there are threads. What runs for long must let go of
+    the interpreter's lock, as kernels with `nogil`, NumPy and OpenCV do; kernels with threads of their own may not run
+    side by side.
+
+    Args:
+        work: Of an index; called in threads.
+        count: Of indices.
+    """
+    threads = os.cpu_count() or 1
+    coming: deque[Future[T]] = deque()
+    with ThreadPoolExecutor(threads) as pool:
+        for index in range(count):
+            coming.append(pool.submit(work, index))
+            if len(coming) > threads:
+                yield coming.popleft().result()
+        while coming:
+            yield coming.popleft().result()

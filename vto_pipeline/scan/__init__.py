@@ -5,7 +5,7 @@ texture/: the photos laid on the surface
 keyframes: photos from a video
 exposure, grey: how brightly each photo was exposed, and in which grey its print shows best
 fuse, level_set: one surface from many depth maps
-depth_views, in_order: maps that are read when they are needed
+depth_views: maps that are read when they are needed
 disagreement: the error to expect, from how far the maps are from their surface
 object_sphere: what the cameras look at, without the room
 normals, surface: a surface through an unorganised cloud

@@ -12,7 +12,7 @@ from vto_pipeline.errors import ScanError
 from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.frames import DepthMaps
-from vto_pipeline.scan.in_order import in_order
+from vto_pipeline.numerics.cpu_threads import in_order
 from vto_pipeline.scan.photos.consistency import views_on_surface
 
 SAMPLED = 40

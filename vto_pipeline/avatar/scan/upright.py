@@ -1,13 +1,15 @@
-"""Normalisation of a scan: metres, +Y up, normals outwards, without floor and small pieces."""
+"""Normalisation of a scan: metres, +Y up, normals outwards, without floor, small pieces and what stands apart."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from vto_pipeline.errors import AvatarError
+from vto_pipeline.geometry.apart import APART, faces_apart
+from vto_pipeline.geometry.closest import closest_points
 from vto_pipeline.geometry.floor import level_band
 from vto_pipeline.geometry.metres import need_metres
-from vto_pipeline.geometry.topology import component_areas, submesh
+from vto_pipeline.geometry.topology import component_areas, face_areas, submesh
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -67,6 +69,23 @@ def in_metres(scan: TriangleMesh, job: Job) -> TriangleMesh:
     if fitting[0] != "metres":
         job.note(f"the scan is assumed to be in {fitting[0]}: its longest side is {longest:.4g}")
     return TriangleMesh(kept.vertices * _UNITS_M[fitting[0]], kept.faces)
+
+
+def without_surroundings(scan: TriangleMesh, body: TriangleMesh, job: Job) -> TriangleMesh:
+    """Return the scan without pieces that stand apart from the body, as furniture in the room does.
+
+    Args:
+        scan: In pieces [m].
+        body: Fitted to it, in its frame.
+        job: Notified of what is left out.
+    """
+    apart = faces_apart(scan, closest_points(scan.vertices, body.vertices, body.faces)[2])
+    if not apart.any():
+        return scan
+    area = face_areas(scan)
+    share = 100.0 * area[apart].sum() / area.sum()
+    job.note(f"left out {share:.0f} % of the scan: pieces more than {1e3 * APART:.0f} mm beside the body")
+    return submesh(scan, ~apart)[0]
 
 
 def candidate_up_rotations(scan: TriangleMesh) -> dict[str, FloatArray]:

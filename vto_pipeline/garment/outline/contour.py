@@ -17,7 +17,7 @@ from vto_pipeline.garment.outline.edges import EdgeLevel
 from vto_pipeline.geometry.topology import edge_face_counts, face_normals, half_edges
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
-from vto_pipeline.numerics.rasterise import rasterise
+from vto_pipeline.numerics.rasterise import rasterise_depth
 
 SPACING = 2.0
 """Distance of points along the outline [px]."""
@@ -68,8 +68,7 @@ class ContourMesh:
         camera, scale = level.camera, float(np.cbrt(np.linalg.det(cam_from_mesh[:3, :3])))
         local = self.mesh.vertices @ cam_from_mesh[:3, :3].T + cam_from_mesh[:3, 3]
         eye = -np.linalg.solve(cam_from_mesh[:3, :3], cam_from_mesh[:3, 3])
-        facing = np.einsum("fd,fd->f", self.normals, eye - self.mesh.vertices[self.mesh.faces[:, 0]])
-        toward: NDArray[np.bool_] = np.asarray(facing > 0)
+        toward: NDArray[np.bool_] = _toward(self.normals, self.mesh.vertices, self.mesh.faces, eye)
         z = local[:, 2]
         ahead: NDArray[np.bool_] = np.asarray(z > 0.05 * scale * self.size)
         safe = np.where(ahead, z, 1.0)
@@ -79,7 +78,7 @@ class ContourMesh:
         whole: NDArray[np.bool_] = (
             np.ones(len(self.mesh.faces), bool) if ahead.all() else np.asarray(ahead[self.mesh.faces].all(axis=1))
         )
-        _, _, depth = rasterise(pixel[self.mesh.faces[whole & toward]], camera.width, camera.height)
+        depth = rasterise_depth(pixel, self.mesh.faces[whole & toward], camera.width, camera.height)
         rim = (toward[self.beside[:, 0]] != toward[self.beside[:, 1]]) & whole[self.beside].all(axis=1)
         pair = self.edges[rim]
         front = np.where(toward[self.beside[rim, 0]], self.beside[rim, 0], self.beside[rim, 1])
@@ -103,7 +102,19 @@ def _inner_edges(mesh: TriangleMesh) -> tuple[IntArray, IntArray]:
     return edges[inner], np.column_stack([face[first[inner]], face[first[inner] + 1]]).astype(np.int32)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
+def _toward(normals, vertices, faces, eye):  # type: ignore[no-untyped-def]  # typed by Numba
+    """Which faces look at the eye, shape (F,)."""
+    toward = np.empty(len(faces), np.bool_)
+    for f in range(len(faces)):
+        first, facing = vertices[faces[f, 0]], 0.0
+        for d in range(3):
+            facing += normals[f, d] * (eye[d] - first[d])
+        toward[f] = facing > 0.0
+    return toward
+
+
+@njit(cache=True, nogil=True)
 def _seen(ends, third, depth, hidden, behind, covered):  # type: ignore[no-untyped-def]  # typed by Numba
     """Points along projected edges that nothing hides.
 

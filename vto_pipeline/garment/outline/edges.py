@@ -16,6 +16,7 @@ from vto_pipeline.io.captures.undistort import undistorted
 from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.camera import CameraSet, Intrinsics
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.numerics.cpu_threads import in_order
 
 MAX_PHOTOS = 40
 """So many are enough for an outline, and fit in memory; more are thinned evenly."""
@@ -66,39 +67,44 @@ class EdgePhoto:
 
 
 def load_edges(paths: Sequence[Path], cameras: CameraSet, scan: TriangleMesh) -> tuple[EdgePhoto, ...]:
-    """Read posed photos as edges.
+    """Read posed photos as edges, side by side.
 
     Args:
         paths: Of the photos; those without a camera are left out.
         cameras: In the scan's frame and unit.
         scan: Surface that hides what is behind it.
     """
-    import cv2
-
     at = {path.name: path for path in paths}
     usable = [k for k, name in enumerate(cameras.names) if name in at]
     chosen = np.unique(np.linspace(0, len(usable) - 1, min(len(usable), MAX_PHOTOS)).round().astype(int))
     size = float(np.linalg.norm(np.ptp(np.percentile(scan.vertices, [2, 98], axis=0), axis=0)))
-    photos = []
-    for k in (usable[c] for c in chosen):
+
+    def load(number: int) -> EdgePhoto:
+        k = usable[chosen[number]]
         picture = undistorted(read_image(at[cameras.names[k]]), cameras.intrinsics[k])
         camera = cameras.intrinsics[k].resized(picture.shape[1], picture.shape[0]).without_distortion()
-        scale = min(1.0, MAX_SIDE / max(picture.shape[:2]))
-        cam_from_scan = np.linalg.inv(cameras.world_from_cam[k])
+        cam_from_scan: FloatArray = np.asarray(np.linalg.inv(cameras.world_from_cam[k]), dtype=np.float64)
         local = scan.vertices @ cam_from_scan[:3, :3].T + cam_from_scan[:3, 3]
-        levels = []
-        for level in range(LEVELS):
-            wide, high = (max(round(side * scale / 2**level), 8) for side in (camera.width, camera.height))
-            small: Any = (
-                cv2.resize(picture, (wide, high), interpolation=cv2.INTER_AREA) if scale < 1 or level else picture
-            )
-            lens = camera.resized(wide, high)
-            gradient = _gradient(small)
-            usual = float(np.median(np.linalg.norm(gradient, axis=2)))
-            half = NOISE_GRADIENTS * max(usual, LEAST_GRADIENT)
-            levels.append(EdgeLevel(lens, gradient, half, _hidden(local, lens, size)))
-        photos.append(EdgePhoto(cameras.names[k], cam_from_scan, tuple(levels)))
-    return tuple(photos)
+        return EdgePhoto(cameras.names[k], cam_from_scan, _levels(picture, camera, local, size))
+
+    return tuple(in_order(load, len(chosen)))
+
+
+def _levels(picture: ByteArray, camera: Intrinsics, local: FloatArray, size: float) -> tuple[EdgeLevel, ...]:
+    """A photo without distortion at all sizes, with the scan in its camera's frame, (N, 3), and the scan's size."""
+    import cv2
+
+    scale = min(1.0, MAX_SIDE / max(picture.shape[:2]))
+    levels = []
+    for level in range(LEVELS):
+        wide, high = (max(round(side * scale / 2**level), 8) for side in (camera.width, camera.height))
+        small: Any = cv2.resize(picture, (wide, high), interpolation=cv2.INTER_AREA) if scale < 1 or level else picture
+        lens = camera.resized(wide, high)
+        gradient = _gradient(small)
+        usual = float(np.median(np.linalg.norm(gradient, axis=2)))
+        half = NOISE_GRADIENTS * max(usual, LEAST_GRADIENT)
+        levels.append(EdgeLevel(lens, gradient, half, _hidden(local, lens, size)))
+    return tuple(levels)
 
 
 def _gradient(picture: ByteArray) -> NDArray[np.float32]:
@@ -133,7 +139,7 @@ def _hidden(local: FloatArray, camera: Intrinsics, size: float) -> NDArray[np.fl
     return np.where(mask[border:-border, border:-border] > 0, near, np.float32(np.inf))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _splat(local, fx, fy, cx, cy, width, height):  # type: ignore[no-untyped-def]  # typed by Numba
     """Nearest depth of the points (N, 3) that fall in each pixel, infinite for none, shape (H, W), float32."""
     depth = np.full((height, width), np.float32(np.inf), dtype=np.float32)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -13,6 +14,7 @@ from vto_pipeline.garment.outline.edges import EdgePhoto
 from vto_pipeline.garment.outline.match import nearest_edges
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.numerics.cpu_threads import in_order
 
 REACH_PX = 8.0
 """Pictures are taken as small as makes the reach of the search about this many pixels."""
@@ -50,6 +52,26 @@ class OutlineFit:
     covariance: FloatArray
 
 
+class _Sums(NamedTuple):
+    """What one photo says of a placement, P ways of moving it being free.
+
+    Args:
+        normal: Gauss-Newton matrix, shape (P, P).
+        gradient: Shape (P,).
+        length: Of the outline that it shows [form's unit].
+        supported: Of that, what lies on edges.
+        squares: Distances from the edges, squared and weighted.
+        weight: Of them.
+    """
+
+    normal: FloatArray
+    gradient: FloatArray
+    length: float
+    supported: float
+    squares: float
+    weight: float
+
+
 class OutlineProblem:
     """All that placements are judged by.
 
@@ -72,6 +94,8 @@ class OutlineProblem:
     def step(self, placement: FloatArray, reach: float, free: Sequence[int], move: bool = True) -> OutlineFit:
         """Take one step, or with `move` False none, and judge the placement that it started from.
 
+        Photos are looked at side by side.
+
         Args:
             placement: scan_from_form, shape (4, 4).
             reach: Farthest edge that belongs to the outline [form's unit].
@@ -79,18 +103,11 @@ class OutlineProblem:
         """
         scale = float(np.cbrt(np.linalg.det(placement[:3, :3])))
         size = len(free)
-        normal, gradient = np.zeros((size, size)), []
-        lengths, supported, squares, weights, photos = 0.0, 0.0, 0.0, 0.0, 0
-        for photo in self.photos:
-            jacobian, away, length, strength = self._rows(photo, placement, scale, reach)
-            jacobian = jacobian[:, free]
-            near = np.maximum(1.0 - np.square(away / reach), 0.0)
-            weight = length * strength * near**2
-            normal += jacobian.T @ (weight[:, None] * jacobian)
-            gradient.append(jacobian.T @ (weight * away))
-            lengths, supported = lengths + length.sum(), supported + (length * strength * near).sum()
-            squares, weights = squares + (weight * away**2).sum(), weights + weight.sum()
-            photos += bool(length.sum() > 0.05 * self.form.size)
+        found = list(in_order(lambda k: self._sums(self.photos[k], placement, scale, reach, free), len(self.photos)))
+        normal, gradient = sum((one.normal for one in found), np.zeros((size, size))), [one.gradient for one in found]
+        lengths, supported = sum(one.length for one in found), sum(one.supported for one in found)
+        squares, weights = sum(one.squares for one in found), sum(one.weight for one in found)
+        photos = sum(one.length > 0.05 * self.form.size for one in found)
         pull = np.sum(gradient, axis=0)
         deep, inside = self._inside(placement, reach, free)
         share = INSIDE_WEIGHT * max(lengths, 1e-9) / len(self.scan)
@@ -107,6 +124,15 @@ class OutlineProblem:
         rms = float(np.sqrt(squares / weights)) if weights > 0 else np.inf
         support = float(supported / lengths) if lengths > 0 else 0.0
         return OutlineFit(moved, support, inside, photos, float(lengths / self.form.size), rms, covariance)
+
+    def _sums(self, photo: EdgePhoto, placement: FloatArray, scale: float, reach: float, free: Sequence[int]) -> _Sums:
+        jacobian, away, length, strength = self._rows(photo, placement, scale, reach)
+        jacobian = jacobian[:, free]
+        near = np.maximum(1.0 - np.square(away / reach), 0.0)
+        weight = length * strength * near**2
+        normal, gradient = jacobian.T @ (weight[:, None] * jacobian), jacobian.T @ (weight * away)
+        supported, squares = float((length * strength * near).sum()), float((weight * away**2).sum())
+        return _Sums(normal, gradient, float(length.sum()), supported, squares, float(weight.sum()))
 
     def _rows(
         self, photo: EdgePhoto, placement: FloatArray, scale: float, reach: float

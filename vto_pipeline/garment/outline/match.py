@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def nearest_edges(gradient, pixel, outward, reach, half):  # type: ignore[no-untyped-def]  # typed by Numba
     """Look for an edge along the normal of each point of an outline.
 

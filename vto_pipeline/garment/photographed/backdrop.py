@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, label, map_coordinates, uniform_filter
 
 from vto_pipeline.garment.align import PosedPhotos
-from vto_pipeline.garment.photographed.sightings import BORDER_PX, small_photos
+from vto_pipeline.garment.photographed.sightings import BORDER_PX, of_small_photos
 from vto_pipeline.garment.subtraction.color_model import usual_colors
 from vto_pipeline.geometry.seen.depth_picture import depth_picture
 from vto_pipeline.geometry.topology import submesh
@@ -61,18 +61,20 @@ def find_backdrops(
         photos: With their cameras in that frame.
     """
     seen, _ = submesh(garment, np.all(observed[garment.faces], axis=1))
-    found = []
-    for picture, camera, pose in small_photos(photos):
+
+    def find(picture: ByteArray, camera: Intrinsics, pose: FloatArray) -> Backdrop | None:
         cam_from_world: FloatArray = np.asarray(np.linalg.inv(pose), dtype=np.float64)
         cloth, form, whole = (
             np.isfinite(depth_picture(thing, camera, cam_from_world)) for thing in (seen, mannequin, garment)
         )
         background = background_of(picture, cloth, form, whole)
-        if background is not None:
-            inwards, outwards = distance_transform_edt(background), distance_transform_edt(~background)
-            beyond = np.where(background, inwards - 0.5, 0.5 - outwards).astype(np.float32)
-            found.append(Backdrop(beyond, camera, cam_from_world))
-    return found
+        if background is None:
+            return None
+        inwards, outwards = distance_transform_edt(background), distance_transform_edt(~background)
+        beyond = np.where(background, inwards - 0.5, 0.5 - outwards).astype(np.float32)
+        return Backdrop(beyond, camera, cam_from_world)
+
+    return [backdrop for backdrop in of_small_photos(photos, find) if backdrop is not None]
 
 
 def background_of(

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.numerics.cpu_threads import in_order
 
 MAX_PHOTOS, MAX_SIDE = 60, 800
 """More photos are thinned evenly; larger ones are scaled down to this longer side [px]."""
@@ -42,6 +43,9 @@ LEAST_VIEWS = 2
 """Photos that must show a point."""
 MOST = 4.0
 """One photo counts no more than this log-likelihood ratio."""
+
+
+T = TypeVar("T")
 
 
 class Sightings(NamedTuple):
@@ -80,9 +84,8 @@ def look_at_mannequin(
     count = max(int(area / SPACING**2), 1)
     points, normals, _ = sample_surface(mannequin, count, job.seed)
     seen_cloth, _ = submesh(garment, np.all(observed[garment.faces], axis=1))
-    score, views, told, read = np.zeros(count), np.zeros(count, dtype=int), 0, 0
-    for picture, camera, pose in small_photos(photos):
-        read += 1
+
+    def ask(picture: ByteArray, camera: Intrinsics, pose: FloatArray) -> tuple[NDArray[np.int_], FloatArray] | None:
         cam_from_world: FloatArray = np.asarray(np.linalg.inv(pose), dtype=np.float64)
         form = depth_picture(mannequin, camera, cam_from_world)
         cloth = depth_picture(garment, camera, cam_from_world)
@@ -90,12 +93,16 @@ def look_at_mannequin(
         evidence = _evidence(
             picture, _eroded(np.isfinite(cloth) & (observed_cloth <= cloth) & (cloth < form)), _eroded(form < cloth)
         )
-        if evidence is None:
-            continue
-        told += 1
-        shows, ratio = _read(points, normals, pose, camera, form, evidence)
-        score[shows] += ratio
-        views[shows] += 1
+        return None if evidence is None else _read(points, normals, pose, camera, form, evidence)
+
+    score, views, told, read = np.zeros(count), np.zeros(count, dtype=int), 0, 0
+    for found in of_small_photos(photos, ask):
+        read += 1
+        if found is not None:
+            told += 1
+            shows, ratio = found
+            score[shows] += ratio
+            views[shows] += 1
     if told < LEAST_VIEWS:
         reason = "in the photos too little of the mannequin shows, or it is of the cloth's colours"
         job.leave_out("cloth beside the openings", reason)
@@ -106,13 +113,23 @@ def look_at_mannequin(
     return Sightings(points[enough], mean > SURE, area / count)
 
 
-def small_photos(photos: PosedPhotos) -> Iterator[tuple[ByteArray, Intrinsics, FloatArray]]:
-    """Yield photos without distortion and of limited size, evenly chosen, with lens and pose (world_from_cam)."""
+def of_small_photos(photos: PosedPhotos, ask: Callable[[ByteArray, Intrinsics, FloatArray], T]) -> Iterator[T]:
+    """Yield what is asked of photos, in their order; they are read side by side.
+
+    Args:
+        photos: With their cameras.
+        ask: Of a photo without distortion and of limited size, its lens and its pose (world_from_cam).
+    """
     at = {path.name: path for path in photos.paths}
     usable = [k for k, name in enumerate(photos.cameras.names) if name in at]
     chosen = np.unique(np.linspace(0, len(usable) - 1, min(len(usable), MAX_PHOTOS)).round().astype(int))
-    for k in (usable[c] for c in chosen):
-        yield *_small(at[photos.cameras.names[k]], photos.cameras.intrinsics[k]), photos.cameras.world_from_cam[k]
+
+    def read(number: int) -> T:
+        k = usable[chosen[number]]
+        picture, camera = _small(at[photos.cameras.names[k]], photos.cameras.intrinsics[k])
+        return ask(picture, camera, photos.cameras.world_from_cam[k])
+
+    return in_order(read, len(chosen))
 
 
 def _small(path: Path, lens: Intrinsics) -> tuple[ByteArray, Intrinsics]:

@@ -13,6 +13,7 @@ from vto_pipeline.garment.subtraction.color_model import color_evidence, color_o
 from vto_pipeline.garment.subtraction.floor import not_worn
 from vto_pipeline.garment.subtraction.graph_cut import minimum_cut
 from vto_pipeline.garment.subtraction.subtract import CERTAIN, SubtractConfig, boundary_price
+from vto_pipeline.geometry.apart import faces_apart
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import edges
 from vto_pipeline.model.arrays import FloatArray
@@ -59,6 +60,7 @@ def label_over_estimate(
         raise GarmentError("without a scan of the bare mannequin, the scan needs colours", hint=_HINT)
     near = SurfaceDistance(body).signed(surface.vertices)
     standing = ~not_worn(surface, float(body.vertices[:, 1].min()) + FOOT, SIGMA / 3.0, job)
+    standing[surface.faces[faces_apart(surface, np.abs(near.distance))]] = False
     at_ends = ends[body.faces].mean(axis=1)[near.face] > 0.5
     bare = sure = at_ends & (np.abs(near.distance) < FAR) & standing
     share = float(sure.sum() / max(standing.sum(), 1))

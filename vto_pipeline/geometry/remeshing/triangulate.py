@@ -8,7 +8,7 @@ loop is first shortened by its ears.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numba import njit, prange
 from numpy.typing import NDArray
 
 from vto_pipeline.errors import GarmentError
@@ -24,6 +24,9 @@ MOST = 10_000
 
 TIE = 1e-9
 """Folds that differ by less are equal."""
+
+CHUNK = 16
+"""Chords of one length that one thread works on at a time."""
 
 
 def triangulate_loop(points: FloatArray, rim_normals: FloatArray, forbidden: NDArray[np.bool_]) -> IntArray:
@@ -53,38 +56,49 @@ def triangulate_loop(points: FloatArray, rim_normals: FloatArray, forbidden: NDA
     return np.vstack([ears, kept[_collect(split)]])
 
 
-@njit(cache=True)
+@njit(cache=True, parallel=True)
 def _best_splits(points, rim_normals, forbidden):  # type: ignore[no-untyped-def]
-    """Return the worst fold (1 - cosine) of the best span of i..j, and the point k that it puts on the chord ij."""
+    """Return the worst fold (1 - cosine) of the best span of i..j, and the point k that it puts on the chord ij.
+
+    Chords of one length only need shorter ones. The tables are symmetric, so that a chord reads two rows.
+    """
     count = len(points)
     fold = np.zeros((count, count))
     area = np.zeros((count, count))
     split = np.full((count, count), -1, np.int32)
     normal = np.zeros((count, count, 3))
     for i in range(count - 1):
-        normal[i, i + 1] = rim_normals[i]
+        normal[i, i + 1], normal[i + 1, i] = rim_normals[i], rim_normals[i]
     for span in range(2, count):
-        for i in range(count - span):
-            j = i + span
-            last = span == count - 1
-            best_fold, best_area, best = np.inf, np.inf, -1
-            if last or not forbidden[i, j]:
-                for k in range(i + 1, j):
-                    worst = max(fold[i, k], fold[k, j])
-                    if worst > best_fold or worst == np.inf:
-                        continue
-                    x, y, z, own_area = triangle_normal(points, i, k, j)
-                    worst = max(worst, max(fold_to(x, y, z, normal[i, k]), fold_to(x, y, z, normal[k, j])))
-                    if last:
-                        worst = max(worst, fold_to(x, y, z, rim_normals[j]))
-                    total = area[i, k] + area[k, j] + own_area
-                    if worst < best_fold - TIE or (worst < best_fold + TIE and total < best_area):
-                        best_fold, best_area, best = worst, total, k
-            fold[i, j], area[i, j], split[i, j] = best_fold, best_area, best
-            if best >= 0:
-                x, y, z, _ = triangle_normal(points, i, best, j)
-                normal[i, j, 0], normal[i, j, 1], normal[i, j, 2] = x, y, z
+        for chunk in prange(-(-(count - span) // CHUNK)):
+            for i in range(chunk * CHUNK, min((chunk + 1) * CHUNK, count - span)):
+                _best_split(i, i + span, points, rim_normals, forbidden, fold, area, split, normal)
     return fold, split
+
+
+@njit(cache=True)
+def _best_split(i, j, points, rim_normals, forbidden, fold, area, split, normal):  # type: ignore[no-untyped-def]
+    """Enter the chord ij into the tables."""
+    last = j - i == len(points) - 1
+    best_fold, best_area, best = np.inf, np.inf, -1
+    if last or not forbidden[i, j]:
+        for k in range(i + 1, j):
+            worst = max(fold[i, k], fold[j, k])
+            if worst > best_fold or worst == np.inf:
+                continue
+            x, y, z, own_area = triangle_normal(points, i, k, j)
+            worst = max(worst, max(fold_to(x, y, z, normal[i, k]), fold_to(x, y, z, normal[j, k])))
+            if last:
+                worst = max(worst, fold_to(x, y, z, rim_normals[j]))
+            total = area[i, k] + area[j, k] + own_area
+            if worst < best_fold - TIE or (worst < best_fold + TIE and total < best_area):
+                best_fold, best_area, best = worst, total, k
+    fold[i, j], area[i, j], split[i, j] = best_fold, best_area, best
+    fold[j, i], area[j, i] = best_fold, best_area
+    if best >= 0:
+        x, y, z, _ = triangle_normal(points, i, best, j)
+        for a, b in ((i, j), (j, i)):
+            normal[a, b, 0], normal[a, b, 1], normal[a, b, 2] = x, y, z
 
 
 @njit(cache=True)

@@ -104,13 +104,13 @@ def _front(s, plan, factor):
     return 3 * plan.first[s], begin, end, panel
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy", fastmath={"contract"}, forceinline=True)
 def _subtract_three_from(a, one, b, two, c, three, target):
     for i in range(len(target)):
         target[i] -= a * one[i] + b * two[i] + c * three[i]
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"}, forceinline=True)
 def _products(one, two, three, other):
     """Return the inner products of three rows with another one, summed in whatever order is fast: always the same."""
     a = b = c = 0.0

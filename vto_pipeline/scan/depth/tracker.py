@@ -11,12 +11,12 @@ from vto_pipeline.errors import ScanError
 from vto_pipeline.io.captures.depth import frame_color, frame_depth
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.frames import DepthFrameSet
+from vto_pipeline.numerics.cpu_threads import in_order
 from vto_pipeline.scan.depth.depth_mask import clean_depth
 from vto_pipeline.scan.depth.pose_graph import Edge
 from vto_pipeline.scan.depth.pose_guess import ImageFeatures, find_features, guess_motion
 from vto_pipeline.scan.depth.rgbd_alignment import RgbdAlignment, align_frames
 from vto_pipeline.scan.depth.rgbd_frame import RgbdFrame, prepare_frame
-from vto_pipeline.scan.in_order import in_order
 
 MIN_READINGS = 1000
 """Of a frame; with fewer there is nothing to hold on to."""

@@ -21,6 +21,7 @@ from vto_pipeline.model.frames import DepthMaps, PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud
 from vto_pipeline.model.settings import Config
+from vto_pipeline.numerics.cpu_threads import in_order
 from vto_pipeline.scan.library_message import library_message
 from vto_pipeline.scan.photos.consistency import agreeing_views, consensus, rays
 from vto_pipeline.scan.photos.disparity import MatchConfig, match_pair
@@ -197,8 +198,9 @@ def _check(merged: DepthMaps, pairs: list[tuple[int, int]], config: StereoConfig
     """Depths that enough other photos confirm and that can be of the object, shape (C, H, W)."""
     checked = np.zeros_like(merged.depth)
     region = object_region(CameraSet(merged.names, merged.intrinsics, merged.world_from_cam))
-    for i, depth in enumerate(merged.depth):
-        others = sorted({a + b - i for a, b in pairs if i in (a, b)})
+
+    def check(i: int) -> None:
+        depth, others = merged.depth[i], sorted({a + b - i for a, b in pairs if i in (a, b)})
         if others:
             votes = agreeing_views(merged, i, others, config.check_tolerance)
             checked[i] = np.where(votes >= config.check_views, depth, 0)
@@ -206,6 +208,8 @@ def _check(merged: DepthMaps, pairs: list[tuple[int, int]], config: StereoConfig
                 local = rays(merged.intrinsics[i].matrix, *depth.shape) * depth[..., None]
                 pose = merged.world_from_cam[i]
                 checked[i][~region.holds(local @ pose[:3, :3].T + pose[:3, 3])] = 0
+
+    for i, _ in enumerate(in_order(check, len(checked))):
         job.progress(0.9 + 0.05 * (i + 1) / len(checked), f"checking photo {i + 1} of {len(checked)}")
     checked.flags.writeable = False
     return checked

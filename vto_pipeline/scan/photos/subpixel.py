@@ -124,7 +124,7 @@ def _cubics(picture):  # type: ignore[no-untyped-def]  # typed by Numba
     return found
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True, fastmath=True, forceinline=True)
 def _moments(  # type: ignore[no-untyped-def]  # typed by Numba
     grey, cubics, width, row, column, offset, dx, dy, radius, a, b, slope
 ):

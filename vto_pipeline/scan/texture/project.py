@@ -19,12 +19,13 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
 from vto_pipeline.model.texture import TexturedMesh
+from vto_pipeline.numerics.cpu_threads import in_order
 from vto_pipeline.scan.exposure import relative_levels
 from vto_pipeline.scan.texture.charts import Texels, nearest_pixel, texels_of, unwrap
 from vto_pipeline.scan.texture.colors import blend, coarse_band, coarse_logs, read_colors
 from vto_pipeline.scan.texture.fill import fill_between, fill_vertices
 from vto_pipeline.scan.texture.rim import form_at_rims
-from vto_pipeline.scan.texture.views import Samples, lens_of, look, no_photo, pixel_size, rank_view
+from vto_pipeline.scan.texture.views import Samples, View, lens_of, look, no_photo, pixel_size, rank_view
 
 NORMAL_ROUNDS = 5
 """Of smoothing the normals, so that noise of the surface does not decide which photo is the best."""
@@ -88,24 +89,29 @@ def texture_surface(
     best, score = no_photo(len(samples.face), config.views)
     least = float(np.cos(np.radians(config.max_angle_deg)))
     masks = []
-    for index, (camera, pose) in enumerate(zip(cameras.intrinsics, cameras.world_from_cam, strict=True)):
+
+    def look_from(k: int) -> View:
+        return look(mesh, occluder, cameras.intrinsics[k], cameras.world_from_cam[k], 1e-3 * config.slack_mm)
+
+    for index, view in enumerate(in_order(look_from, len(cameras.names))):
         job.progress(0.2 + 0.4 * index / len(cameras.names), "which photos show each texel")
-        view = look(mesh, occluder, camera, pose, 1e-3 * config.slack_mm)
         rank_view(
-            index, mesh.vertices, normals, mesh.faces, *samples, lens_of(camera), view.cam_from_world,
-            view.depth, view.inside, least, config.border_pixels, best, score,
+            index, mesh.vertices, normals, mesh.faces, *samples, lens_of(cameras.intrinsics[index]),
+            view.cam_from_world, view.depth, view.inside, least, config.border_pixels, best, score,
         )  # fmt: skip
         masks.append(np.packbits(view.inside > 1.0, axis=1))
     low, high = (np.zeros((*best.shape, 3), np.int16) for _ in range(2))
-    for index, (name, camera, pose) in enumerate(
-        zip(cameras.names, cameras.intrinsics, cameras.world_from_cam, strict=True)
-    ):
+
+    def read(k: int) -> tuple[ByteArray, NDArray[np.float32]]:
+        camera, picture = cameras.intrinsics[k], read_image(paths[cameras.names[k]])
+        mask = np.unpackbits(masks[k], axis=1, count=camera.width)
+        return picture, coarse_band(undistorted(picture, camera), mask, config.band_pixels)
+
+    for index, (picture, coarse) in enumerate(in_order(read, len(cameras.names))):
         job.progress(0.6 + 0.3 * index / len(cameras.names), "colours")
-        picture = read_image(paths[name])
-        mask = np.unpackbits(masks[index], axis=1, count=camera.width)
-        coarse = coarse_band(undistorted(picture, camera), mask, config.band_pixels)
+        camera, cam_from_world = cameras.intrinsics[index], np.linalg.inv(cameras.world_from_cam[index])
         read_colors(
-            index, mesh.vertices, mesh.faces, *samples, lens_of(camera), camera.k1, np.linalg.inv(pose),
+            index, mesh.vertices, mesh.faces, *samples, lens_of(camera), camera.k1, cam_from_world,
             picture, coarse, best, low, high,
         )  # fmt: skip
     gain = _gains(best, low, len(texels.face), len(cameras.names))

@@ -18,6 +18,7 @@ from vto_pipeline.io.captures.images import read_image
 from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
+from vto_pipeline.numerics.cpu_threads import in_order
 from vto_pipeline.scan.grey import best_shares, in_grey
 from vto_pipeline.scan.library_message import COLMAP_ERRORS, library_message
 from vto_pipeline.scan.photos.matching.mapping import lens_of
@@ -106,11 +107,14 @@ def _adjust(model: Any, photos: PhotoSet, job: Job) -> int:
     views, scales = _views(model, photos, ids)
     extra: dict[int, list[FloatArray]] = {number: [] for number in ids}
     tracks: list[Track] = []
-    for index in range(len(ids)):
+
+    def look(index: int) -> tuple[list[int], FloatArray, FloatArray, NDArray[np.bool_]]:
         near = _neighbours(index, shared, views)
         corners, seen = follow(views[index], [views[k] for k in near])
         sighted = np.concatenate([corners[None], seen])
-        points, good = _triangulate([views[index], *(views[k] for k in near)], sighted)
+        return near, sighted, *_triangulate([views[index], *(views[k] for k in near)], sighted)
+
+    for index, (near, sighted, points, good) in enumerate(in_order(look, len(ids))):
         for n in np.flatnonzero(good.sum(axis=0) >= LEAST_VIEWS):
             track = []
             for m in np.flatnonzero(good[:, n]):

@@ -9,6 +9,7 @@ from vto_pipeline.errors import ScanError
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.frames import DepthMaps
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.numerics.cpu_threads import in_order
 from vto_pipeline.scan.canonical import canonical_mesh
 from vto_pipeline.scan.library_message import library_message
 from vto_pipeline.scan.photos.consistency import rays
@@ -43,7 +44,7 @@ def guess_surface(maps: DepthMaps, pixel: float) -> tuple[TriangleMesh, FloatArr
     o3d.utility.set_verbosity_level(o3d.utility.VerbosityLevel.Error)
     known = sum(int(np.count_nonzero(depth)) for depth in maps.depth)
     stride = max(STRIDE, int(np.ceil(np.sqrt(known / MOST_POINTS))))
-    found = [_oriented(maps, index, stride) for index in range(len(maps.names))]
+    found = list(in_order(lambda index: _oriented(maps, index, stride), len(maps.names)))
     points, normals = _thinned(np.concatenate([p for p, _ in found]), np.concatenate([n for _, n in found]), pixel)
     if len(points) < 100:
         raise ScanError(f"{len(points)} points of confirmed depth are no surface")

@@ -18,7 +18,7 @@ from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.frames import DepthMaps
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
-from vto_pipeline.scan.in_order import in_order
+from vto_pipeline.numerics.cpu_threads import in_order
 from vto_pipeline.scan.photos.rematch.patches import correlations, mismatch, own_places
 from vto_pipeline.scan.photos.rematch.smooth_choice import smooth_choice
 
@@ -161,8 +161,9 @@ def _least_slanted(
 
     A point may be off by `lift`: it is asked for so far in front of itself.
     """
-    cosine = np.zeros((len(points), len(photos.intrinsics)))
-    for k, (lens, pose) in enumerate(zip(photos.intrinsics, photos.world_from_cam, strict=True)):
+
+    def cosines(k: int) -> FloatArray:
+        lens, pose = photos.intrinsics[k], photos.world_from_cam[k]
         inverse = np.linalg.inv(pose)
         depth = depth_picture(scene, lens, inverse)
         to_eye = pose[:3, 3] - points
@@ -171,7 +172,9 @@ def _least_slanted(
         u, v = np.rint(shown[:, :2]).astype(np.int64).T
         inside = ahead & (u >= 0) & (v >= 0) & (u < lens.width) & (v < lens.height) & (slant > LEAST_COSINE)
         inside[inside] = shown[inside, 2] <= depth[v[inside], u[inside]]
-        cosine[inside, k] = slant[inside]
+        return np.asarray(np.where(inside, slant, 0.0))
+
+    cosine = np.stack(list(in_order(cosines, len(photos.intrinsics))), axis=1)
     order = np.argsort(-cosine, axis=1, kind="stable")[:, :count]
     return np.where(np.take_along_axis(cosine, order, axis=1) > 0, order, -1)
 

@@ -39,10 +39,12 @@ def correlations(  # type: ignore[no-untyped-def]  # typed by Numba
     count, side = views.shape[1], 2 * radius + 1
     found = np.full((len(points), len(offsets), count), np.float32(np.nan), dtype=np.float32)
     column = np.full(len(points), -1)
-    patch = np.empty((count, side * side), np.float32)
+    patch, place = np.empty((count, side * side), np.float32), np.empty((side * side, 2))
     pairs = np.empty((len(offsets), count, count), np.float32)
     seen = np.empty(count, np.bool_)
     for p in range(len(points)):
+        if (views[p] >= 0).sum() <= held:
+            continue  # too few, whatever they show
         n = normals[p]
         first = np.zeros(3)
         first[np.argmin(np.abs(n))] = 1.0
@@ -54,8 +56,8 @@ def correlations(  # type: ignore[no-untyped-def]  # typed by Numba
         for o in range(len(offsets)):
             middle = points[p] + offsets[o] * n
             for m in range(count):
-                seen[m] = views[p, m] >= 0 and _sampled(patch[m], views[p, m], middle, across, along, pictures, sizes,
-                                                        matrices, cam_from_world, radius, spacing)  # fmt: skip
+                seen[m] = views[p, m] >= 0 and _sampled(patch[m], place, views[p, m], middle, across, along, pictures,
+                                                        sizes, matrices, cam_from_world, radius, spacing)  # fmt: skip
             for a in range(count):
                 for b in range(a + 1, count):
                     if seen[a] and seen[b]:
@@ -70,7 +72,7 @@ def correlations(  # type: ignore[no-untyped-def]  # typed by Numba
     return found, column
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True, fastmath=True, forceinline=True)
 def _dot(a, b):  # type: ignore[no-untyped-def]  # typed by Numba
     total = np.float32(0)
     for k in range(len(a)):
@@ -81,10 +83,16 @@ def _dot(a, b):  # type: ignore[no-untyped-def]  # typed by Numba
 @njit(cache=True, nogil=True)
 def best_mean(values, held):  # type: ignore[no-untyped-def]  # typed by Numba
     """Mean of the largest `held` values, NaN left out; minus infinity where there are fewer."""
-    ordered = np.sort(np.where(np.isnan(values), -np.inf, values))  # ascending
-    total = 0.0
-    for k in range(len(ordered) - held, len(ordered)):
-        total += ordered[k]
+    total, taken = 0.0, 0  # one bit for each value that was counted: no memory is asked for
+    for _ in range(held):
+        best, at = -np.inf, -1
+        for k in range(len(values)):
+            if values[k] > best and not taken >> k & 1:
+                best, at = values[k], k
+        if at < 0:
+            return -np.inf
+        total += best
+        taken |= 1 << at
     return total / held
 
 
@@ -116,9 +124,12 @@ def own_places(found, least):  # type: ignore[no-untyped-def]  # typed by Numba
 
 @njit(cache=True, nogil=True)
 def _sampled(  # type: ignore[no-untyped-def]  # typed by Numba
-    patch, view, middle, across, along, pictures, sizes, matrices, cam_from_world, radius, spacing
+    patch, place, view, middle, across, along, pictures, sizes, matrices, cam_from_world, radius, spacing
 ):
-    """Fill the patch with a photo's brightness, mean 0 and length 1; False beyond the photo or without texture."""
+    """Fill the patch with a photo's brightness, mean 0 and length 1; False beyond the photo or without texture.
+
+    What lies between its corners is shown between them. `place` is memory for its samples in the photo, shape (S, 2).
+    """
     turn, lens = cam_from_world[view], matrices[view]
     height, width = sizes[view]
     corner, right, down = turn[:3, 3].copy(), np.zeros(3), np.zeros(3)
@@ -127,30 +138,37 @@ def _sampled(  # type: ignore[no-untyped-def]  # typed by Numba
             corner[i] += turn[i, j] * middle[j]
             right[i] += turn[i, j] * spacing * across[j]
             down[i] += turn[i, j] * spacing * along[j]
-    k, mean = 0, 0.0
-    for i in range(-radius, radius + 1):
-        for j in range(-radius, radius + 1):
-            x, y = corner[0] + i * right[0] + j * down[0], corner[1] + i * right[1] + j * down[1]
-            z = corner[2] + i * right[2] + j * down[2]
-            if z <= 0.0:
+    side = 2 * radius + 1
+    for i in (-radius, radius):
+        for j in (-radius, radius):
+            if corner[2] + i * right[2] + j * down[2] <= 0.0:
                 return False
-            u, v = lens[0, 0] * x / z + lens[0, 2], lens[1, 1] * y / z + lens[1, 2]
-            if not (0.0 <= u < width - 1 and 0.0 <= v < height - 1):
-                return False
-            column, row = int(u), int(v)
-            s, t = u - column, v - row
-            upper = (1 - s) * pictures[view, row, column] + s * pictures[view, row, column + 1]
-            lower = (1 - s) * pictures[view, row + 1, column] + s * pictures[view, row + 1, column + 1]
-            patch[k] = (1 - t) * upper + t * lower
-            mean += patch[k]
-            k += 1
-    mean /= k
+    for i in range(side):
+        for j in range(side):
+            a, b = i - radius, j - radius
+            z = corner[2] + a * right[2] + b * down[2]
+            place[i * side + j, 0] = lens[0, 0] * (corner[0] + a * right[0] + b * down[0]) / z + lens[0, 2]
+            place[i * side + j, 1] = lens[1, 1] * (corner[1] + a * right[1] + b * down[1]) / z + lens[1, 2]
+    for k in (0, side - 1, side * (side - 1), side * side - 1):
+        if not (0.0 <= place[k, 0] < width - 1 and 0.0 <= place[k, 1] < height - 1):
+            return False
+    mean = 0.0
+    for k in range(side * side):
+        u, v = place[k]
+        column, row = min(int(u), width - 2), min(int(v), height - 2)  # were it rounded beyond its corners
+        s, t = u - column, v - row
+        upper = (1 - s) * pictures[view, row, column] + s * pictures[view, row, column + 1]
+        lower = (1 - s) * pictures[view, row + 1, column] + s * pictures[view, row + 1, column + 1]
+        patch[k] = (1 - t) * upper + t * lower
+        mean += patch[k]
+    mean /= side * side
     squared = 0.0
-    for i in range(k):
-        patch[i] -= mean
-        squared += patch[i] ** 2
-    if squared < k * LEAST_CONTRAST**2:
+    for k in range(side * side):
+        patch[k] -= mean
+        squared += patch[k] ** 2
+    if squared < side * side * LEAST_CONTRAST**2:
         return False
-    for i in range(k):
-        patch[i] /= np.sqrt(squared)
+    length = np.sqrt(squared)
+    for k in range(side * side):
+        patch[k] /= length
     return True

@@ -13,6 +13,7 @@ from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.frames import DepthMaps
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.numerics.cpu_threads import in_order
 from vto_pipeline.numerics.rasterise import rasterise
 from vto_pipeline.scan.depth_views import depth_only, pixel_on_surface, supporting_views
 from vto_pipeline.scan.photos.rematch.guess import guess_surface
@@ -100,7 +101,9 @@ def _filled(
     """The maps, with the depth of faces whose corners each photo knows, where it had none."""
     depth = maps.depth.copy()
     fresh = new[mesh.faces].any(axis=1)
-    for k, (lens, pose) in enumerate(zip(maps.intrinsics, maps.world_from_cam, strict=True)):
+
+    def fill(k: int) -> None:
+        lens, pose = maps.intrinsics[k], maps.world_from_cam[k]
         known = np.isfinite(ways[k])
         placed, ahead = projected(
             mesh.vertices + np.where(known, ways[k], moved)[:, None] * normals, lens, np.linalg.inv(pose)
@@ -111,5 +114,8 @@ def _filled(
         own = depth[k, : lens.height, : lens.width]
         add = (face >= 0) & good[face] & (own == 0)
         own[add] = away[add]
+
+    for _ in in_order(fill, len(maps.names)):
+        pass
     depth.flags.writeable = False
     return replace(maps, depth=depth)

@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from vto_pipeline.scan.in_order import in_order
+from vto_pipeline.numerics.cpu_threads import in_order
 
 
 def test_results_come_in_order_and_few_are_read_ahead():
