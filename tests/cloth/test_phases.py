@@ -9,8 +9,11 @@ from cloth_scenes import ball, fabric, sheet
 import vto_pipeline.cloth.rest.phases as module
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.model.build import at_rest, build_cloth
+from vto_pipeline.cloth.placement.thinning import BodyGrowth
 from vto_pipeline.cloth.rest.convergence import SettlingResult
 from vto_pipeline.cloth.rest.phases import Phases
+from vto_pipeline.errors import IntersectingError
+from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.job import Job
 
@@ -92,3 +95,37 @@ def test_what_never_came_free_of_the_body_and_is_stretched_about_it_is_not_waite
     found = phases.settle_and_clear(at_rest(stretched * (mesh.vertices - middle)), Ready(), ball(0.3, levels=2), np.inf)
     assert found.caught is caught
     assert len(cleared) == (0 if caught else 1)
+
+
+def growing(monkeypatch, jams):
+    """How cloth is grown that jams on so many ways; the bodies that it began about, by their place [m]."""
+    mesh = sheet(4, 4, 0.1, 0.1)  # in the ball
+    model, rest = build_cloth(mesh, RestShape(mesh.vertices), fabric()), RestShape(mesh.vertices)
+    body, begun = ball(0.3, levels=1), []
+
+    def way(place, otherwise):
+        moving = MovingBody(np.stack([body.vertices + place, body.vertices]), body.faces)
+        return BodyGrowth(mesh, moving, 0, 0, 0, [], None, otherwise)
+
+    def run(stepper, state, collider, *given, **settings):
+        begun.append(float(collider.at(0.0).mean()))
+        if len(begun) <= jams:
+            raise IntersectingError("jammed")
+        return state
+
+    ways = way(1.0, way(2.0, None))
+    monkeypatch.setattr(module, "plan_body_growth", lambda *given: ways)
+    monkeypatch.setattr(module, "run_body_motion", run)
+    phases = Phases(model, rest, fabric(), DrapeConfig(grow_above_mm=0.0), Job())
+    phases.grow_body(at_rest(mesh.vertices), body)
+    return begun
+
+
+def test_cloth_that_jams_begins_again_from_a_thinner_body(monkeypatch):
+    assert growing(monkeypatch, 0) == pytest.approx([1.0], abs=1e-9)
+    assert growing(monkeypatch, 1) == pytest.approx([1.0, 2.0], abs=1e-9)
+
+
+def test_cloth_that_jams_on_every_way_is_refused(monkeypatch):
+    with pytest.raises(IntersectingError, match="jammed"):
+        growing(monkeypatch, 2)

@@ -157,7 +157,7 @@ def _freed(growth: BodyGrowth, thickness: float) -> BodyGrowth:
             continue
         freed = growth.thinning.growth_from(TriangleMesh(start.positions, faces, growth.garment.colors), steps)
         if freed.astray <= growth.astray and not SurfaceDistance(body).inside(start.positions).any():
-            return freed
+            return freed._replace(otherwise=growth)
     return growth
 
 

@@ -55,7 +55,7 @@ def find_collision_free_start(
     outer = np.empty((0, 2), np.int32) if body is None else intersecting_faces(mesh, body)
     count = remaining = len(pairs) + len(outer)
     places = len(pairs) + len(np.unique(outer[:, 0]))  # a body's triangles may be fine, and many in one of the cloth
-    if 0 < count and places <= _HOPELESS * len(faces):
+    if count > 0 and places <= _HOPELESS * len(faces):
         untangled = untangle(positions, faces, body=body, rest=rest, thickness=thickness, job=job)
         positions, left, remaining = untangled.positions, untangled.pairs, untangled.crossings_left
     elif count > 0:

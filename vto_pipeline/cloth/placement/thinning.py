@@ -46,6 +46,7 @@ class BodyGrowth(NamedTuple):
         to_part: Pairs of both that meet about a body thinned once, and its own.
         pieces: Of the garment, with what the limbs do there.
         thinning: Of the body.
+        otherwise: From a thinner body, for cloth that jams on this way; none where this is the thinnest.
     """
 
     garment: TriangleMesh
@@ -55,6 +56,7 @@ class BodyGrowth(NamedTuple):
     to_part: int
     pieces: list[Piece]
     thinning: Thinning
+    otherwise: BodyGrowth | None = None
 
     @property
     def astray(self) -> int:
@@ -97,13 +99,13 @@ class BodyGrowth(NamedTuple):
         Raises:
             IntersectingError: with the limbs and places; `partial` holds the garment there as "draped".
         """
-        names = [limb.name for limb in self.thinning.limbs.limbs]
         found = []
         for piece in self.pieces:
             for limb, places in enumerate(piece.pierced):
                 if len(places):
                     at = ", ".join(f"{x:.2f}" for x in places[0])
-                    found.append(f"the {names[limb]} goes through the cloth at ({at}){piece.missed(limb)}")
+                    name = self.thinning.limbs.limbs[limb].name
+                    found.append(f"the {name} goes through the cloth at ({at}){piece.missed(limb)}")
         if found:
             raise IntersectingError(
                 f"the garment cannot be put on: {'; '.join(found)}",

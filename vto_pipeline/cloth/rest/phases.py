@@ -18,9 +18,11 @@ from vto_pipeline.cloth.placement.body_growth import plan_body_growth
 from vto_pipeline.cloth.placement.clear_body import OVERSTRETCHED, clear_body_crossings, edge_stretches
 from vto_pipeline.cloth.placement.collision_free_start import find_collision_free_start
 from vto_pipeline.cloth.placement.limbs.limbs import Limbs
+from vto_pipeline.cloth.placement.thinning import BodyGrowth
 from vto_pipeline.cloth.rest.convergence import SettleLimits, SettlingResult, relax_to_rest
 from vto_pipeline.cloth.rest.true_distance import some_positions
 from vto_pipeline.cloth.simulation import default_skin
+from vto_pipeline.errors import IntersectingError
 from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.arrays import FloatArray
@@ -38,6 +40,7 @@ In place, to see where it lies across the body before it goes on; roughly, for a
 What is in place has forces of ten times its weight while wrinkles snap here and there: the exact stiffness of the last
 steps is faster at ending that."""
 
+_GROWING = "growing the body inside the garment"
 _TURNS = 5  # of coming to rest and being cleared
 _LARGER = 1.02  # times its size: what starts so was enlarged, not just bent
 _LONG = 0.5  # steps per 1/60 s on the way to rest: backward Euler takes the more motion out, the longer they are
@@ -120,21 +123,36 @@ class Phases:
         """Return the cloth outside the body.
 
         Raises:
-            IntersectingError: a limb goes through cloth, wherever the garment is led.
+            IntersectingError: a limb goes through cloth, wherever the garment is led; or the cloth jams.
         """
         mesh = TriangleMesh(state.positions, self._model.faces)
         depth = -float(SurfaceDistance(body).signed(mesh.vertices).distance.min())
-        what = "growing the body inside the garment"
         if depth <= 1e-3 * self._config.grow_above_mm:
-            self._job.leave_out(what, f"no cloth is deeper inside than {1e3 * max(depth, 0):.1f} mm")
+            self._job.leave_out(_GROWING, f"no cloth is deeper inside than {1e3 * max(depth, 0):.1f} mm")
             return state
-        self._job.progress(0.05, what)
+        self._job.progress(0.05, _GROWING)
         growth = plan_body_growth(body, mesh, self._job, self._fabric.thickness)
         growth.refuse_pierced()
-        times = float(np.median(edge_stretches(growth.garment.vertices, self._rest.positions, mesh.faces)))
+        while True:
+            try:
+                return self._grown(growth)
+            except IntersectingError as error:
+                if growth.otherwise is None:
+                    raise
+                growth = growth.otherwise
+                self._job.note(f"{error.problem}: begun again from a thinner body")
+
+    def _grown(self, growth: BodyGrowth) -> ClothState:
+        """Return the cloth outside the body as it ends.
+
+        Raises:
+            IntersectingError: it jams on the way.
+        """
+        faces = self._model.faces
+        times = float(np.median(edge_stretches(growth.garment.vertices, self._rest.positions, faces)))
         if times > _LARGER:
             growth = growth.from_smaller(times)
-        thin = TriangleMesh(growth.body.keyframes[0], body.faces)
+        thin = TriangleMesh(growth.body.keyframes[0], growth.body.faces)
         state = self.resolve_crossings(at_rest(growth.garment.vertices), thin)
         collider = self.collider(growth.body, growth.garment)
         stepper = self.stepper(without_gravity(self._model), collider, _CALM)
@@ -143,7 +161,7 @@ class Phases:
             state,
             collider,
             self._skin,
-            lambda done: self._job.progress(0.05 + 0.25 * done, what),
+            lambda done: self._job.progress(0.05 + 0.25 * done, _GROWING),
             only_grows=True,
         )
         return at_rest(grown.positions)
