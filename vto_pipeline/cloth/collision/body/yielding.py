@@ -90,7 +90,7 @@ class YieldingBody:
         posed = TriangleMesh(there.posed, self.path.faces)
         pairs = intersecting_faces(cloth, posed)
         corners, place = np.unique(posed.faces[pairs[:, 1]], return_inverse=True)
-        pressed = _pressed(posed, corners, self._free) if len(corners) > 0 else np.zeros(0, np.bool_)
+        pressed = _pressed(posed, corners.astype(np.int64), self._free) if len(corners) > 0 else np.zeros(0, np.bool_)
         return pairs[~pressed[place.reshape(-1, 3)].any(axis=1)]
 
     def _at(self, time: float) -> FloatArray:
