@@ -9,7 +9,10 @@ from ipc_judge import crosses, self_crosses
 from numpy.testing import assert_allclose, assert_array_equal
 
 from vto_pipeline.cloth import MeshCollider, simulate
+from vto_pipeline.cloth.model.build import build_cloth
+from vto_pipeline.cloth.moving.config import FollowConfig
 from vto_pipeline.cloth.moving.follow import follow
+from vto_pipeline.cloth.moving.frame import FrameStepper
 from vto_pipeline.errors import ConfigError, SimulationError
 from vto_pipeline.geometry.topology import submesh
 from vto_pipeline.io.runs.frame_log import FrameLog, read_cloth_motion, write_cloth_motion
@@ -103,6 +106,52 @@ def test_what_is_not_held_keeps_its_speed_when_the_body_is_taken_away(cap):
     speed = np.diff(middle, axis=0) * FPS
     assert_allclose(np.diff(speed[3:, 1]) * FPS, -9.81, rtol=0.01)  # even steps: backward Euler falls so exactly
     assert_allclose(speed[3:, 0], speed[3, 0], atol=0.01)
+
+
+@pytest.mark.parametrize(("speed", "left"), [(0.0, 1.0), (0.1, 0.5), (0.4, 0.25)])
+def test_skin_that_had_to_be_thicker_thins_out_as_the_body_moves_on(cap, speed, left):
+    """In a second at 0.1 m/s by half, as in half a second at more than twice that; in a pose that is held, never."""
+    way = path(lambda t, x: shifted(x, speed * t, 0.0, 0.0), 1.0)
+    stepper = FrameStepper(build_cloth(cap.mesh, cap.rest, cloth()), cap, way, cloth(), FollowConfig(), Job())
+    thin = stepper.now.skin.copy()
+    stepper.now = stepper.now._replace(skin=thin + 1e-3)
+    for frame in range(1, FPS + 1):
+        assert stepper.go_to(frame).attempts == 1
+    assert_allclose(stepper.now.skin - thin, left * 1e-3, rtol=1e-9)
+
+
+def test_a_spike_that_no_attempt_gets_cloth_over_leaves_it_clear_of_the_body(cap):
+    """Contacts are held at vertices; a spike grows through the middle of a triangle, and there is but one attempt."""
+    middle = cap.mesh.vertices[cap.mesh.faces].mean(axis=1)
+    above = middle[np.argmax(middle[:, 1])]
+    tip = np.argmin(np.linalg.norm(ball(RADIUS, levels=3).vertices - RADIUS / np.linalg.norm(above) * above, axis=1))
+
+    def grown(t, x):
+        return np.where(np.arange(len(x))[:, None] == tip, x + min(10.0 * t, 1.0) * (1.1 * above - x[tip]), x)
+
+    way = path(grown, 0.2)
+    motion, found = follow(cap, way, cloth(), {"attempts": 1})
+    bodies = [TriangleMesh(way.at(way.time(k)), way.faces) for k in range(way.frames)]
+    sheets = [TriangleMesh(frame, motion.faces) for frame in motion.frames]
+    assert crosses(sheets[0], bodies[-1])  # it is in the way
+    assert not any(crosses(sheet, body) for sheet, body in zip(sheets, bodies, strict=True))
+    assert not any(map(self_crosses, sheets))
+    assert found["max_stretch"] < 0.1
+
+
+def test_a_frame_with_cloth_in_skin_that_gave_way_though_it_was_free_is_tried_again_in_thicker_skin(cap, monkeypatch):
+    """And no longer than that helps."""
+    still = path(lambda t, x: x, 0.2)
+    stepper = FrameStepper(build_cloth(cap.mesh, cap.rest, cloth()), cap, still, cloth(), FollowConfig(), Job())
+    one = np.array([[0, 0]], np.int32)
+    answers = [one, one[:0], one, one]
+    monkeypatch.setattr(stepper.body, "crossing_with_room", lambda *_: answers.pop(0))
+    before = stepper.now.skin.copy()
+    assert stepper.go_to(1).attempts == 2
+    thicker = np.flatnonzero(stepper.now.skin > before + 5e-4)
+    assert_array_equal(thicker, np.sort(cap.mesh.faces[0]))
+    assert stepper.go_to(2).attempts == 2
+    assert not answers
 
 
 def test_half_the_step_gives_the_same_motion(cap):

@@ -84,6 +84,19 @@ def test_on_a_path_there_is_room_for_cloth_that_lies_in_several_layers():
         assert 3.0 * ROOM - 1e-9 < gap_between(body.path.at(path.time(frame))) < 3.0 * ROOM + 0.01
 
 
+def test_cloth_in_the_posed_skin_counts_where_that_was_free_and_only_there():
+    """A small sheet through the face of one ball: it has room, until the other ball is there."""
+    bodies = two_balls([APART, ROOM + 0.004, 0.5 * ROOM])
+    path = BodyPath(lambda time: bodies.keyframes[round(time)].copy(), bodies.faces, 3, 1.0)
+    body = YieldingBody(path, SKIN, everywhere(bodies))
+    counted = []
+    for frame, gap in enumerate([APART, ROOM + 0.004, 0.5 * ROOM]):
+        at = -0.5 * gap + np.array([[-0.001, -0.005, 0.0], [0.001, 0.0, 0.005], [0.001, 0.0, -0.005]])[:, 0]
+        sheet = TriangleMesh(np.column_stack([at, [-0.005, 0.0, 0.0], [0.0, 0.005, -0.005]]), np.array([[0, 1, 2]]))
+        counted.append(len(body.crossing_with_room(sheet, frame)) > 0)
+    assert counted == [False, True, False]  # not sunk; sunk though free; pressed
+
+
 @pytest.mark.parametrize(("speed", "times"), [(0.1, 60), (0.0, 1)])
 def test_each_frame_sinks_once_however_many_steps_and_attempts_lead_to_it(monkeypatch, speed, times):
     """Steps add up to the time of a frame but for rounding: it must not count as one between two others.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +46,17 @@ def astride(moves: Moves) -> Moves:
         hip = NAMES.index(f"{side}UpLeg")
         turns[:, hip] = Rotation.from_rotvec([0.0, 0.0, angle]).as_matrix() @ turns[:, hip]
     return Moves(turns, moves.root)
+
+
+def test_measuring_the_person_hardly_slows_the_first_frames():
+    """A stream would fall behind in its first second."""
+    joints, pose = LiveJoints("camera"), LivePose(template(0.0), NO_LEAD)
+    took = []
+    for number, line in enumerate(tracked_text(astride(random_moves(60))).splitlines()):
+        places, began = joints.read(line.encode()).places, time.process_time()
+        pose.at(places, number / 25)
+        took.append(time.process_time() - began)
+    assert np.median(took[:30]) < 2.0 * np.median(took[30:])  # posing twice, 2.5 times as long
 
 
 def test_once_measured_a_frame_is_as_the_whole_motion_has_it(tmp_path: Path):

@@ -7,6 +7,7 @@ first frames, anew with each of them, and then kept. Feet are not held: that wou
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,13 +19,14 @@ from vto_pipeline.avatar.motion.room.parts import Arms
 from vto_pipeline.avatar.motion.timing import brought_to
 from vto_pipeline.io.motion.joint_map import JointMap
 from vto_pipeline.io.motion.read import clip_of, understood
+from vto_pipeline.io.motion.standard_skeleton import standard_skeleton
 from vto_pipeline.io.motion.tracked.parse import carried_by_feet, moving_skeleton
 from vto_pipeline.io.motion.tracked.turns import fitted_skeleton, turns_of
 from vto_pipeline.io.motion.upright import to_y
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Avatar
 from vto_pipeline.model.job import Job
-from vto_pipeline.model.motion import CONTACTS, AvatarMotion
+from vto_pipeline.model.motion import CONTACTS, AvatarMotion, Clip
 from vto_pipeline.numerics.kinematics import local_rotations, matrix_vectors, vector_matrices
 
 _MEASURED = 30
@@ -82,8 +84,10 @@ class LivePose:
         places = self._upright(places)
         if len(self._seen) < _MEASURED:
             self._seen.append(places)
-            self._measure()
-        poses, translations = self._off_body(*self._posed(places), seconds)
+            posed = self._measured()
+        else:
+            posed = self._posed(places)
+        poses, translations = self._off_body(*posed, seconds)
         motion = AvatarMotion(
             self._avatar.joint_names,
             np.stack([self._first[0], poses]),
@@ -115,27 +119,35 @@ class LivePose:
             found = {name: place + self._walked for name, place in found.items()}
         return found
 
-    def _measure(self) -> None:
-        """Measure the person over the frames so far."""
+    def _measured(self) -> tuple[FloatArray, FloatArray]:
+        """Measure the person over the frames so far; return pose and translation in the last of them, as `_posed`."""
         window = {
             name: np.stack([places[name] for places in self._seen])
             for name in self._seen[0]
             if all(name in places for places in self._seen)
         }
         arrays = _skeleton(window)
-        self._offsets = arrays["offsets"]
-        self._fit = fit_of(clip_of(arrays), self._joints, self._avatar, Job())
-        self._first = self._posed(self._seen[0])
+        self._offsets, clip = arrays["offsets"], clip_of(arrays)
+        self._fit = fit_of(clip, self._joints, self._avatar, Job())
+        ends = [0, -1]  # together: a frame more costs next to nothing
+        poses, places = self._carried(
+            replace(clip, rotations=clip.rotations[ends], translations=clip.translations[ends])
+        )
+        self._first = poses[0], places[0]
+        return poses[1], places[1]
 
     def _posed(self, places: Places) -> tuple[FloatArray, FloatArray]:
         """Return pose and translation where the person is, in front of the camera."""
         known = {name: place[None] for name, place in places.items() if name in self._seen[0]}
-        clip = clip_of(_skeleton(known, self._offsets))
+        poses, translations = self._carried(clip_of(_skeleton(known, self._offsets)))
+        return poses[0], translations[0]
+
+    def _carried(self, clip: Clip) -> tuple[FloatArray, FloatArray]:
+        """Return poses and translations of the avatar in some frames, shapes (T, J, 3) and (T, 3)."""
         turn, root = carried(clip, self._joints, self._avatar, self._fit)
         poses = matrix_vectors(local_rotations(self._avatar.parents.tolist(), turn))
         poses, _ = limit_turns(poses, self._avatar.joint_names)
-        pelvis = self._avatar.joints[self._avatar.joint_names.index("pelvis")]
-        return poses[0], root[0] - pelvis
+        return poses, root - self._avatar.joints[self._avatar.joint_names.index("pelvis")]
 
     def _off_body(self, poses: FloatArray, translation: FloatArray, seconds: float) -> tuple[FloatArray, FloatArray]:
         """Return a pose whose arms are kept off the body; they go out of the way fast, and come back slowly."""
@@ -167,6 +179,5 @@ def _leaps(before: tuple[FloatArray, FloatArray], after: tuple[FloatArray, Float
 
 def _skeleton(places: Places, offsets: FloatArray | None = None) -> dict[str, np.ndarray]:
     """Return a skeleton whose joints are there, shape (T, 3) each; its bones as measured before, or as they are."""
-    parents, own = fitted_skeleton(places)
-    offsets = own if offsets is None else offsets
-    return moving_skeleton(parents, offsets, *turns_of(places, offsets), _FRAME_S)
+    parents, bones = fitted_skeleton(places) if offsets is None else (standard_skeleton()[0], offsets)
+    return moving_skeleton(parents, bones, *turns_of(places, bones), _FRAME_S)

@@ -2,12 +2,16 @@
 
 A frame is taken from where the last one ended. If triangles of the cloth then meet the body, the skin of their vertices
 thickens and the frame is tried again; if the cloth overstretches or blows up, it is tried again in half the steps. The
-skin thins out again over the next frames, to what the drape needed.
+skin thins out again as the body moves on, to what the drape needed.
+
+What cloth must not meet is the body as it gives way. Where that leaves a free place as posed, cloth is kept out of the
+posed skin, too, if further attempts bring it out.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from math import ceil
 from typing import Any, NamedTuple
 
@@ -25,6 +29,7 @@ from vto_pipeline.cloth.moving.frame_audit import stretch_of_edges
 from vto_pipeline.cloth.moving.path_collider import PathCollider
 from vto_pipeline.cloth.moving.skins import draped_skin, thickened
 from vto_pipeline.cloth.simulation import default_skin
+from vto_pipeline.cloth.untangle import untangle
 from vto_pipeline.errors import DivergedError
 from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.geometry.topology import laid_edge_lengths
@@ -35,7 +40,9 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.motion import BodyPath
 
-_THINS_S = 0.5  # s in which the skin loses half of what it is thicker by
+_THINS_S = 0.5  # s in which the skin loses half of what it is thicker by,
+_PACE_M_S = 0.2  # while the body moves as fast; more slowly where it is slower: held, it needs what it needed
+_CLEAR_M = 5e-4  # from the body, of what is untangled
 _FINER = 2  # times as many steps where the cloth overstretches
 
 
@@ -148,15 +155,16 @@ class FrameStepper:
     def go_to(self, frame: int) -> Reached:
         """Take the garment from one frame to the next, this one, where `now` then is.
 
-        Where no attempt is clean, the one with the fewest crossings is kept. Where all of them overstretch the cloth or
-        blow it up, it stays where it was, and `why` says so.
+        Where no attempt is clean, the one with the fewest crossings is untangled from the body. Where all of them
+        overstretch the cloth or blow it up, it stays where it was, and `why` says so.
         """
         time = self._path.time(frame)
         begin, body = self.now, self.body_at(time)
         self._collider.crosses_itself = self.body.crosses_itself(frame)
-        substeps, skin = self._steps_by_travel(begin, time), begin.skin.copy()
-        best: tuple[int, Moment, Reached] | None = None
-        why, tried = "", 0
+        travel, skin = self._travel(begin, time), begin.skin.copy()
+        substeps = self._steps_by_travel(travel, time - begin.state.time)
+        best: tuple[tuple[int, int], Moment, Reached] | None = None
+        why, tried, left = "", 0, 0.5 ** (min(time - begin.state.time, travel / _PACE_M_S) / _THINS_S)
         for attempt in range(1, self._config.attempts + 1):
             tried = attempt
             self._set(begin._replace(skin=skin), substeps)
@@ -168,27 +176,37 @@ class FrameStepper:
                 continue
             cloth = TriangleMesh(state.positions, self._model.faces)
             stretch = float(stretch_of_edges(cloth, self.natural).max(initial=0.0))
-            crossing = intersecting_faces(cloth, body)
+            crossing, in_posed = intersecting_faces(cloth, body), self.body.crossing_with_room(cloth, frame)
             if stretch > self._stretched:
                 why, substeps = f"an edge has {1.0 + stretch:.1f} times its length at rest", self._finer(substeps)
                 continue
-            if best is None or len(crossing) < best[0]:
-                left = 0.5 ** ((time - begin.state.time) / _THINS_S)
+            count = len(crossing), len(in_posed)
+            better = best is None or count < best[0]
+            if better:
                 thinner = self._skin + left * (skin - self._skin)
                 moment = Moment(state, thinner, self._stepper.contact_memory, self._collider.recollection)
                 reached = Reached(crossing, self._stepper.steps - taken, attempt)
-                best = len(crossing), moment, reached
-            if len(crossing) == 0:
+                best = count, moment, reached
+            if count == (0, 0) or (count[0] == 0 and not better):
                 break
-            before = skin
-            skin = thickened(before, np.unique(self._model.faces[crossing[:, 0]]), state.positions, body)
+            before, meeting = skin, self._model.faces[np.concatenate([crossing, in_posed])[:, 0]]
+            skin = thickened(before, np.unique(meeting), state.positions, body)
             if np.array_equal(skin, before):  # no room: the next attempt would be this one again
                 break
         if best is None:
             self.now = begin
             return Reached(np.empty((0, 2), np.int32), 0, tried, why)
-        self.now = best[1]
-        return best[2]._replace(attempts=tried)
+        _, self.now, reached = best
+        if len(reached.crossing) > 0:
+            reached = reached._replace(crossing=self._untangled(body))
+        return reached._replace(attempts=tried)
+
+    def _untangled(self, body: TriangleMesh) -> IntArray:
+        """Move the cloth out of the body, as little as needed, and keep its speed; return what still meets (K, 2)."""
+        state = self.now.state
+        found = untangle(state.positions, self._model.faces, body=body, thickness=_CLEAR_M)
+        self.now = self.now._replace(state=replace(state, positions=found.positions))
+        return found.body_pairs
 
     def _finer(self, substeps: float) -> float:
         return min(_FINER * substeps, max(self._config.finest, substeps))
@@ -199,11 +217,13 @@ class FrameStepper:
         self._collider.recollection = moment.seen
         self._stepper.substeps = substeps
 
-    def _steps_by_travel(self, begin: Moment, time: float) -> float:
-        """Return the steps per 1/60 s in which the body near the cloth moves no farther than it may in each."""
-        seconds = time - begin.state.time
+    def _travel(self, begin: Moment, time: float) -> float:
+        """Return how far the body near the cloth moves until then [m]."""
         start, end = self._path.at(begin.state.time), self._path.at(time)
         near = beside(start, TriangleMesh(begin.state.positions, self._model.faces))
-        travel = float(np.linalg.norm(end - start, axis=1)[near].max(initial=0.0))
+        return float(np.linalg.norm(end - start, axis=1)[near].max(initial=0.0))
+
+    def _steps_by_travel(self, travel: float, seconds: float) -> float:
+        """Return the steps per 1/60 s in which the body near the cloth moves no farther than it may in each."""
         needed = ceil(travel / (1e-3 * self._config.body_step_mm)) * FRAME / seconds
         return float(np.clip(needed, self._substeps, max(self._config.finest, self._substeps)))

@@ -106,9 +106,13 @@ class Apart:
         for first in range(0, len(turn), _FRAMES):
             some = slice(first, first + _FRAMES)
             moves = self._moves(turn[some], place[some])
+            surfaces: dict[int, tuple[FloatArray, FloatArray]] = {}  # both arms are kept off one
             for k, part in enumerate(self.parts):
                 places, _ = self._skin(part.places, *moves)
-                found[some, k] = _swing(places, place[some][:, part.pivot], *self._skin(part.others, *moves), part.room)
+                if id(part.others) not in surfaces:
+                    surfaces[id(part.others)] = self._skin(part.others, *moves)
+                surface = surfaces[id(part.others)]
+                found[some, k] = _swing(places, place[some][:, part.pivot], *surface, part.room)
         return found
 
     def swung(self, turn: FloatArray, swings: FloatArray) -> FloatArray:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from vto_pipeline.geometry.intersections import meeting_vertices, self_intersections
+from vto_pipeline.geometry.intersections import intersecting_faces, meeting_vertices, self_intersections
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.smooth import neighbour_mean
 from vto_pipeline.geometry.topology import vertex_normals
@@ -60,8 +60,8 @@ class YieldingBody:
     """
 
     def __init__(self, path: BodyPath, skin: float, about: NDArray[np.int64]) -> None:
-        self._posed, self._room = path, _HEMS * _ROOM * skin
-        self._about = about[~_pressed(TriangleMesh(path.at(0.0), path.faces), about, _ROOM * skin)]
+        self._posed, self._free, self._room = path, _ROOM * skin, _HEMS * _ROOM * skin
+        self._about = about[~_pressed(TriangleMesh(path.at(0.0), path.faces), about, self._free)]
         self._known: OrderedDict[int, _Sunken] = OrderedDict()
         self._mean = neighbour_mean(TriangleMesh(path.at(0.0), path.faces))
         self.path = BodyPath(self._at, path.faces, path.frames, path.frame_time)
@@ -77,6 +77,21 @@ class YieldingBody:
     def depth(self, frame: int) -> float:
         """Return how far the skin has sunk in a frame where it has most [m]."""
         return float(np.linalg.norm(self._frame(frame).moved, axis=1).max(initial=0.0))
+
+    def crossing_with_room(self, cloth: TriangleMesh, frame: int) -> IntArray:
+        """Return pairs of triangles of cloth and posed body that meet where the posed skin is free, shape (K, 2).
+
+        Skin gives way for some distance about where it is pressed. Where there was room for cloth above it as posed,
+        cloth has no need to be in it.
+        """
+        there = self._frame(frame)
+        if not there.moved.any():
+            return np.empty((0, 2), np.int32)
+        posed = TriangleMesh(there.posed, self.path.faces)
+        pairs = intersecting_faces(cloth, posed)
+        corners, place = np.unique(posed.faces[pairs[:, 1]], return_inverse=True)
+        pressed = _pressed(posed, corners.astype(np.int64), self._free) if len(corners) > 0 else np.zeros(0, np.bool_)
+        return pairs[~pressed[place.reshape(-1, 3)].any(axis=1)]
 
     def _at(self, time: float) -> FloatArray:
         place = min(max(time / self._posed.frame_time, 0.0), float(self._posed.frames - 1))
