@@ -3,8 +3,10 @@
 import numpy as np
 from cloth_scenes import moved, tube
 from numpy.testing import assert_allclose
+from test_drape import double_vest, pear
 from test_rigid_escape import AROUND, bodice_and_sleeve, trunk_and_limb, turns_about_the_limb
 
+from vto_pipeline.cloth.model.coarsening import coarsen
 from vto_pipeline.cloth.placement import body_growth
 from vto_pipeline.cloth.placement.body_growth import lead_to_body, plan_body_growth
 from vto_pipeline.cloth.placement.clear_body import edge_stretches
@@ -51,3 +53,15 @@ def test_cloth_that_stays_in_a_limb_waits_for_a_thinner_one(monkeypatch):
     assert SurfaceDistance(body).inside(inner.vertices).all()
     assert growth.thinned > 1
     assert body_growth._freed(growth, 3e-4) is growth
+
+
+def test_what_comes_free_only_beside_the_body_is_not_freed_so():
+    """Two coarse layers about a pear: the least move out of the whole of it takes them off it."""
+    body = pear()
+    garment = coarsen(double_vest(), 108).garment.mesh
+    found = plan_body_growth(body, garment, Job(), 3e-4)
+    middle = body.vertices[np.abs(body.vertices[:, 1] - garment.vertices[:, 1].mean()) < 0.02].mean(axis=0)
+    away = found.garment.vertices - garment.vertices
+    assert len(garment.vertices) < 150
+    assert np.linalg.norm(away, axis=1).max() < 0.05
+    assert np.hypot(*(found.garment.vertices.mean(axis=0) - middle)[[0, 2]]) < 0.02

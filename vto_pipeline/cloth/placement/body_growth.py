@@ -7,7 +7,7 @@ is untangled, about the thickest body from which that goes.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,15 +94,14 @@ def _least_faulty(thinning: Thinning, garment: TriangleMesh) -> BodyGrowth:
     if first.fault == (0, 0):
         return first
     soon = _SOON * len(garment.faces)
-    area, worn = laplacian(body)[1], _enclosed(garment, body)
-    enough = _STILL_WORN * area[worn].sum()
+    is_worn = _still_worn(garment, body)
 
     def is_good(growth: BodyGrowth) -> bool:
         return growth.astray == 0 and growth.to_part <= soon
 
     def best_of(ways: Iterable[TriangleMesh], best: BodyGrowth) -> BodyGrowth:
         for led in ways:
-            if area[worn & _enclosed(led, body)].sum() >= enough:
+            if is_worn(led):
                 best = min(best, thinning.growth(led), key=lambda one: (one.pierced, one.astray, one.to_part))
             if is_good(best):
                 break
@@ -147,16 +146,18 @@ def _few_vertices(garment: TriangleMesh) -> CoarseGarment | None:
 def _freed(growth: BodyGrowth, thickness: float) -> BodyGrowth:
     """Return the growth with the garment untangled from the thickest body that lets go of it; as it was if none does.
 
-    No limb may go through it then, nor cloth be drawn out as by what it is caught in.
+    No limb may go through it then, nor cloth be drawn out as by what it is caught in; and it is still about the body.
     """
     x, faces = growth.garment.vertices, growth.garment.faces
+    is_worn = _still_worn(growth.garment, growth.thinning.after(0))
     for steps in range(growth.thinned):
         body = growth.thinning.after(steps)
         start = find_collision_free_start(x, faces, x, thickness, Job(), body)
         if start.crossings_left > 0 or edge_stretches(start.positions, x, faces).max() > OVERSTRETCHED:
             continue
         freed = growth.thinning.growth_from(TriangleMesh(start.positions, faces, growth.garment.colors), steps)
-        if freed.astray <= growth.astray and not SurfaceDistance(body).inside(start.positions).any():
+        outside = not SurfaceDistance(body).inside(start.positions).any()
+        if outside and freed.astray <= growth.astray and is_worn(freed.garment):
             return freed._replace(otherwise=growth)
     return growth
 
@@ -175,6 +176,13 @@ def _times_larger(garment: TriangleMesh, times: float) -> TriangleMesh:
     """Return the garment so many times as large, about its middle."""
     middle = garment.vertices.mean(axis=0)
     return TriangleMesh(middle + times * (garment.vertices - middle), garment.faces)
+
+
+def _still_worn(garment: TriangleMesh, body: TriangleMesh) -> Callable[[TriangleMesh], bool]:
+    """Return what tells of a garment that was moved whether it is worn where it was: around the same of the body."""
+    area, worn = laplacian(body)[1], _enclosed(garment, body)
+    enough = _STILL_WORN * area[worn].sum()
+    return lambda moved: bool(area[worn & _enclosed(moved, body)].sum() >= enough)
 
 
 def _enclosed(garment: TriangleMesh, body: TriangleMesh) -> NDArray[np.bool_]:
