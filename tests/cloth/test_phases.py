@@ -101,7 +101,7 @@ def growing(monkeypatch, jams):
     """How cloth is grown that jams on so many ways; the bodies that it began about, by their place [m]."""
     mesh = sheet(4, 4, 0.1, 0.1)  # in the ball
     model, rest = build_cloth(mesh, RestShape(mesh.vertices), fabric()), RestShape(mesh.vertices)
-    body, begun = ball(0.3, levels=1), []
+    body, begun = ball(0.12, levels=1), []
 
     def way(place, otherwise):
         moving = MovingBody(np.stack([body.vertices + place, body.vertices]), body.faces)
