@@ -150,6 +150,35 @@ def test_a_flat_star_is_covered_just_once(seed):
     assert twice.min() > 0.0
 
 
+def triangulations(first, last):
+    """All ways to cut the polygon of points first..last into triangles."""
+    if last - first < 2:
+        return [[]]
+    return [
+        [*left, (first, middle, last), *right]
+        for middle in range(first + 1, last)
+        for left in triangulations(first, middle)
+        for right in triangulations(middle, last)
+    ]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_where_folds_are_equal_the_least_area_of_all_is_taken(seed):
+    """The rim's faces stand upright on every triangle alike, and no inner fold is as sharp."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 10)[:-1]
+    height = 0.2 * np.sin(2.0 * angle) + 0.1 * np.random.default_rng(seed).standard_normal(9)
+    points = np.column_stack([np.cos(angle), np.sin(angle), height])
+
+    def area(faces):
+        a, b, c = points[np.array(faces)].transpose(1, 0, 2)
+        return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
+
+    found = triangulate_loop(points, np.zeros((9, 3)), np.zeros((9, 9), dtype=bool))
+    every = [area(faces) for faces in triangulations(0, 8)]
+    assert len(every) == 429  # Catalan's number
+    assert area(found) == pytest.approx(min(every), rel=1e-12)
+
+
 def test_a_long_loop_gets_the_same_triangles_on_any_number_of_threads():
     rng = np.random.default_rng(7)
     turn = np.linspace(0, 2 * np.pi, 150, endpoint=False)
