@@ -148,8 +148,10 @@ def _freed(growth: BodyGrowth, thickness: float) -> BodyGrowth:
 
     No limb may go through it then, nor cloth be drawn out as by what it is caught in; and it is still about the body.
     """
-    x, faces = growth.garment.vertices, growth.garment.faces
-    is_worn = _still_worn(growth.garment, growth.thinning.after(0))
+    x, faces, full = growth.garment.vertices, growth.garment.faces, growth.thinning.after(0)
+    if not _enclosed(growth.garment, full).any():  # it would be put beside the body
+        return growth
+    is_worn = _still_worn(growth.garment, full)
     for steps in range(growth.thinned):
         body = growth.thinning.after(steps)
         start = find_collision_free_start(x, faces, x, thickness, Job(), body)
