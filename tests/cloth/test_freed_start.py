@@ -1,7 +1,7 @@
 """What crosses a body is untangled from it, so that the body begins thick and has little to grow."""
 
 import numpy as np
-from cloth_scenes import moved, tube
+from cloth_scenes import ball, moved, sheet, tube
 from numpy.testing import assert_allclose
 from test_drape import double_vest, pear
 from test_rigid_escape import AROUND, bodice_and_sleeve, trunk_and_limb, turns_about_the_limb
@@ -10,7 +10,7 @@ from vto_pipeline.cloth.model.coarsening import coarsen
 from vto_pipeline.cloth.placement import body_growth
 from vto_pipeline.cloth.placement.body_growth import lead_to_body, plan_body_growth
 from vto_pipeline.cloth.placement.clear_body import edge_stretches
-from vto_pipeline.cloth.placement.collision_free_start import Start
+from vto_pipeline.cloth.placement.collision_free_start import Start, find_collision_free_start
 from vto_pipeline.cloth.placement.thinning import Thinning
 from vto_pipeline.geometry.intersections import intersecting_faces, self_intersections
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
@@ -65,3 +65,13 @@ def test_what_comes_free_only_beside_the_body_is_not_freed_so():
     assert len(garment.vertices) < 150
     assert np.linalg.norm(away, axis=1).max() < 0.05
     assert np.hypot(*(found.garment.vertices.mean(axis=0) - middle)[[0, 2]]) < 0.02
+
+
+def test_coarse_cloth_that_cuts_a_fine_body_is_not_hopeless():
+    """One triangle of the cloth meets many of the body's: more pairs than the cloth has triangles."""
+    body, cloth = ball(0.05, levels=5), moved(sheet(5, 5, 0.2, 0.2, upright=False), -0.1, 0.04, -0.1)
+    pairs = intersecting_faces(cloth, body)
+    assert len(pairs) > len(cloth.faces)
+    start = find_collision_free_start(cloth.vertices, cloth.faces, cloth.vertices, 3e-4, Job(), body)
+    assert (start.crossings, start.crossings_left) == (len(pairs), 0)
+    assert len(intersecting_faces(TriangleMesh(start.positions, cloth.faces), body)) == 0
