@@ -10,7 +10,7 @@ from test_drape import double_vest, pear, vest
 import vto_pipeline.cloth.rest.multiresolution as levels_module
 from vto_pipeline.cloth.drape import drape
 from vto_pipeline.cloth.model.coarsening import coarsen
-from vto_pipeline.errors import GarmentError
+from vto_pipeline.errors import GarmentError, IntersectingError
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import boundary_loops, face_area_vectors
 from vto_pipeline.model.garment import Garment, RestShape
@@ -112,7 +112,8 @@ def test_what_cannot_lie_clear_on_a_coarse_mesh_begins_on_one_that_can(garment, 
     assert found.audit["body_intersections"] == found.audit["self_intersections"] == 0
 
 
-def test_where_a_coarse_mesh_jams_the_next_starts_where_the_garment_was_given(monkeypatch):
+def jam_on_coarse_meshes(monkeypatch):
+    """Let every mesh with fewer vertices than a vest's end jammed."""
     reached = levels_module.Phases.settle_and_clear
 
     def jam(self, state, *rest):
@@ -120,10 +121,26 @@ def test_where_a_coarse_mesh_jams_the_next_starts_where_the_garment_was_given(mo
         found.jammed = len(state.positions) < len(vest().vertices)
         return found
 
+    monkeypatch.setattr(levels_module.Phases, "settle_and_clear", jam)
+
+
+def test_what_is_too_small_and_jams_on_a_coarse_mesh_is_refused_there(monkeypatch):
+    jam_on_coarse_meshes(monkeypatch)
+    put_on = vest()
+    small = Garment(put_on, RestShape(0.8 * put_on.vertices))
+    settings = {"settle_seconds": 0.1, "coarsen_above": 1000, "place": "as_it_stands"}
+    with pytest.raises(
+        IntersectingError, match=r"needs the garment 25% larger, and on a coarser mesh .*jammed"
+    ) as info:
+        drape(small, pear(), fabric(), settings)
+    assert (info.value.partial["draped"].vertices == put_on.vertices).all()
+
+
+def test_where_a_coarse_mesh_jams_the_next_starts_where_the_garment_was_given(monkeypatch):
     job = Job()
     settings = {"settle_seconds": 0.1}
     alone = drape(vest(), pear(), fabric(), settings)
-    monkeypatch.setattr(levels_module.Phases, "settle_and_clear", jam)
+    jam_on_coarse_meshes(monkeypatch)
     found = drape(vest(), pear(), fabric(), {**settings, "coarsen_above": 1000}, job)
     assert any(what.startswith("coming to rest on ") and "jammed" in why for what, why in job.left_out)
     assert (found.mesh.vertices == alone.mesh.vertices).all()

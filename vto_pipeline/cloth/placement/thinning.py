@@ -181,7 +181,7 @@ class Thinning:
             above = self._hangs_from(piece)
             for number, limb in enumerate(self.limbs.limbs):
                 if above is not None and limb.name.endswith("arm"):
-                    count += len(piece.pierced[number]) > 0 or self._over(piece, above, limb).max() > _UNDER_ARMS
+                    count += len(piece.pierced[number]) > 0 or self._over_nearest(piece, above, limb) > _UNDER_ARMS
                 elif limb.name == "head" and number in piece.alone():
                     over = self._over(piece, piece.meant[number], limb)
                     count += over.min() > _OVER or over.max() < -_UNDER
@@ -219,6 +219,11 @@ class Thinning:
     def _over(self, piece: Piece, opening: int, limb: Limb) -> FloatArray:
         """Return how far above where a limb joins the body an opening is, as shares of the stature, shape (N,)."""
         return np.asarray((piece.mesh.vertices[piece.openings[opening], 1] - limb.root[1]) / self._stature)
+
+    def _over_nearest(self, piece: Piece, opening: int, limb: Limb) -> float:
+        """Return the same where the opening is nearest to that place: straps go over shoulders, between the arms."""
+        nearest = np.linalg.norm(piece.mesh.vertices[piece.openings[opening]] - limb.root, axis=1).argmin()
+        return float(self._over(piece, opening, limb)[nearest])
 
     def _hangs_from(self, piece: Piece) -> int | None:
         """Return the upper opening of what has none for one arm and is steep there, as no poncho is."""

@@ -21,8 +21,9 @@ from vto_pipeline.cloth.dynamics.body_motion import VariableSpeedBody
 from vto_pipeline.cloth.dynamics.stepper import Stepper
 from vto_pipeline.cloth.model.build import ClothModel, ClothState, at_rest, build_cloth
 from vto_pipeline.cloth.model.coarsening import CoarseGarment, coarsen
+from vto_pipeline.cloth.placement.clear_body import edge_stretches
 from vto_pipeline.cloth.rest.convergence import SettlingResult, rms
-from vto_pipeline.cloth.rest.phases import ROUGH, Phases
+from vto_pipeline.cloth.rest.phases import ENLARGED, ROUGH, Phases
 from vto_pipeline.cloth.rest.softened import softened
 from vto_pipeline.cloth.rest.true_distance import some_positions, with_true_distances
 from vto_pipeline.cloth.simulation import default_skin
@@ -79,6 +80,18 @@ def come_to_rest(
     return _CoarseToFine(garment, model, fabric, config, job).run(body, deadline)
 
 
+class _TooCoarseError(Exception):
+    """A mesh is too coarse for its layers to lie between one another and the body.
+
+    What is wedged there never comes to rest, and a finer mesh would begin with it.
+    """
+
+    def __init__(self, why: str, vertices: int) -> None:
+        super().__init__(why)
+        self.why = why
+        self.vertices = vertices
+
+
 class _CoarseToFine:
     """The way of one garment down its meshes, coarsest first."""
 
@@ -94,7 +107,11 @@ class _CoarseToFine:
         self._coarser = _coarser_ones(garment, config.coarsen_above, job)
 
     def run(self, body: MovingBody, deadline: float) -> RestOnMesh:
-        """Return the garment at rest on its own mesh."""
+        """Return the garment at rest on its own mesh.
+
+        Raises:
+            IntersectingError: also of one that must start larger for the body to be in it, and fails on a coarser mesh.
+        """
         trace: list[TraceRow] = []
         looks: list[FloatArray] = []
         before: tuple[Phases, ...] = ()
@@ -102,8 +119,11 @@ class _CoarseToFine:
         start, motion, fresh = garments[-1], body, True
         for level in range(len(self._coarser), 0, -1):
             now = time.perf_counter()
-            found = self._rest_on(level, start, motion, now + _FIRST * (deadline - now), fresh=fresh)
-            if found is None:
+            try:
+                found = self._rest_on(level, start, motion, now + _FIRST * (deadline - now), fresh=fresh)
+            except _TooCoarseError as error:
+                self._refuse_if_too_small(start, error.why)
+                self._job.leave_out(f"coming to rest on {error.vertices} vertices first", f"too coarse: {error.why}")
                 start, motion, fresh = garments[level - 1], body, True
                 continue
             trace += found.settling.trace
@@ -118,19 +138,13 @@ class _CoarseToFine:
             start, fresh = Garment(TriangleMesh(there, finer.mesh.faces), finer.rest), False
             motion = MovingBody(body.keyframes[-1:], body.faces)
         reached = self._rest_on(0, start, motion, deadline, fresh=fresh)
-        assert reached is not None  # only coarser ones are given up
         settling = reached.settling
         final = reached.phases.some(settling.state.positions)
         settling.trace = with_true_distances(trace + settling.trace, looks + settling.looks, final)
         return reached._replace(before=before)
 
-    def _rest_on(
-        self, level: int, garment: Garment, body: MovingBody, deadline: float, *, fresh: bool
-    ) -> RestOnMesh | None:
+    def _rest_on(self, level: int, garment: Garment, body: MovingBody, deadline: float, *, fresh: bool) -> RestOnMesh:
         """Return the garment at rest on one mesh: 0 is its own, the last the coarsest.
-
-        None where that is coarser, and too coarse for its layers to lie between one another and the body: what is
-        wedged there never comes to rest, and a finer mesh would begin with it.
 
         Args:
             level: Of which mesh.
@@ -138,6 +152,9 @@ class _CoarseToFine:
             body: What it lies on.
             deadline: `time.perf_counter` at which to stop settling.
             fresh: Whether it starts where the garment was given, not where a coarser mesh came to rest.
+
+        Raises:
+            _TooCoarseError: of a coarser mesh that is so.
         """
         model, config, job = self._model, self._config, self._job
         if level > 0:
@@ -155,14 +172,12 @@ class _CoarseToFine:
             except IntersectingError as error:
                 if level == 0:
                     raise
-                self._leave_out(model, f"too coarse: {error.problem}")
-                return None
+                raise _TooCoarseError(error.problem, len(model.mass)) from error
             put_on = len(job.warnings)
             state = phases.resolve_crossings(grown, first)
             if level > 0 and phases.crossings_left > 0:
                 left = f"{phases.crossings_left} pairs of triangles still intersect"
-                self._leave_out(model, f"too coarse to clear the body: {left}")
-                return None
+                raise _TooCoarseError(left, len(model.mass))
         cloth = TriangleMesh(state.positions, model.faces)
         collider = phases.collider(phases.give_way(body, cloth), cloth)
         stepper = phases.stepper(model, collider, config.damping)
@@ -173,8 +188,7 @@ class _CoarseToFine:
         except IntersectingError as error:
             if level == 0:
                 raise
-            self._leave_out(model, f"too coarse: {error.problem}")
-            return None
+            raise _TooCoarseError(error.problem, len(model.mass)) from error
         before = time.perf_counter() - self._began
         if level > 0:
             settling = phases.settle_and_clear(state, stepper, body.final, deadline, (ROUGH,))
@@ -186,8 +200,7 @@ class _CoarseToFine:
         if level > 0 and (settling.jammed or settling.caught):
             weights = f"with forces of {settling.residual:.0f} times the weight"
             what = "it is caught in the body" if settling.caught else "its layers are jammed"
-            self._leave_out(model, f"too coarse: {what}, {weights}")
-            return None
+            raise _TooCoarseError(f"{what}, {weights}", len(model.mass))
         settling.trace = [replace(row, seconds=before + row.seconds, level=level) for row in settling.trace]
         if level > 0:  # how it was put on is done but once; what else matters in the end warns again
             self._job.warnings += job.warnings[untangled:put_on]
@@ -236,8 +249,19 @@ class _CoarseToFine:
             positions = coarse.prolong(positions)
         return some_positions(len(self._model.mass))(positions)
 
-    def _leave_out(self, model: ClothModel, why: str) -> None:
-        self._job.leave_out(f"coming to rest on {len(model.mass)} vertices first", why)
+    def _refuse_if_too_small(self, garment: Garment, why: str) -> None:
+        """Raise an error if a garment that failed on a coarser mesh was put in its place in another size than its own.
+
+        Cloth that is drawn so far about a body passes through it at its first chance: a finer mesh takes minutes to
+        find the same.
+        """
+        times = float(np.median(edge_stretches(garment.mesh.vertices, garment.rest.positions, garment.mesh.faces)))
+        if times > ENLARGED:
+            raise IntersectingError(
+                f"too small: this body needs the garment {times - 1:.0%} larger, and on a coarser mesh {why}",
+                hint="give a larger size, or a body that it is meant for",
+                partial={"draped": self._garment.mesh},
+            )
 
     def _part(self, level: int) -> Job:
         """Return a job whose progress is a part of the first half of the whole one's."""
