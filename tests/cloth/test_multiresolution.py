@@ -89,7 +89,7 @@ def test_a_small_garment_needs_none():
 
 
 def test_a_garment_that_cannot_be_made_coarser_is_draped_as_it_is(monkeypatch):
-    def refuse(garment, vertices):
+    def refuse(*_):
         raise GarmentError("remeshing broke the surface")
 
     monkeypatch.setattr(levels_module, "coarsen", refuse)

@@ -37,7 +37,7 @@ class CoarseGarment(NamedTuple):
         return apply(self.binding, positions)
 
 
-def coarsen(fine: Garment, vertices: int) -> CoarseGarment:
+def coarsen(fine: Garment, vertices: int, longest: float = _LONGEST) -> CoarseGarment:
     """Return a garment with about this many vertices.
 
     It is remeshed at rest, where it is smooth and clear of itself, onto the rest surface of the fine one; so both have
@@ -47,6 +47,7 @@ def coarsen(fine: Garment, vertices: int) -> CoarseGarment:
     Args:
         fine: The garment.
         vertices: How many are wanted.
+        longest: Edges it may have [m].
 
     Raises:
         InputError: as `remesh`, or edges would be too long or too short for it; GarmentError: as `remesh`.
@@ -54,8 +55,8 @@ def coarsen(fine: Garment, vertices: int) -> CoarseGarment:
     laid = TriangleMesh(fine.rest.positions, fine.mesh.faces)
     area = surface_area(laid)
     edge = np.sqrt(area / (vertices * np.sqrt(0.75)))  # V corners of equilateral triangles cover V √3/2 l²
-    if not _SHORTEST <= edge <= _LONGEST:
-        raise InputError(f"edges would be {1e3 * edge:.3g} mm")
+    if not _SHORTEST <= edge <= longest:
+        raise InputError(f"edges would be {1e3 * edge:.3g} mm, of {1e3 * _SHORTEST:.3g} to {1e3 * longest:.3g}")
     coarse = remesh(laid, RemeshConfig(edge_mm=1e3 * edge, iterations=_ROUNDS), Job())
     now = apply(bind(coarse, laid), fine.mesh.vertices)
     panels = None if fine.rest.panels is None else carry_flat_faces(laid, fine.rest.panels, coarse)

@@ -37,6 +37,7 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
 _FEWER = 4  # times fewer vertices on the next coarser mesh: edges twice as long
+_LONGEST = 0.03  # m: of longer edges, layers about an arm cannot lie clear of it and of each other
 _FIRST = 0.5  # of the progress, and of the time there is: the coarser meshes
 
 
@@ -305,7 +306,7 @@ def _coarser_ones(garment: Garment, most: int, job: Job) -> list[CoarseGarment]:
     what = "coming to rest on a coarser mesh first"
     while (count := len(garment.mesh.vertices)) > most:
         try:
-            made.append(coarsen(garment, count // _FEWER))
+            made.append(coarsen(garment, count // _FEWER, _LONGEST))
         except (InputError, GarmentError) as error:
             job.leave_out(what, f"{count} vertices cannot be reduced to {count // _FEWER}: {error.problem}")
             return made
