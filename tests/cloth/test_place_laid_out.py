@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.placement.place import PlaceConfig, find_placement, place_garment
+from vto_pipeline.cloth.placement.thinning import Thinning
 from vto_pipeline.model.garment import Garment, RestShape
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -96,6 +97,17 @@ def test_what_hangs_goes_below_the_arms_though_it_is_too_narrow_for_the_waist(ra
     assert bottom > 0.3
     assert radius > 0.12 or job.metrics["needs_larger_share"] > 0.1
     assert found.stretch == 1.0
+
+
+def test_a_bib_may_end_above_the_arms_that_pass_beside_it():
+    """A tube is in the way of both arms. Not so one that rises as high in front and behind, and ends below them."""
+    below, above = height_of_arms() - 0.1, SHOULDER[1]
+    level = tube(0.16, 0.6, 48, 31, base=below - 0.6)
+    rises = (level.vertices[:, 2:] / 0.16) ** 4 * (level.vertices[:, 1:2] - below + 0.6) / 0.6
+    bib = TriangleMesh(level.vertices + (above - below) * rises * [0.0, 1.0, 0.0], level.faces)
+    thinning = Thinning(figure(BELOW))
+    assert thinning.limbs_out_of_place(moved(level, 0.0, above - below, 0.0)) == 2
+    assert thinning.limbs_out_of_place(bib) == 0
 
 
 @pytest.mark.parametrize("top", [2.35, 3.0])
