@@ -112,7 +112,7 @@ def _least_faulty(thinning: Thinning, garment: TriangleMesh) -> BodyGrowth:
         pieces = pieces_with_limbs(few.garment.mesh, thinning.limbs, thinning.after(LINES))
         ways = _led(few.garment.mesh, pieces, thinning, astray=astray)
         best = best_of((TriangleMesh(few.prolong(led.vertices), garment.faces) for led in ways), best)
-    if few is None or (best.pierced == 0 and not is_good(best)):  # limbs that few do not free, all do not, either
+    if few is None:
         best = best_of(_led(garment, first.pieces, thinning, astray=astray), best)
     return best
 
