@@ -2,6 +2,7 @@
 
 import numpy as np
 from cloth_scenes import ball, moved, sheet, tube
+from figures import figure
 from numpy.testing import assert_allclose
 from test_drape import double_vest, pear
 from test_rigid_escape import AROUND, bodice_and_sleeve, trunk_and_limb, turns_about_the_limb
@@ -11,7 +12,8 @@ from vto_pipeline.cloth.placement import body_growth
 from vto_pipeline.cloth.placement.body_growth import lead_to_body, plan_body_growth
 from vto_pipeline.cloth.placement.clear_body import edge_stretches
 from vto_pipeline.cloth.placement.collision_free_start import Start, find_collision_free_start
-from vto_pipeline.cloth.placement.thinning import Thinning
+from vto_pipeline.cloth.placement.limbs.openings import pieces_with_limbs
+from vto_pipeline.cloth.placement.thinning import LINES, Thinning
 from vto_pipeline.geometry.intersections import intersecting_faces, self_intersections
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.job import Job
@@ -65,6 +67,26 @@ def test_what_comes_free_only_beside_the_body_is_not_freed_so():
     assert len(garment.vertices) < 150
     assert np.linalg.norm(away, axis=1).max() < 0.05
     assert np.hypot(*(found.garment.vertices.mean(axis=0) - middle)[[0, 2]]) < 0.02
+
+
+def test_cloth_beside_an_armpit_is_pierced_by_no_arm():
+    """The line that stands for an arm strays out of the body there: a patch across it beside the skin meets no arm."""
+    thinning = Thinning(figure(1.0))
+    thin, body = thinning.after(LINES), thinning.after(1)
+    arm = next(limb for limb, one in enumerate(thinning.limbs.limbs) if one.name == "left arm")
+    way = thinning.limbs.ways_in(thin)[arm]
+    middles = 0.5 * (way[:-1] + way[1:])
+    depth = -SurfaceDistance(body).signed(middles).distance
+
+    def patch(segment):
+        """A square of 5 mm across the line."""
+        across = np.linalg.svd((way[segment + 1] - way[segment])[None])[2][1:]
+        corners = middles[segment] + 2.5e-3 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) @ across
+        return TriangleMesh(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+
+    for segment, is_there in ((int(depth.argmin()), False), (int(depth.argmax()), True)):
+        assert any(len(piece.pierced[arm]) for piece in pieces_with_limbs(patch(segment), thinning.limbs, thin))
+        assert (thinning.growth_from(patch(segment), 1).pierced > 0) is is_there
 
 
 def test_coarse_cloth_that_cuts_a_fine_body_is_not_hopeless():

@@ -147,8 +147,16 @@ class Thinning:
         return self._growth_from(garment, least, pieces_with_limbs(garment, self.limbs, self.after(least)))
 
     def growth_from(self, garment: TriangleMesh, steps: int) -> BodyGrowth:
-        """Return the growth from so many steps of thinning, whatever crosses there."""
-        return self._growth_from(garment, steps, pieces_with_limbs(garment, self.limbs, self.after(LINES)))
+        """Return the growth from so many steps of thinning, whatever crosses there.
+
+        Lines stray out of the body, past an armpit: no limb is where one meets cloth there.
+        """
+        body = SurfaceDistance(self.after(steps))
+        pieces = [
+            piece._replace(pierced=[places[body.signed(places).distance < 0.0] for places in piece.pierced])
+            for piece in pieces_with_limbs(garment, self.limbs, self.after(LINES))
+        ]
+        return self._growth_from(garment, steps, pieces)
 
     def _growth_from(self, garment: TriangleMesh, steps: int, pieces: list[Piece]) -> BodyGrowth:
         tangled = len(self_intersections(garment))
