@@ -30,6 +30,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 _FEW = 1500  # vertices of a garment that is led
 _LED_BY = (0, 3, 6)  # steps of thinning after which the garment is led about the body: the thin one leaves room
+_FREED_AFTER = (0, 1, 2, 4, 8)  # steps of thinning after which it is untangled: each try may take as long as all else
 _STILL_WORN = 0.5  # of the body's surface that was in the garment: with less, it is led to another part of the body
 _SOON = 0.01  # pairs for each triangle of the garment: so few are soon parted
 _LARGER = (1.1, 1.2, 1.35, 1.5)  # times: so much it may start larger than it is
@@ -152,7 +153,7 @@ def _freed(growth: BodyGrowth, thickness: float) -> BodyGrowth:
     if not _enclosed(growth.garment, full).any():  # it would be put beside the body
         return growth
     is_worn = _still_worn(growth.garment, full)
-    for steps in range(growth.thinned):
+    for steps in filter(lambda steps: steps < growth.thinned, _FREED_AFTER):
         body = growth.thinning.after(steps)
         start = find_collision_free_start(x, faces, x, thickness, Job(), body)
         if start.crossings_left > 0 or edge_stretches(start.positions, x, faces).max() > OVERSTRETCHED:
