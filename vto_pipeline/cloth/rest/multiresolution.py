@@ -28,6 +28,7 @@ from vto_pipeline.cloth.rest.softened import softened
 from vto_pipeline.cloth.rest.true_distance import some_positions, with_true_distances
 from vto_pipeline.cloth.simulation import default_skin
 from vto_pipeline.errors import GarmentError, InputError, IntersectingError
+from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.cloth import TraceRow
@@ -104,7 +105,7 @@ class _CoarseToFine:
         self._config = config
         self._job = job
         skin_mm = 1e3 * default_skin(model.edge_length) if config.skin_mm is None else config.skin_mm
-        self._rough = config.model_copy(update={"skin_mm": skin_mm, "clear_rounds": 0})  # a finer mesh will see to that
+        self._rough = config.model_copy(update={"skin_mm": skin_mm})
         self._coarser = _coarser_ones(garment, config.coarsen_above, job)
 
     def run(self, body: MovingBody, deadline: float) -> RestOnMesh:
@@ -176,9 +177,6 @@ class _CoarseToFine:
                 raise _TooCoarseError(error.problem, len(model.mass)) from error
             put_on = len(job.warnings)
             state = phases.resolve_crossings(grown, first)
-            if level > 0 and phases.crossings_left > 0:
-                left = f"{phases.crossings_left} pairs of triangles still intersect"
-                raise _TooCoarseError(left, len(model.mass))
         cloth = TriangleMesh(state.positions, model.faces)
         collider = phases.collider(phases.give_way(body, cloth), cloth)
         stepper = phases.stepper(model, collider, config.damping)
@@ -192,7 +190,11 @@ class _CoarseToFine:
             raise _TooCoarseError(error.problem, len(model.mass)) from error
         before = time.perf_counter() - self._began
         if level > 0:
-            settling = phases.settle_and_clear(state, stepper, body.final, deadline, (ROUGH,))
+            cut = fresh and phases.crossings_left > 0  # else corners that are left in the body are a finer mesh's
+            settling = phases.settle_and_clear(state, stepper, body.final, deadline, (ROUGH,), clears=cut)
+            lies = TriangleMesh(settling.state.positions, model.faces)
+            if cut and len(left := intersecting_faces(lies, body.final)) > 0:
+                raise _TooCoarseError(f"{len(left)} pairs of triangles still intersect", len(model.mass))
         else:
             softer = phases.stepper(self._soft(garment, config), collider, config.damping)
             settling = _by_softer_threads(phases, softer, stepper, state, body.final, deadline)

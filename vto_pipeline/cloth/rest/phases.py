@@ -238,6 +238,8 @@ class Phases:
         body: TriangleMesh,
         deadline: float,
         passes: Sequence[tuple[float, float]] = (PLACED, REST),
+        *,
+        clears: bool = True,
     ) -> SettlingResult:
         """Return the cloth at rest and clear of the body, or as near to it as allowed.
 
@@ -247,10 +249,11 @@ class Phases:
             body: Where it is now.
             deadline: `time.perf_counter` at which to stop.
             passes: How nearly, for each coming to rest; what was pushed off the body does so again.
+            clears: Whether it is cleared.
         """
         trace: list[TraceRow] = []
         looks: list[FloatArray] = []
-        began = time.perf_counter()
+        began, rounds = time.perf_counter(), self._config.clear_rounds if clears else 0
         for turn in range(_TURNS):
             spent = time.perf_counter() - began
             settling = self.settle(state, stepper, body, deadline, passes[min(turn, len(passes) - 1)])
@@ -261,13 +264,13 @@ class Phases:
                 break
             self._job.progress(0.9, "clearing the body")
             state, crossing = clear_body_crossings(
-                stepper, settling.state, self._rest.positions, self._model.faces, body, self._config.clear_rounds
+                stepper, settling.state, self._rest.positions, self._model.faces, body, rounds
             )
             lies_clear = state is settling.state
             settling.state = state
             if not lies_clear:  # nobody has looked at it since it was moved
                 settling.settled, settling.error = False, np.inf
-            if len(crossing) > 0 and self._config.clear_rounds > 0:  # nor will waiting clear it
+            if len(crossing) > 0 and rounds > 0:  # nor will waiting clear it
                 settling.settled, settling.error = False, np.inf
                 break
             if lies_clear and (settling.jammed or turn + 1 >= len(passes)):
