@@ -120,11 +120,21 @@ def test_what_a_coarse_mesh_leaves_in_the_body_begins_on_a_finer_one(monkeypatch
         self.crossings_left += body is not None and len(state.positions) < len(vest().vertices)
         return state
 
+    cleared, settle = [], levels_module.Phases.settle_and_clear
+
+    def watched(self, *given, clears=True):
+        cleared.append(clears)
+        return settle(self, *given, clears=clears)
+
     settings, job = {"settle_seconds": 0.1}, Job()
+    monkeypatch.setattr(levels_module.Phases, "settle_and_clear", watched)
     alone = drape(vest(), pear(), fabric(), settings)
+    drape(vest(), pear(), fabric(), {**settings, "coarsen_above": 1000})
+    assert cleared == [True, False, True]  # alone; what is clear of the body on a coarse mesh; and then alone
     monkeypatch.setattr(levels_module.Phases, "resolve_crossings", in_part)
     monkeypatch.setattr(levels_module, "intersecting_faces", lambda *_: np.zeros((7, 2), np.int32))
     found = drape(vest(), pear(), fabric(), {**settings, "coarsen_above": 1000}, job)
+    assert cleared[3:] == [True, True]
     assert "too coarse: 7 pairs of triangles still intersect" in [why for _, why in job.left_out]
     assert (found.mesh.vertices == alone.mesh.vertices).all()
 
