@@ -49,13 +49,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m vto_pipeline.bench.motion.garments", description=__doc__)
     parser.add_argument("--garment", type=Path, nargs="+", required=True, help="mesh or pattern files")
     parser.add_argument("--motion", nargs="+", required=True, help="motion files, or names of presets")
+    parser.add_argument("--body", type=Path, metavar="AVATAR", help="avatar.npz; by default the mean body")
     parser.add_argument("--limit", type=float, default=3600.0, metavar="SECONDS", help="of a run")
     parser.add_argument("--set", dest="settings", nargs="*", default=[], metavar="STAGE.KEY=VALUE", help="of the runs")
     parser.add_argument("--out", type=Path, default=Path("runs/garment_motion"), metavar="DIR", help="for the runs")
     arguments = parser.parse_args()
-    body = arguments.out / "mean_body.npz"
-    body.parent.mkdir(parents=True, exist_ok=True)
-    write_avatar(body, template())
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    body = arguments.body or arguments.out / "mean_body.npz"
+    if arguments.body is None:
+        write_avatar(body, template())
     table = LiveRows(arguments.out, _COLUMNS)
     for garment in arguments.garment:
         for motion in arguments.motion:
