@@ -28,7 +28,8 @@ SIZE = 0.02  # m: edges of the patches
 PATCHES = np.array([[0, 1, 2], [3, 4, 5]], np.int32)
 AUDIT = (
     *("frames", "frames_crossing_body", "most_body_crossings", "frames_crossing_itself", "frames_body_crossing_itself"),
-    *("body_yields_mm", "penetration_mm", "max_stretch", "seconds_per_frame"),
+    *("body_yields_mm", "penetration_mm", "max_stretch", "max_thread_stretch", "p99_thread_stretch"),
+    *("max_shear_deg", "seconds_per_frame"),
     *("cpu_seconds_per_frame", "most_cpu_seconds"),
 )
 

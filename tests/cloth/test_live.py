@@ -132,6 +132,20 @@ def test_a_leap_of_ten_centimetres_a_frame_is_followed_outside_of_the_body(cap):
     assert np.isfinite(frames).all()
 
 
+def test_cloth_that_a_step_leaves_in_the_body_is_shown_on_its_skin(cap, monkeypatch):
+    """By brute force: what is in the ball goes to the nearest place of it, and all else stays."""
+    live, _ = carried(cap, lambda t, x: x, 3)
+    body, stays = ball(RADIUS, (0.04, 0.02, 0.01), levels=3), live.positions
+    _, nearest, _ = closest_points(stays, body.vertices, body.faces)
+    inside = np.linalg.norm(stays - [0.04, 0.02, 0.01], axis=1) < 0.99 * RADIUS  # facets lie within a percent
+    clear = np.linalg.norm(stays - [0.04, 0.02, 0.01], axis=1) > RADIUS
+    assert inside.sum() > 10 < clear.sum()
+    monkeypatch.setattr(Newton, "advance", lambda self, state, contacts, h, substeps: state)
+    live.advance(body.vertices, PERIOD)
+    assert_allclose(live.positions[inside], nearest[inside], rtol=0, atol=1e-7)
+    assert_array_equal(live.positions[clear], stays[clear])
+
+
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, 50.0])
 def test_cloth_that_has_gone_astray_is_laid_on_anew(cap, wrong, monkeypatch):
     live, _ = carried(cap, lambda t, x: x, 3)

@@ -86,8 +86,9 @@ def motion_lines(found: Mapping[str, Any]) -> Iterator[str]:
             f"there by up to {found['body_yields_mm']:.0f} mm"
         )
     yield (
-        f"  at most {found['penetration_mm']:.1f} mm inside the body, {found['max_stretch']:.0%} stretch of an edge; "
-        f"{found['seconds_per_frame']:.1f} s a frame"
+        f"  at most {found['penetration_mm']:.1f} mm inside the body; threads stretched by up to "
+        f"{found['max_thread_stretch']:.0%}, on 99% of the cloth by up to {found['p99_thread_stretch']:.0%}, and "
+        f"sheared by up to {found['max_shear_deg']:.0f} degrees; {found['seconds_per_frame']:.1f} s a frame"
     )
 
 

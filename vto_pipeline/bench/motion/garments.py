@@ -34,7 +34,10 @@ _COLUMNS = (
     "body_in_itself",
     "yields_mm",
     "inside_mm",
-    "stretch",
+    "edge_stretch",
+    "thread_stretch",
+    "thread_stretch_p99",
+    "shear_deg",
     "s_per_frame",
     "cpu_s_per_frame",
     "cpu_s_most",
@@ -46,13 +49,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m vto_pipeline.bench.motion.garments", description=__doc__)
     parser.add_argument("--garment", type=Path, nargs="+", required=True, help="mesh or pattern files")
     parser.add_argument("--motion", nargs="+", required=True, help="motion files, or names of presets")
+    parser.add_argument("--body", type=Path, metavar="AVATAR", help="avatar.npz; by default the mean body")
     parser.add_argument("--limit", type=float, default=3600.0, metavar="SECONDS", help="of a run")
     parser.add_argument("--set", dest="settings", nargs="*", default=[], metavar="STAGE.KEY=VALUE", help="of the runs")
     parser.add_argument("--out", type=Path, default=Path("runs/garment_motion"), metavar="DIR", help="for the runs")
     arguments = parser.parse_args()
-    body = arguments.out / "mean_body.npz"
-    body.parent.mkdir(parents=True, exist_ok=True)
-    write_avatar(body, template())
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    body = arguments.body or arguments.out / "mean_body.npz"
+    if arguments.body is None:
+        write_avatar(body, template())
     table = LiveRows(arguments.out, _COLUMNS)
     for garment in arguments.garment:
         for motion in arguments.motion:
@@ -100,7 +105,10 @@ def run_figures(folder: Path, body: Path) -> dict[str, Value]:
                 "body_in_itself": found["frames_body_crossing_itself"],
                 "yields_mm": found["body_yields_mm"],
                 "inside_mm": found["penetration_mm"],
-                "stretch": found["max_stretch"],
+                "edge_stretch": found["max_stretch"],
+                "thread_stretch": found["max_thread_stretch"],
+                "thread_stretch_p99": found["p99_thread_stretch"],
+                "shear_deg": found["max_shear_deg"],
                 "s_per_frame": found["seconds_per_frame"],
                 "cpu_s_per_frame": found["cpu_seconds_per_frame"],
                 "cpu_s_most": found["most_cpu_seconds"],

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from vto_pipeline.cloth.dynamics.warm_up import warm_up
+from vto_pipeline.cloth.judge.strain import cloth_triangles
 from vto_pipeline.cloth.model.build import build_cloth
 from vto_pipeline.cloth.model.settings import checked
 from vto_pipeline.cloth.moving.config import FollowConfig
@@ -60,6 +61,7 @@ def follow(
     warm_up()
     model = build_cloth(garment.mesh, garment.rest, fabric, materials=config, job=job)
     stepper = FrameStepper(model, garment, path, fabric, config, job)
+    laid = cloth_triangles(garment.rest.corners(model.faces))
 
     def keep(*, steps: int, attempts: int, began: tuple[float, float]) -> None:
         assert log is not None
@@ -67,6 +69,7 @@ def follow(
         found = audit_frame(
             model,
             stepper.natural,
+            laid,
             state,
             body,
             own_crossings=stepper.body.own_crossings(len(log.frames)),
@@ -123,7 +126,7 @@ def summary(records: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "most_self_crossings": most("self_crossings"),
         "penetration_mm": most("penetration_mm"),
         "body_yields_mm": most("yields_mm"),
-        "max_stretch": most("max_stretch"),
+        **{name: most(name) for name in ("max_stretch", "max_thread_stretch", "p99_thread_stretch", "max_shear_deg")},
         "seconds_per_frame": float(np.median([record["seconds"] for record in records])),
         "cpu_seconds_per_frame": float(np.median([record["cpu_seconds"] for record in records])),
         "most_cpu_seconds": most("cpu_seconds"),

@@ -8,10 +8,11 @@ import numpy as np
 
 from vto_pipeline.cloth.dynamics.residual import elastic_energy
 from vto_pipeline.cloth.judge.crossings import crossings_between, self_crossings
+from vto_pipeline.cloth.judge.strain import RestTriangles, gradients, warp_weft_strains
 from vto_pipeline.cloth.model.build import ClothModel, ClothState
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import laid_edge_lengths
-from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 
 
@@ -26,7 +27,11 @@ class FrameAudit:
         own_crossings: Pairs of triangles of the body itself that meet as it is posed.
         yields_mm: How far its skin has then sunk, where it has most [mm]; cloth is held against the sunken skin.
         penetration_mm: Of the deepest vertex in the body [mm], 0 where none is inside.
-        max_stretch: Of the edge that is stretched most, beyond rest [share].
+        max_stretch: Of the edge that is stretched most, beyond rest [share]. Edges on the bias of a weave also grow
+            where it shears, which stretches no thread.
+        max_thread_stretch: Of the warp or weft that is stretched most, beyond rest [share].
+        p99_thread_stretch: What the more stretched of warp and weft stays below on 99 % of the cloth [share].
+        max_shear_deg: Largest angle by which warp and weft are sheared [degrees].
         elastic_j, kinetic_j: Energy [J].
         steps: Of the solver, in the attempt that was kept.
         attempts: How often the frame was tried.
@@ -41,6 +46,9 @@ class FrameAudit:
     yields_mm: float
     penetration_mm: float
     max_stretch: float
+    max_thread_stretch: float
+    p99_thread_stretch: float
+    max_shear_deg: float
     elastic_j: float
     kinetic_j: float
     steps: int
@@ -55,9 +63,24 @@ def stretch_of_edges(mesh: TriangleMesh, natural: FloatArray) -> FloatArray:
     return np.asarray(np.divide(length, natural, out=np.ones_like(length), where=natural > 0.0) - 1.0)
 
 
+def thread_strains(positions: FloatArray, faces: IntArray, laid: RestTriangles) -> tuple[float, float, float]:
+    """Return the largest stretch of a thread, what 99 % of the cloth stays below, and the largest shear [degrees].
+
+    Args:
+        positions: [m], shape (V, 3).
+        faces: Shape (F, 3).
+        laid: Those at rest.
+    """
+    strain = warp_weft_strains(gradients(positions, faces, laid))
+    most = strain[:, :2].max(axis=1)
+    below = np.quantile(most, 0.99, weights=laid.area, method="inverted_cdf")
+    return max(0.0, float(most.max())), max(0.0, float(below)), float(np.degrees(np.abs(strain[:, 2]).max()))
+
+
 def audit_frame(
     model: ClothModel,
     natural: FloatArray,
+    laid: RestTriangles,
     state: ClothState,
     body: TriangleMesh,
     *,
@@ -73,6 +96,7 @@ def audit_frame(
     Args:
         model: The cloth.
         natural: Lengths of its edges without forces [m], shape (E,).
+        laid: Its triangles without forces.
         state: Where it is.
         body: Where that is.
         own_crossings: Of the body as it is posed.
@@ -80,6 +104,7 @@ def audit_frame(
         steps, attempts, seconds, cpu_seconds: What it took.
     """
     mesh = TriangleMesh(state.positions, model.faces)
+    thread, below, shear = thread_strains(mesh.vertices, mesh.faces, laid)
     nearest = float(SurfaceDistance(body).signed(mesh.vertices).distance.min())
     return FrameAudit(
         time_s=state.time,
@@ -89,6 +114,9 @@ def audit_frame(
         yields_mm=1e3 * yields,
         penetration_mm=1e3 * max(0.0, -nearest),
         max_stretch=float(stretch_of_edges(mesh, natural).max(initial=0.0)),
+        max_thread_stretch=thread,
+        p99_thread_stretch=below,
+        max_shear_deg=shear,
         elastic_j=elastic_energy(model, state.positions),
         kinetic_j=float(0.5 * np.einsum("i,ij,ij->", model.mass, state.velocities, state.velocities)),
         steps=steps,

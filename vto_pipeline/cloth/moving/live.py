@@ -7,6 +7,7 @@ what it would pass through or repeated, and a vertex is held off the part of the
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from pydantic import Field
@@ -90,6 +91,7 @@ class LiveCloth:
         self.deepest = max(self.deepest, self._body.depth)
         self._state = self._solver.advance(self._state, contacts, seconds, 1)
         self._body.arrive()
+        self._state = replace(self._state, positions=self._body.led_out(self.positions))
         if not self._is_near(vertices):
             self.restarts += 1
             self._lay_on(TriangleMesh(vertices, self._faces), apply(self._laid, vertices))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vto_pipeline.cloth.collision.body.nearest import Nearest, SurfaceTree
 from vto_pipeline.cloth.collision.body.triangle_planes import INSIDE, sides, triangle_planes
@@ -43,9 +44,7 @@ class LiveBody:
 
     def contacts(self, positions: FloatArray, span: ContactSpan) -> Contacts:
         """See `Collider.contacts`; planes are carried as `PathCollider` carries them."""
-        found = Nearest(*walk(positions, self._on, self.vertices, self._faces, *self._around))
-        self._on = found.triangle
-        side, distance = sides(self.vertices, self._faces, self._normals, positions, *found)
+        found, side, distance = self._beneath(positions)
         self.depth = float(distance[side == INSIDE].max(initial=0.0))
         away, point, normal, near = triangle_planes(
             self.vertices, self.after, self._faces, self._normals, positions, positions, side, *found
@@ -58,3 +57,17 @@ class LiveBody:
         """Be where the span ended."""
         self.vertices = self.after
         update_pseudonormals(self._normals, self.vertices, self._faces)
+
+    def led_out(self, positions: FloatArray) -> FloatArray:
+        """Return places of the cloth [m], shape (V, 3): those inside their part of the body are now on its skin."""
+        found, side, _ = self._beneath(positions)
+        inside, out = side == INSIDE, positions.copy()
+        corners = self.vertices[self._faces[found.triangle[inside]]]
+        out[inside] = np.einsum("nk,nkd->nd", found.weights[inside], corners)
+        return out
+
+    def _beneath(self, positions: FloatArray) -> tuple[Nearest, NDArray[np.int8], FloatArray]:
+        """Return the nearest place of each vertex's part of the body, on which side of it that is, and how far off."""
+        found = Nearest(*walk(positions, self._on, self.vertices, self._faces, *self._around))
+        self._on = found.triangle
+        return found, *sides(self.vertices, self._faces, self._normals, positions, *found)
