@@ -15,7 +15,7 @@ from vto_pipeline.errors import AvatarError
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.job import Job
-from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.mesh import PointCloud, TriangleMesh
 
 _PROBES = 300
 _CAP_M = 0.15
@@ -107,13 +107,13 @@ def best_axis(scan: TriangleMesh) -> Upright | None:
     return None if best is None else best[1]
 
 
-def initial_poses(scan: TriangleMesh) -> list[InitialPose]:
+def initial_poses(scan: TriangleMesh | PointCloud) -> list[InitialPose]:
     """Return the best guess for each of four facings, best first.
 
     Args:
         scan: In metres, +Y up.
     """
-    probes, _, _ = sample_surface(scan, _PROBES, 0)
+    probes = _probes(scan)
     middle = probes.mean(axis=0)
     spread = (probes - middle)[:, [0, 2]]
     wide = np.linalg.eigh(spread.T @ spread)[1][:, -1]
@@ -121,6 +121,13 @@ def initial_poses(scan: TriangleMesh) -> list[InitialPose]:
     across = float(np.arctan2(-wide[1], wide[0]))
     found = [_best(probes, across + turn) for turn in (0.0, np.pi, np.pi / 2, -np.pi / 2)]
     return sorted(found, key=lambda start: start.score)
+
+
+def _probes(scan: TriangleMesh | PointCloud) -> FloatArray:
+    if isinstance(scan, TriangleMesh):
+        return sample_surface(scan, _PROBES, 0)[0]
+    some: FloatArray = np.random.default_rng(0).choice(scan.points, min(_PROBES, len(scan.points)), replace=False)
+    return some
 
 
 def _best(probes: FloatArray, yaw: float) -> InitialPose:
