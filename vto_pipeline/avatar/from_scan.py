@@ -34,6 +34,7 @@ from vto_pipeline.avatar.scan.report import (
 )
 from vto_pipeline.avatar.scan.tangential_slide import slide_along_surface
 from vto_pipeline.avatar.scan.unobserved_uncertainty import unseen_sigmas
+from vto_pipeline.avatar.scan.unseen_people import as_people_differ
 from vto_pipeline.avatar.scan.upright import in_metres, without_surroundings
 from vto_pipeline.avatar.standing import refuse_misread_unit
 from vto_pipeline.avatar.template.template import JOINT_KINDS
@@ -156,6 +157,7 @@ def fit_scan(
             surface_sigmas(space, target, body),
         )
         sigmas = {name: math.hypot(*(part[name] for part in parts)) for name in parts[0]}
+        sigmas = as_people_differ(body, sigmas, target)
     caveats += report_registration(kept, space, body.vertices, job)
     job.measure(tangled_faces=bad)
     if bad:

@@ -59,7 +59,9 @@ def misread_unit(body: TriangleMesh | PointCloud) -> str | None:
         if height <= 0.5 * extent.max():
             continue
         person = (_PERSON_M / height) * points @ turn.T
-        sized = TriangleMesh(person, body.faces) if isinstance(body, TriangleMesh) else PointCloud(person)
+        sized: TriangleMesh | PointCloud = PointCloud(person)
+        if isinstance(body, TriangleMesh):
+            sized = TriangleMesh(person, body.faces)
         if initial_poses(sized)[0].score < _WHOLE_M:
             return _no_such_person(height)
     return None
