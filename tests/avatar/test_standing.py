@@ -97,6 +97,9 @@ def test_a_body_by_others_in_inches_is_told(name: str) -> None:
     body = read_mesh(BODIES / f"{name}.ply")
     with pytest.raises(AvatarError, match=f"{np.ptp(body.vertices[:, 1]):.2f} m if the file is in inches"):
         refuse_misread_unit(scaled(body, 0.01 / 0.0254))
+    job = Job()  # half of its vertices are in face and hands
+    warn_of_misread_unit(PointCloud(scaled(body, 0.01 / 0.0254).vertices), job)
+    assert "if the file is in inches" in job.warnings[0]
 
 
 def test_a_small_body_under_a_drape_is_warned_of() -> None:

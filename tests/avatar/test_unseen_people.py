@@ -11,7 +11,7 @@ from vto_pipeline.avatar.from_scan import ScanConfig, fit_scan
 from vto_pipeline.avatar.measure import measure
 from vto_pipeline.avatar.measuring.population import population
 from vto_pipeline.avatar.scan.correspondence import Target
-from vto_pipeline.avatar.scan.unseen_people import as_people_differ, open_shares
+from vto_pipeline.avatar.scan.uncertainty.people import as_people_differ, open_shares
 from vto_pipeline.avatar.template.template import beyond_armscye, template
 from vto_pipeline.geometry.topology import face_normals, submesh
 from vto_pipeline.io.meshes import read_mesh

@@ -21,7 +21,6 @@ from vto_pipeline.avatar.scan.clothed import fit_under_clothes
 from vto_pipeline.avatar.scan.correspondence import Correspondences, Target
 from vto_pipeline.avatar.scan.displacement import displace
 from vto_pipeline.avatar.scan.initial_pose import InitialPose, upright_initial_poses
-from vto_pipeline.avatar.scan.observed_uncertainty import level_sigmas, surface_sigmas
 from vto_pipeline.avatar.scan.registration import covariance, initial_fit, refine_registration
 from vto_pipeline.avatar.scan.report import (
     CORE,
@@ -33,8 +32,9 @@ from vto_pipeline.avatar.scan.report import (
     report_registration,
 )
 from vto_pipeline.avatar.scan.tangential_slide import slide_along_surface
-from vto_pipeline.avatar.scan.unobserved_uncertainty import unseen_sigmas
-from vto_pipeline.avatar.scan.unseen_people import as_people_differ
+from vto_pipeline.avatar.scan.uncertainty.observed import level_sigmas, surface_sigmas
+from vto_pipeline.avatar.scan.uncertainty.people import as_people_differ
+from vto_pipeline.avatar.scan.uncertainty.unobserved import unseen_sigmas
 from vto_pipeline.avatar.scan.upright import in_metres, without_surroundings
 from vto_pipeline.avatar.standing import refuse_misread_unit
 from vto_pipeline.avatar.template.template import JOINT_KINDS

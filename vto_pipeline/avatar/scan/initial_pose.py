@@ -18,6 +18,8 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud, TriangleMesh
 
 _PROBES = 300
+_PLACE_M = 0.03
+"""One point of a cloud counts in each cube of this side [m]: clouds are denser at faces and hands."""
 _CAP_M = 0.15
 _SURELY_WHOLE_M, CHILD_M = 1.30, 0.80
 """A scan this tall is of a whole body; one less tall is of a child or of a part; a smaller one is of a part."""
@@ -126,8 +128,8 @@ def initial_poses(scan: TriangleMesh | PointCloud) -> list[InitialPose]:
 def _probes(scan: TriangleMesh | PointCloud) -> FloatArray:
     if isinstance(scan, TriangleMesh):
         return sample_surface(scan, _PROBES, 0)[0]
-    some: FloatArray = np.random.default_rng(0).choice(scan.points, min(_PROBES, len(scan.points)), replace=False)
-    return some
+    _, kept = np.unique(np.floor(scan.points / _PLACE_M), axis=0, return_index=True)
+    return scan.points[np.random.default_rng(0).choice(kept, min(_PROBES, len(kept)), replace=False)]
 
 
 def _best(probes: FloatArray, yaw: float) -> InitialPose:
