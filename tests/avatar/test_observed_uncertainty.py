@@ -12,7 +12,7 @@ from vto_pipeline.avatar.measuring.measuring_levels import level_spread
 from vto_pipeline.avatar.measuring.tape import Tape
 from vto_pipeline.avatar.model.shape import shape_space
 from vto_pipeline.avatar.scan.correspondence import Target
-from vto_pipeline.avatar.scan.observed_uncertainty import level_sigmas, surface_sigmas
+from vto_pipeline.avatar.scan.uncertainty.observed import level_sigmas, surface_sigmas
 from vto_pipeline.geometry.topology import vertex_normals
 from vto_pipeline.model.body import Avatar, Measurements
 

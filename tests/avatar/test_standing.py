@@ -9,13 +9,19 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from vto_pipeline.avatar.model.pose import named_pose
-from vto_pipeline.avatar.standing import refuse_misread_unit, stood_up, turn_of, warn_of_several
+from vto_pipeline.avatar.standing import (
+    refuse_misread_unit,
+    stood_up,
+    turn_of,
+    warn_of_misread_unit,
+    warn_of_several,
+)
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.errors import AvatarError
 from vto_pipeline.geometry.rigid import transform_mesh
 from vto_pipeline.io.meshes import read_mesh
 from vto_pipeline.model.job import Job
-from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.mesh import PointCloud, TriangleMesh
 
 BODIES = Path(__file__).parents[3] / "shared" / "data" / "bodies"
 POSED = named_pose(template(), "t_pose")
@@ -91,6 +97,9 @@ def test_a_body_by_others_in_inches_is_told(name: str) -> None:
     body = read_mesh(BODIES / f"{name}.ply")
     with pytest.raises(AvatarError, match=f"{np.ptp(body.vertices[:, 1]):.2f} m if the file is in inches"):
         refuse_misread_unit(scaled(body, 0.01 / 0.0254))
+    job = Job()  # half of its vertices are in face and hands
+    warn_of_misread_unit(PointCloud(scaled(body, 0.01 / 0.0254).vertices), job)
+    assert "if the file is in inches" in job.warnings[0]
 
 
 def test_a_small_body_under_a_drape_is_warned_of() -> None:
@@ -149,3 +158,15 @@ def test_bodies_by_others_are_told_front_from_back(name: str) -> None:
     assert not job.warnings
     stood_up(turned(body, "y", 180), job)
     assert "the body faces -Z" in job.warnings[0]
+
+
+@pytest.mark.parametrize(("times", "said"), [(0.4, "if the file is in inches"), (2.54, "no one is so tall"), (1.0, "")])
+def test_a_cloud_or_mesh_of_a_persons_wrong_size_is_told(times: float, said: str) -> None:
+    """Inches read as centimetres, and the other way round; the size is the ratio's of the two units."""
+    body = scaled(BODY, times)
+    for what in (body, PointCloud(body.vertices)):
+        job = Job()
+        warn_of_misread_unit(what, job)
+        assert [said in text and f"{np.ptp(body.vertices[:, 1]):.2f} m" in text for text in job.warnings] == [True] * (
+            times != 1.0
+        )

@@ -10,7 +10,7 @@ from vto_pipeline.avatar.measure import measure
 from vto_pipeline.avatar.model.shape import ShapeSpace, shape_space
 from vto_pipeline.avatar.scan.correspondence import Target
 from vto_pipeline.avatar.scan.report import refuse_implausible_build
-from vto_pipeline.avatar.scan.unobserved_uncertainty import unseen_sigmas
+from vto_pipeline.avatar.scan.uncertainty.unobserved import unseen_sigmas
 from vto_pipeline.avatar.template.template import beyond_armscye
 from vto_pipeline.errors import AvatarError
 from vto_pipeline.geometry.topology import submesh

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from vto_pipeline.avatar.model.pose import named_pose
+from vto_pipeline.avatar.template.template import template
 from vto_pipeline.cli.describe import DESCRIPTIONS
 from vto_pipeline.pipeline.batch.ledger import Ledger
 
@@ -27,6 +29,19 @@ def test_a_mesh_is_described_in_metres(vto):
     box.export("open.ply")
     assert vto("info", "open.ply", "--json").data["closed"] is False
     assert any("assumed to be m" in note for note in said.data["notes"])
+
+
+def test_a_body_of_a_wrong_unit_is_told_by_info(vto):
+    """One in inches has the size of a form in centimetres; as points it is told, too, and a form is not."""
+    body = named_pose(template(), "a_pose")
+    inches = body.vertices / 0.0254
+    trimesh.Trimesh(inches, body.faces, process=False).export("body.ply")
+    trimesh.PointCloud(inches).export("cloud.ply")
+    trimesh.creation.box((20.0, 36.0, 14.0)).export("form.ply")
+    stature = f"{np.ptp(body.vertices[:, 1]):.2f} m if the file is in inches"
+    for name, kind, said in (("body.ply", "surface", 1), ("cloud.ply", "cloud", 1), ("form.ply", "surface", 0)):
+        data = vto("info", name, "--json").data
+        assert (data["kind"], sum(stature in text for text in data["warnings"])) == (kind, said)
 
 
 def test_every_kind_that_may_be_given_has_a_description(vto):

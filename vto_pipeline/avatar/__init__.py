@@ -3,6 +3,7 @@
 from_measurements, from_scan, from_silhouettes: the three ways to an avatar
 from_dressed: a mannequin inside the scan of what it wears
 measure: measure any body
+open_mesh: a mesh that is open as a garment is has to be a person's
 standing: a body mesh by others, with the axis up along which it stands
 template/: fixed topology, and how it is built
 model/: shape and pose

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -21,7 +21,6 @@ from vto_pipeline.avatar.scan.clothed import fit_under_clothes
 from vto_pipeline.avatar.scan.correspondence import Correspondences, Target
 from vto_pipeline.avatar.scan.displacement import displace
 from vto_pipeline.avatar.scan.initial_pose import InitialPose, upright_initial_poses
-from vto_pipeline.avatar.scan.observed_uncertainty import level_sigmas, surface_sigmas
 from vto_pipeline.avatar.scan.registration import covariance, initial_fit, refine_registration
 from vto_pipeline.avatar.scan.report import (
     CORE,
@@ -33,7 +32,9 @@ from vto_pipeline.avatar.scan.report import (
     report_registration,
 )
 from vto_pipeline.avatar.scan.tangential_slide import slide_along_surface
-from vto_pipeline.avatar.scan.unobserved_uncertainty import unseen_sigmas
+from vto_pipeline.avatar.scan.uncertainty.observed import level_sigmas, surface_sigmas
+from vto_pipeline.avatar.scan.uncertainty.people import as_people_differ
+from vto_pipeline.avatar.scan.uncertainty.unobserved import unseen_sigmas
 from vto_pipeline.avatar.scan.upright import in_metres, without_surroundings
 from vto_pipeline.avatar.standing import refuse_misread_unit
 from vto_pipeline.avatar.template.template import JOINT_KINDS
@@ -73,6 +74,25 @@ class ScanConfig(Config):
     )
 
 
+@dataclass(frozen=True)
+class Begun:
+    """A registration of pose and shape.
+
+    Args:
+        space: The shape space.
+        fit: Its parameters, pose and place.
+        scan: What was fitted to: +Y up, without floor and surroundings [m].
+        target: The same, prepared for closest points.
+        posed: The model's body there [m], shape (V, 3).
+    """
+
+    space: ShapeSpace
+    fit: Fit
+    scan: TriangleMesh
+    target: Target
+    posed: FloatArray
+
+
 def fit_scan(
     scan: TriangleMesh, config: ScanConfig | None = None, job: Job | None = None, tape: Measurements | None = None
 ) -> Avatar:
@@ -93,17 +113,9 @@ def fit_scan(
     job.progress(0.0, "finding the body's facing and size")
     metric = in_metres(scan, job)
     refuse_misread_unit(metric)
-    kept, guesses = upright_initial_poses(metric, job)
-    target = Target(kept, config.probes, job.seed)
-    space = shape_space(SEX_SHARE[config.sex])
-    tries = [_pose_and_shape(space, target, guess, config, job, steps=8) for guess in guesses[:2]]
-    scores = [_score(space, target, fit) for fit in tries]
-    fit = _pose_and_shape(space, target, tries[int(np.argmin(scores))], config, job, steps=config.iterations)
+    begun = begin_registration(metric, config, job)
+    space, fit, kept, target, posed = begun.space, begun.fit, begun.scan, begun.target, begun.posed
     job.progress(0.6, "fitting the surface to the scan")
-    posed = separate_thighs(space, fit, posed_vertices(space, fit))
-    whole, kept = kept, without_surroundings(kept, TriangleMesh(posed, space.base.faces), job)
-    if kept is not whole:
-        target = Target(kept, config.probes, job.seed)
     if not config.clothed:
         refuse_shape_of_no_body(kept, space, posed)
     vertices, softest = _displaced(space, fit, target, posed, config.stiffness, config.rounds)
@@ -145,11 +157,36 @@ def fit_scan(
             surface_sigmas(space, target, body),
         )
         sigmas = {name: math.hypot(*(part[name] for part in parts)) for name in parts[0]}
+        sigmas = as_people_differ(body, sigmas, target)
     caveats += report_registration(kept, space, body.vertices, job)
     job.measure(tangled_faces=bad)
     if bad:
         job.warn(f"{bad} faces of the registered body still pass through others, where the scan's own limbs touch")
     return replace(body, sigmas=sigmas, caveats=tuple(caveats))
+
+
+def begin_registration(metric: TriangleMesh, config: ScanConfig, job: Job) -> Begun:
+    """Return pose and shape of the model's body that comes nearest to a scan, before its surface is displaced.
+
+    Args:
+        metric: The scan in metres; its upward axis and facing are detected.
+        config: Settings.
+        job: Notified of what was turned or left out.
+
+    Raises:
+        AvatarError: it is tall in no direction.
+    """
+    kept, guesses = upright_initial_poses(metric, job)
+    target = Target(kept, config.probes, job.seed)
+    space = shape_space(SEX_SHARE[config.sex])
+    tries = [_pose_and_shape(space, target, guess, config, job, steps=8) for guess in guesses[:2]]
+    scores = [_score(space, target, fit) for fit in tries]
+    fit = _pose_and_shape(space, target, tries[int(np.argmin(scores))], config, job, steps=config.iterations)
+    posed = separate_thighs(space, fit, posed_vertices(space, fit))
+    whole, kept = kept, without_surroundings(kept, TriangleMesh(posed, space.base.faces), job)
+    if kept is not whole:
+        target = Target(kept, config.probes, job.seed)
+    return Begun(space, fit, kept, target, posed)
 
 
 def _levelled(

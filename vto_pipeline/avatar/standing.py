@@ -10,7 +10,7 @@ from vto_pipeline.errors import AvatarError
 from vto_pipeline.geometry.topology import face_components
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.job import Job
-from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.mesh import PointCloud, TriangleMesh
 from vto_pipeline.units import LENGTH_M
 
 _LIKE_A_BODY_M = 0.06
@@ -26,12 +26,14 @@ _AS_TALL = 0.6
 _PERSON_M = 1.7
 _WHOLE_M = 0.045
 """Mean distance of the first guess at a person's size: whole bodies have 0.033 at most, parts 0.055 and more."""
+_REACH_M = 2.5
+"""From the floor to the hands of a tall person who raises them; what guesses a file's unit finds nothing larger [m]."""
 _TAKEN_FOR = {"in": ("inches", "cm"), "ft": ("feet", "dm")}
 """Units that are not guessed -> their plural, and the metric unit in which a body has the size of a form."""
 
 
 def refuse_misread_unit(scan: TriangleMesh) -> None:
-    """Refuse a whole body that is smaller than anybody who stands: its unit was misread.
+    """Refuse a whole body that is smaller or larger than anybody who stands: its unit was misread.
 
     Raises:
         AvatarError: with the units in which it would be a person.
@@ -40,25 +42,48 @@ def refuse_misread_unit(scan: TriangleMesh) -> None:
         raise AvatarError(problem, hint="give the unit; in a document: {file: body.ply, unit: in}")
 
 
-def misread_unit(body: TriangleMesh) -> str | None:
-    """Return what is wrong with the size of a whole body that is smaller than anybody who stands, else None.
+def misread_unit(body: TriangleMesh | PointCloud) -> str | None:
+    """Return what is wrong with the size of a whole body that is smaller or larger than anybody who stands, else None.
 
     Forms are as small, but have no head, arms and legs.
 
     Args:
         body: As it was read [m], any axis up.
     """
-    extent = np.ptp(body.vertices, axis=0)
-    if extent.max() >= CHILD_M:
+    points = body.vertices if isinstance(body, TriangleMesh) else body.points
+    extent = np.ptp(points, axis=0)
+    if CHILD_M <= extent.max() <= _REACH_M:
         return None
     for name, turn in AXES.items():
         height = float(extent["XYZ".index(name[1])])
-        person = TriangleMesh((_PERSON_M / height) * body.vertices @ turn.T, body.faces)
-        if height > 0.5 * extent.max() and initial_poses(person)[0].score < _WHOLE_M:
-            sizes = [(height * LENGTH_M[unit] / LENGTH_M[taken], name) for unit, (name, taken) in _TAKEN_FOR.items()]
-            others = ", ".join(f"{size:.2f} m if the file is in {name}" for size, name in sizes)
-            return f"a whole body of {height:.2f} m: no one who stands is so small ({others})"
+        if height <= 0.5 * extent.max():
+            continue
+        person = (_PERSON_M / height) * points @ turn.T
+        sized: TriangleMesh | PointCloud = PointCloud(person)
+        if isinstance(body, TriangleMesh):
+            sized = TriangleMesh(person, body.faces)
+        if initial_poses(sized)[0].score < _WHOLE_M:
+            return _no_such_person(height)
     return None
+
+
+def _no_such_person(height: float) -> str:
+    if height > CHILD_M:
+        return f"a whole body of {height:.2f} m: no one is so tall"
+    sizes = [(height * LENGTH_M[unit] / LENGTH_M[taken], name) for unit, (name, taken) in _TAKEN_FOR.items()]
+    others = ", ".join(f"{size:.2f} m if the file is in {name}" for size, name in sizes)
+    return f"a whole body of {height:.2f} m: no one who stands is so small ({others})"
+
+
+def warn_of_misread_unit(body: TriangleMesh | PointCloud, job: Job) -> None:
+    """Warn of a whole body that is smaller or larger than anybody who stands.
+
+    Args:
+        body: As it was read [m], any axis up.
+        job: Warned.
+    """
+    if (problem := misread_unit(body)) is not None:
+        job.warn(f"{problem}. If that is so, give the unit in a document: {{file: body.ply, unit: in}}")
 
 
 def stood_up(body: TriangleMesh, job: Job) -> TriangleMesh:
@@ -70,8 +95,7 @@ def stood_up(body: TriangleMesh, job: Job) -> TriangleMesh:
         body: In metres, any axis up.
         job: Notified of the turn, warned of the facing, and of a whole body that is too small for a person.
     """
-    if (problem := misread_unit(body)) is not None:
-        job.warn(f"{problem}. If that is so, give the unit in a document: {{file: body.ply, unit: in}}")
+    warn_of_misread_unit(body, job)
     found = best_axis(body)
     if found is None or found.guesses[0].score > _LIKE_A_BODY_M:
         return body

@@ -14,12 +14,15 @@ _OPENINGS = 8
 
 
 def _surface(path: Path, job: Job) -> dict[str, Any]:
+    from vto_pipeline.avatar.standing import warn_of_misread_unit
     from vto_pipeline.geometry.remeshing.rims import perimeter
     from vto_pipeline.geometry.topology import boundary_loops
     from vto_pipeline.io.meshes import read_mesh
     from vto_pipeline.report.facts import surface_facts
 
     mesh = read_mesh(path, job=job)
+    if mesh.metric:
+        warn_of_misread_unit(mesh, job)
     facts = surface_facts(mesh)
     if facts["closed"]:
         return facts
@@ -32,9 +35,11 @@ def _surface(path: Path, job: Job) -> dict[str, Any]:
 
 
 def _cloud(path: Path, job: Job) -> dict[str, Any]:
+    from vto_pipeline.avatar.standing import warn_of_misread_unit
     from vto_pipeline.io.clouds import read_cloud
 
     cloud = read_cloud(path, job=job)
+    warn_of_misread_unit(cloud, job)
     return {
         "points": len(cloud.points),
         "size_m": [float(side) for side in cloud.points.max(axis=0) - cloud.points.min(axis=0)],

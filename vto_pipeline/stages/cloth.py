@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from vto_pipeline.avatar.model.pose import morph
+from vto_pipeline.avatar.open_mesh import refuse_open_mesh
 from vto_pipeline.avatar.scan.body_transfer import transfer_motion
 from vto_pipeline.avatar.standing import stood_up, warn_of_several
 from vto_pipeline.cloth.drape import drape
@@ -45,6 +46,7 @@ def _morph(inputs: Inputs, settings: MorphConfig, job: Job) -> Outputs:
 
 def _mesh_morph(inputs: Inputs, settings: MorphConfig, job: Job) -> Outputs:
     body = stood_up(need_metres(inputs["body_mesh"], "a body"), job)
+    refuse_open_mesh(body)
     warn_of_several(body, job)
     if "body_avatar" not in inputs:
         job.leave_out("fitting an avatar", "a body mesh was given, and the cloth is draped on it directly")

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from vto_pipeline.avatar.standing import warn_of_misread_unit
 from vto_pipeline.geometry.topology import submesh
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.settings import Config
@@ -87,6 +88,8 @@ def _stage(role: str) -> Stage:
     def run(inputs: Inputs, settings: Config, job: Job) -> Outputs:
         surface, record = inputs[f"{role}_surface"], inputs["run_record"]
         maps, labels = inputs.get(f"{role}_depth_maps"), inputs.get("labels")
+        if role == "body" and surface.metric:
+            warn_of_misread_unit(surface, job)
         if maps is None:
             return {f"{role}_scan_report": scan_report(role, surface.metric, record)}
         if role == "garment" and labels is not None and len(labels.garment) == len(surface.vertices):

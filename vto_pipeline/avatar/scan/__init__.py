@@ -6,7 +6,7 @@ correspondence, registration: closest points; pose and shape by Gauss-Newton
 tangential_slide, bust_points, displacement, misfit_correlation: the last millimetres
 bind_pose: the result carried back, sound in both poses
 clothed, body_under_clothes: the body inside a dressed scan
-observed_uncertainty, unobserved_uncertainty: how sure each measurement is
+uncertainty/: how sure each measurement is
 report: how well the result explains the scan, and whether it is a body
 body_transfer: a body mesh of any topology carried along by its avatar
 """

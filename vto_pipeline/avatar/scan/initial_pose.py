@@ -15,9 +15,11 @@ from vto_pipeline.errors import AvatarError
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.job import Job
-from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.model.mesh import PointCloud, TriangleMesh
 
 _PROBES = 300
+_PLACE_M = 0.03
+"""One point of a cloud counts in each cube of this side [m]: clouds are denser at faces and hands."""
 _CAP_M = 0.15
 _SURELY_WHOLE_M, CHILD_M = 1.30, 0.80
 """A scan this tall is of a whole body; one less tall is of a child or of a part; a smaller one is of a part."""
@@ -107,13 +109,13 @@ def best_axis(scan: TriangleMesh) -> Upright | None:
     return None if best is None else best[1]
 
 
-def initial_poses(scan: TriangleMesh) -> list[InitialPose]:
+def initial_poses(scan: TriangleMesh | PointCloud) -> list[InitialPose]:
     """Return the best guess for each of four facings, best first.
 
     Args:
         scan: In metres, +Y up.
     """
-    probes, _, _ = sample_surface(scan, _PROBES, 0)
+    probes = _probes(scan)
     middle = probes.mean(axis=0)
     spread = (probes - middle)[:, [0, 2]]
     wide = np.linalg.eigh(spread.T @ spread)[1][:, -1]
@@ -121,6 +123,13 @@ def initial_poses(scan: TriangleMesh) -> list[InitialPose]:
     across = float(np.arctan2(-wide[1], wide[0]))
     found = [_best(probes, across + turn) for turn in (0.0, np.pi, np.pi / 2, -np.pi / 2)]
     return sorted(found, key=lambda start: start.score)
+
+
+def _probes(scan: TriangleMesh | PointCloud) -> FloatArray:
+    if isinstance(scan, TriangleMesh):
+        return sample_surface(scan, _PROBES, 0)[0]
+    _, kept = np.unique(np.floor(scan.points / _PLACE_M), axis=0, return_index=True)
+    return scan.points[np.random.default_rng(0).choice(kept, min(_PROBES, len(kept)), replace=False)]
 
 
 def _best(probes: FloatArray, yaw: float) -> InitialPose:

@@ -36,7 +36,7 @@ _STANDS_M, _REACH = 0.75, 1.2
 _ENDS = ("head", "wrist", "ankle")
 """Joints of a person's ends: the head, the hands and the feet."""
 _NO_END, _CROTCH_M = 0.05, 0.03
-_CUFF_M, _CUFFS = 0.15, 3
+_CUFF_M, CUFFS = 0.15, 3
 """Girth of what an arm or a neck goes through; a garment of the upper body has three: for the neck and both arms."""
 _STRAY = 0.25
 """Of a limb's surface: so much that lies elsewhere and faces inwards is that limb, inside out; some of it lies near."""
@@ -127,8 +127,8 @@ def refuse_garment(scan: TriangleMesh, space: ShapeSpace, vertices: FloatArray) 
     between_legs = closest_points(crotch, scan.vertices, scan.faces)[2][0] < _CROTCH_M
     if between_legs or any(_shown(scan, vertices[own]) > _NO_END for own in ends):
         return
-    cuffs = int((_rims(scan) > _CUFF_M).sum())
-    if cuffs >= _CUFFS:
+    cuffs = wide_openings(scan)
+    if cuffs >= CUFFS:
         raise AvatarError(
             "this looks like a garment, not a body: it shows neither crotch nor head, hands or feet, and is open in "
             f"{cuffs} places",
@@ -214,6 +214,11 @@ def _limbs(space: ShapeSpace) -> dict[str, NDArray[np.bool_]]:
         for side in ("left", "right")
         for limb, joints in {"arm": ("shoulder", "elbow"), "leg": ("hip", "knee")}.items()
     }
+
+
+def wide_openings(mesh: TriangleMesh) -> int:
+    """Return how many openings of a mesh in metres are wide enough for an arm or a neck."""
+    return int((_rims(mesh) > _CUFF_M).sum())
 
 
 def _rims(mesh: TriangleMesh) -> FloatArray:
