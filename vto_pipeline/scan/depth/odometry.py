@@ -122,11 +122,12 @@ def _without(
     out = [index for index, (was, now) in enumerate(zip(owner, left, strict=True)) if was is not None and now is None]
     if not out:
         return left
-    what = f"{len(out)} of {len(owner)} frames show surfaces where others see through; the first: {paths[out[0]].name}"
+    count, first = f"{len(out)} of {len(owner)} frames", paths[out[0]].name
     if left.count(None) > MOST_LOST * len(left):
         hint = "move the camera more slowly, and keep the garment in the middle of the picture"
-        raise ScanError(f"the path does not hold together: {what}", where=str(paths[0].parent), hint=hint)
-    job.warn(f"left out {what}")
+        problem = f"the path does not hold together: {count} show surfaces where others see through; the first: {first}"
+        raise ScanError(problem, where=str(paths[0].parent), hint=hint)
+    job.warn(f"left out {count} that were placed wrongly: others see through what they show; the first: {first}")
     return left
 
 
