@@ -1,5 +1,7 @@
 """The scan bench: what it reads off a garment whose faults are known, and how it ends what does not end."""
 
+import resource
+
 import numpy as np
 import pytest
 import trimesh
@@ -79,7 +81,12 @@ def test_a_refused_capture_is_a_row_with_its_exit_code(vase, tmp_path):
     ball = trimesh.creation.icosphere(subdivisions=2, radius=0.2)
     (tmp_path / "photos").mkdir()
     write_ply(tmp_path / "body.ply", TriangleMesh(ball.vertices, ball.faces))
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     row = scan_row(tmp_path, "photos", tmp_path / "runs" / "one", [], 600.0)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)  # the kernel's own count of all children together
+    busy = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     assert row["exit"] == 3
+    assert_allclose(row["cpu_s"], busy, rtol=0, atol=0.02)  # [s]; the kernel counts to a few milliseconds
+    assert busy > 0.2  # a run imports NumPy at least
     assert "median_mm" not in row
     assert "photos" in (tmp_path / "runs" / "one.log").read_text()

@@ -50,6 +50,7 @@ def scan_row(capture: Path, kind: str, folder: Path, settings: Sequence[str], li
         "kind": kind,
         "exit": ended.code,
         "seconds": ended.seconds,
+        "cpu_s": ended.cpu_seconds,
         "peak_mb": ended.peak_mb,
         "cameras_mm": _cameras_mm(capture / CAMERAS, folder / "out" / "cameras.json"),
         **found,

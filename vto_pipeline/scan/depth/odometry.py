@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 from scipy.spatial.transform import Rotation
 
@@ -16,7 +19,8 @@ from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.frames import DepthFrameSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.settings import Config
-from vto_pipeline.scan.depth.bundle import refine_together
+from vto_pipeline.scan.depth.bundle import choose_pairs, refine_together
+from vto_pipeline.scan.depth.contradiction import compare_frames, contradicted_share
 from vto_pipeline.scan.depth.pose_graph import Edge, disagreement, optimise_poses
 from vto_pipeline.scan.depth.rgbd_frame import RgbdFrame
 from vto_pipeline.scan.depth.tracker import MIN_READINGS, TrackedFrame, Tracker
@@ -31,6 +35,10 @@ LOOKED_BACK = 10
 
 MOST_LOST = 0.34
 """Share of the frames that may be left out."""
+
+MOST_AGAINST = 0.15
+"""A keyframe of whose points a larger share floats before what others see was placed wrongly: of six such, half or more
+did, of 46 others none."""
 
 
 class OdometryConfig(Config):
@@ -51,8 +59,9 @@ def estimate_trajectory(frames: DepthFrameSet, config: OdometryConfig, job: Job)
 
     Each frame is tracked to the last keyframe, and becomes one when it has moved on. Where the path comes back,
     keyframes far apart in time are tracked to each other, and a robust pose graph (Choi et al. 2015, in Open3D) closes
-    the loop; then all pairs of keyframes that see the same surface are aligned together. The other frames follow
-    their keyframes. In memory are the keyframes, made smaller, and few frames more.
+    the loop; then all pairs of keyframes that see the same surface are aligned together. Those that the others
+    contradict are left out. The other frames follow their keyframes. In memory are the keyframes, made smaller, and few
+    frames more.
 
     Args:
         frames: Depth and registered colour, in the order they were taken.
@@ -64,7 +73,7 @@ def estimate_trajectory(frames: DepthFrameSet, config: OdometryConfig, job: Job)
         out. Given poses are returned as they are, approximate ones refined.
 
     Raises:
-        ScanError: more than a third of the frames hold no readings or lost track.
+        ScanError: more than a third of the frames hold no readings, lost track, or are contradicted by others.
     """
     given = frames.world_from_cam
     if given is not None and not frames.poses_approximate:
@@ -75,12 +84,20 @@ def estimate_trajectory(frames: DepthFrameSet, config: OdometryConfig, job: Job)
         surfaces, start, owner = _tracked_path(tracker, config, job)
     else:
         surfaces, start, owner = _given_path(tracker, given, config, job)
-    bundle = refine_together(surfaces, start, np.radians(config.pair_deg), job)
+    widest = np.radians(config.pair_deg)
+    bundle = refine_together(surfaces, start, widest, job)
     path = bundle.world_from_cam
+    loops = _loops(path, config)
+    compared = compare_frames(surfaces, path, [*choose_pairs(path, widest), *loops], config.max_jump_mm / 1000)
+    wrong = contradicted_share(compared, len(surfaces)) > MOST_AGAINST
+    owner = _without(owner, wrong, frames.depth_paths, job)
+    agree = {(pair.one, pair.other) for pair in compared if pair.against <= MOST_AGAINST}
+    if given is None and agree.isdisjoint(loops):
+        job.warn("the path closes no loop: expect centimetres of drift; end the capture where it began")
     shift = np.linalg.norm(path[:, :3, 3] - start[:, :3, 3], axis=1)
     job.measure(
         frames=len(owner),
-        keyframes=len(surfaces),
+        keyframes=int(np.count_nonzero(~wrong)),
         pairs_refined=bundle.pairs,
         refined_by_mm=round(1000 * float(np.median(shift)), 3),
         last_step_mm=round(1000 * bundle.moved, 4),
@@ -88,8 +105,30 @@ def estimate_trajectory(frames: DepthFrameSet, config: OdometryConfig, job: Job)
     known = [k for k, place in enumerate(owner) if place is not None]
     poses = np.full((len(owner), 4, 4), np.nan)
     poses[known] = [path[place[0]] @ place[1] for place in owner if place is not None]
-    poses[known] = upright_from_scan(poses[known], _sample_points(surfaces, path)) @ poses[known]
+    seen = _sample_points([one for one, bad in zip(surfaces, wrong, strict=True) if not bad], path[~wrong])
+    poses[known] = upright_from_scan(poses[known], seen) @ poses[known]
     return poses
+
+
+def _without(
+    owner: list[Place | None], wrong: NDArray[np.bool_], paths: Sequence[Path], job: Job
+) -> list[Place | None]:
+    """Places of the frames without those that follow a keyframe that was placed wrongly, (K,).
+
+    Raises:
+        ScanError: too few are left.
+    """
+    left = [None if place is None or wrong[place[0]] else place for place in owner]
+    out = [index for index, (was, now) in enumerate(zip(owner, left, strict=True)) if was is not None and now is None]
+    if not out:
+        return left
+    count, first = f"{len(out)} of {len(owner)} frames", paths[out[0]].name
+    if left.count(None) > MOST_LOST * len(left):
+        hint = "move the camera more slowly, and keep the garment in the middle of the picture"
+        problem = f"the path does not hold together: {count} show surfaces where others see through; the first: {first}"
+        raise ScanError(problem, where=str(paths[0].parent), hint=hint)
+    job.warn(f"left out {count} that were placed wrongly: others see through what they show; the first: {first}")
+    return left
 
 
 def _given_path(
@@ -140,8 +179,6 @@ def _tracked_path(
     slid = sum(not edge.confirmed for edge in edges)
     if slid and colors:
         job.warn(f"{slid} of {len(edges)} steps have too few matched features: there, the path relies on shape alone")
-    if not loop_edges:
-        job.warn("the path closes no loop: expect centimetres of drift; end the capture where it began")
     return [key.surface for key in keyframes], path, owner
 
 
