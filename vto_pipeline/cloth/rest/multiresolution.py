@@ -82,16 +82,18 @@ def come_to_rest(
     return _CoarseToFine(garment, model, fabric, config, job).run(body, deadline)
 
 
-class _TooCoarseError(Exception):
-    """A mesh is too coarse for its layers to lie between one another and the body.
+class _TooCoarse(NamedTuple):
+    """Why a mesh is too coarse for its layers to lie between one another and the body.
 
     What is wedged there never comes to rest, and a finer mesh would begin with it.
+
+    Args:
+        why: What is wrong with it.
+        vertices: How many it has.
     """
 
-    def __init__(self, why: str, vertices: int) -> None:
-        super().__init__(why)
-        self.why = why
-        self.vertices = vertices
+    why: str
+    vertices: int
 
 
 class _CoarseToFine:
@@ -121,11 +123,10 @@ class _CoarseToFine:
         start, motion, fresh = garments[-1], body, True
         for level in range(len(self._coarser), 0, -1):
             now = time.perf_counter()
-            try:
-                found = self._rest_on(level, start, motion, now + _FIRST * (deadline - now), fresh=fresh)
-            except _TooCoarseError as error:
-                self._refuse_if_too_small(start, error.why)
-                self._job.leave_out(f"coming to rest on {error.vertices} vertices first", f"too coarse: {error.why}")
+            found = self._rest_on(level, start, motion, now + _FIRST * (deadline - now), fresh=fresh)
+            if isinstance(found, _TooCoarse):
+                self._refuse_if_too_small(start, found.why)
+                self._job.leave_out(f"coming to rest on {found.vertices} vertices first", f"too coarse: {found.why}")
                 start, motion, fresh = garments[level - 1], body, True
                 continue
             trace += found.settling.trace
@@ -140,12 +141,15 @@ class _CoarseToFine:
             start, fresh = Garment(TriangleMesh(there, finer.mesh.faces), finer.rest), False
             motion = MovingBody(body.keyframes[-1:], body.faces)
         reached = self._rest_on(0, start, motion, deadline, fresh=fresh)
+        assert isinstance(reached, RestOnMesh)  # only coarser ones are given up
         settling = reached.settling
         final = reached.phases.some(settling.state.positions)
         settling.trace = with_true_distances(trace + settling.trace, looks + settling.looks, final)
         return reached._replace(before=before)
 
-    def _rest_on(self, level: int, garment: Garment, body: MovingBody, deadline: float, *, fresh: bool) -> RestOnMesh:
+    def _rest_on(
+        self, level: int, garment: Garment, body: MovingBody, deadline: float, *, fresh: bool
+    ) -> RestOnMesh | _TooCoarse:
         """Return the garment at rest on one mesh: 0 is its own, the last the coarsest.
 
         Args:
@@ -154,9 +158,6 @@ class _CoarseToFine:
             body: What it lies on.
             deadline: `time.perf_counter` at which to stop settling.
             fresh: Whether it starts where the garment was given, not where a coarser mesh came to rest.
-
-        Raises:
-            _TooCoarseError: of a coarser mesh that is so.
         """
         model, config, job = self._model, self._config, self._job
         if level > 0:
@@ -174,7 +175,7 @@ class _CoarseToFine:
             except IntersectingError as error:
                 if level == 0:
                     raise
-                raise _TooCoarseError(error.problem, len(model.mass)) from error
+                return _TooCoarse(error.problem, len(model.mass))
             put_on = len(job.warnings)
             state = phases.resolve_crossings(grown, first)
         cloth = TriangleMesh(state.positions, model.faces)
@@ -187,14 +188,14 @@ class _CoarseToFine:
         except IntersectingError as error:
             if level == 0:
                 raise
-            raise _TooCoarseError(error.problem, len(model.mass)) from error
+            return _TooCoarse(error.problem, len(model.mass))
         before = time.perf_counter() - self._began
         if level > 0:
             cut = fresh and phases.crossings_left > 0  # else corners that are left in the body are a finer mesh's
             settling = phases.settle_and_clear(state, stepper, body.final, deadline, (ROUGH,), clears=cut)
             lies = TriangleMesh(settling.state.positions, model.faces)
             if cut and len(left := intersecting_faces(lies, body.final)) > 0:
-                raise _TooCoarseError(f"{len(left)} pairs of triangles still intersect", len(model.mass))
+                return _TooCoarse(f"{len(left)} pairs of triangles still intersect", len(model.mass))
         else:
             softer = phases.stepper(self._soft(garment, config), collider, config.damping)
             settling = _by_softer_threads(phases, softer, stepper, state, body.final, deadline)
@@ -203,7 +204,7 @@ class _CoarseToFine:
         if level > 0 and (settling.jammed or settling.caught):
             weights = f"with forces of {settling.residual:.0f} times the weight"
             what = "it is caught in the body" if settling.caught else "its layers are jammed"
-            raise _TooCoarseError(f"{what}, {weights}", len(model.mass))
+            return _TooCoarse(f"{what}, {weights}", len(model.mass))
         settling.trace = [replace(row, seconds=before + row.seconds, level=level) for row in settling.trace]
         if level > 0:  # how it was put on is done but once; what else matters in the end warns again
             self._job.warnings += job.warnings[untangled:put_on]
