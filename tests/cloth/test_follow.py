@@ -10,7 +10,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from vto_pipeline.cloth import MeshCollider, simulate
 from vto_pipeline.cloth.model.build import build_cloth
-from vto_pipeline.cloth.moving import frame as frame_of_cloth
 from vto_pipeline.cloth.moving.config import FollowConfig
 from vto_pipeline.cloth.moving.follow import follow
 from vto_pipeline.cloth.moving.frame import FrameStepper
@@ -121,9 +120,8 @@ def test_skin_that_had_to_be_thicker_thins_out_as_the_body_moves_on(cap, speed, 
     assert_allclose(stepper.now.skin - thin, left * 1e-3, rtol=1e-9)
 
 
-@pytest.mark.parametrize("attempts", [1, 8])
-def test_a_spike_that_no_attempt_gets_cloth_over_leaves_it_clear_of_the_body(cap, attempts):
-    """Contacts are held at vertices; a spike grows through the middle of a triangle. Cloth is soon moved off it."""
+def test_a_spike_that_no_attempt_gets_cloth_over_leaves_it_clear_of_the_body(cap):
+    """Contacts are held at vertices; a spike grows through the middle of a triangle, and there is but one attempt."""
     middle = cap.mesh.vertices[cap.mesh.faces].mean(axis=1)
     above = middle[np.argmax(middle[:, 1])]
     tip = np.argmin(np.linalg.norm(ball(RADIUS, levels=3).vertices - RADIUS / np.linalg.norm(above) * above, axis=1))
@@ -132,8 +130,7 @@ def test_a_spike_that_no_attempt_gets_cloth_over_leaves_it_clear_of_the_body(cap
         return np.where(np.arange(len(x))[:, None] == tip, x + min(10.0 * t, 1.0) * (1.1 * above - x[tip]), x)
 
     way = path(grown, 0.2)
-    motion, found = follow(cap, way, cloth(), {"attempts": attempts})
-    assert max(frame["attempts"] for frame in found["per_frame"]) == min(attempts, 2)
+    motion, found = follow(cap, way, cloth(), {"attempts": 1})
     bodies = [TriangleMesh(way.at(way.time(k)), way.faces) for k in range(way.frames)]
     sheets = [TriangleMesh(frame, motion.faces) for frame in motion.frames]
     assert crosses(sheets[0], bodies[-1])  # it is in the way
@@ -155,30 +152,6 @@ def test_a_frame_with_cloth_in_skin_that_gave_way_though_it_was_free_is_tried_ag
     assert_array_equal(thicker, np.sort(cap.mesh.faces[0]))
     assert stepper.go_to(2).attempts == 2
     assert not answers
-
-
-def test_what_was_untangled_has_a_thicker_skin_in_the_next_frame(cap, monkeypatch):
-    """By a millimetre for each of both attempts that met the body, so that the next frame is clean at once."""
-    still = path(lambda t, x: x, 0.2)
-    stepper = FrameStepper(build_cloth(cap.mesh, cap.rest, cloth()), cap, still, cloth(), FollowConfig(), Job())
-    monkeypatch.setattr(frame_of_cloth, "intersecting_faces", lambda *_: np.array([[0, 0]], np.int32))
-    before = stepper.now.skin.copy()
-    assert stepper.go_to(1).attempts == 2
-    thicker = np.zeros(len(before))
-    thicker[cap.mesh.faces[0]] = 2e-3
-    assert_allclose(stepper.now.skin - before, thicker, rtol=0, atol=1e-9)
-
-
-@pytest.mark.parametrize(("own", "attempts"), [(0, 3), (5, 2)])
-def test_a_body_through_itself_is_no_reason_for_many_attempts_at_its_posed_skin(cap, monkeypatch, own, attempts):
-    still = path(lambda t, x: x, 0.2)
-    stepper = FrameStepper(build_cloth(cap.mesh, cap.rest, cloth()), cap, still, cloth(), FollowConfig(), Job())
-    pairs = np.array([[0, 0], [1, 0]], np.int32)
-    answers = [pairs, pairs[:1], pairs[:0]]
-    monkeypatch.setattr(stepper.body, "crossing_with_room", lambda *_: answers.pop(0))
-    monkeypatch.setattr(stepper.body, "own_crossings", lambda _: own)
-    assert stepper.go_to(1).attempts == attempts
-    assert len(answers) == 3 - attempts
 
 
 def test_half_the_step_gives_the_same_motion(cap):

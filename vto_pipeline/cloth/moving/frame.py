@@ -43,8 +43,6 @@ from vto_pipeline.model.motion import BodyPath
 _THINS_S = 0.5  # s in which the skin loses half of what it is thicker by,
 _PACE_M_S = 0.2  # while the body moves as fast; more slowly where it is slower: held, it needs what it needed
 _CLEAR_M = 5e-4  # from the body, of what is untangled
-_TRIED = 2  # attempts: what meets the body in later ones is untangled from it, and where that passes through itself
-# as posed, no more are made for the sake of its posed skin, which no cloth can keep out of everywhere
 _FINER = 2  # times as many steps where the cloth overstretches
 
 
@@ -157,9 +155,8 @@ class FrameStepper:
     def go_to(self, frame: int) -> Reached:
         """Take the garment from one frame to the next, this one, where `now` then is.
 
-        What still meets the body after some attempts is untangled from it, and has a thicker skin in the next frame.
-        The attempt with the fewest crossings is kept. Where all of them overstretch the cloth or blow it up, it stays
-        where it was, and `why` says so.
+        Where no attempt is clean, the one with the fewest crossings is untangled from the body. Where all of them
+        overstretch the cloth or blow it up, it stays where it was, and `why` says so.
         """
         time = self._path.time(frame)
         begin, body = self.now, self.body_at(time)
@@ -183,56 +180,33 @@ class FrameStepper:
             if stretch > self._stretched:
                 why, substeps = f"an edge has {1.0 + stretch:.1f} times its length at rest", self._finer(substeps)
                 continue
-            meeting = np.unique(self._model.faces[np.concatenate([crossing, in_posed])[:, 0]])
-            thicker = thickened(skin, meeting, state.positions, body) if len(meeting) > 0 else skin
-            frees = attempt >= _TRIED and len(crossing) > 0
-            thinner = self._skin + left * ((thicker if frees else skin) - self._skin)
-            moment = Moment(state, thinner, self._stepper.contact_memory, self._collider.recollection)
-            if frees:
-                moment, crossing, in_posed = self._freed(moment, crossing, in_posed, frame)
             count = len(crossing), len(in_posed)
             better = best is None or count < best[0]
             if better:
-                best = count, moment, Reached(crossing, self._stepper.steps - taken, attempt)
-            pressed = attempt >= _TRIED and self.body.own_crossings(frame) > 0
-            if count == (0, 0) or (count[0] == 0 and (pressed or not better)):
+                thinner = self._skin + left * (skin - self._skin)
+                moment = Moment(state, thinner, self._stepper.contact_memory, self._collider.recollection)
+                reached = Reached(crossing, self._stepper.steps - taken, attempt)
+                best = count, moment, reached
+            if count == (0, 0) or (count[0] == 0 and not better):
                 break
-            if np.array_equal(thicker, skin):  # no room: the next attempt would be this one again
+            before, meeting = skin, self._model.faces[np.concatenate([crossing, in_posed])[:, 0]]
+            skin = thickened(before, np.unique(meeting), state.positions, body)
+            if np.array_equal(skin, before):  # no room: the next attempt would be this one again
                 break
-            skin = thicker
         if best is None:
             self.now = begin
             return Reached(np.empty((0, 2), np.int32), 0, tried, why)
         _, self.now, reached = best
-        if len(reached.crossing) > 0 and reached.attempts < _TRIED:
-            self.now, crossing, _ = self._freed(self.now, reached.crossing, self._in_posed(self.now, frame), frame)
-            reached = reached._replace(crossing=crossing)
+        if len(reached.crossing) > 0:
+            reached = reached._replace(crossing=self._untangled(body))
         return reached._replace(attempts=tried)
 
-    def _in_posed(self, moment: Moment, frame: int) -> IntArray:
-        return self.body.crossing_with_room(TriangleMesh(moment.state.positions, self._model.faces), frame)
-
-    def _freed(
-        self, moment: Moment, crossing: IntArray, in_posed: IntArray, frame: int
-    ) -> tuple[Moment, IntArray, IntArray]:
-        """Move the cloth out of the body, as little as needed; it keeps its speed.
-
-        Args:
-            moment: What crosses the body.
-            crossing, in_posed: Pairs of triangles that meet the body, and the skin as posed where that is free.
-            frame: Which.
-
-        Returns:
-            The moment and its pairs; those given where that stretches the cloth, crosses it, or leaves as many.
-        """
-        state, faces = moment.state, self._model.faces
-        body = self.body_at(self._path.time(frame))
-        found = untangle(state.positions, faces, body=body, thickness=_CLEAR_M)
-        stretch = float(stretch_of_edges(TriangleMesh(found.positions, faces), self.natural).max(initial=0.0))
-        if len(found.body_pairs) >= len(crossing) or len(found.pairs) > 0 or stretch > self._stretched:
-            return moment, crossing, in_posed
-        moved = moment._replace(state=replace(state, positions=found.positions))
-        return moved, found.body_pairs, self._in_posed(moved, frame)
+    def _untangled(self, body: TriangleMesh) -> IntArray:
+        """Move the cloth out of the body, as little as needed, and keep its speed; return what still meets (K, 2)."""
+        state = self.now.state
+        found = untangle(state.positions, self._model.faces, body=body, thickness=_CLEAR_M)
+        self.now = self.now._replace(state=replace(state, positions=found.positions))
+        return found.body_pairs
 
     def _finer(self, substeps: float) -> float:
         return min(_FINER * substeps, max(self._config.finest, substeps))

@@ -91,8 +91,9 @@ class LiveCloth:
         self.deepest = max(self.deepest, self._body.depth)
         self._state = self._solver.advance(self._state, contacts, seconds, 1)
         self._body.arrive()
-        self._state = replace(self._state, positions=self._body.led_out(self.positions))
-        if not self._is_near(vertices):
+        if self._is_near(vertices):
+            self._state = replace(self._state, positions=self._body.led_out(self.positions))
+        else:
             self.restarts += 1
             self._lay_on(TriangleMesh(vertices, self._faces), apply(self._laid, vertices))
 
