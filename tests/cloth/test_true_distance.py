@@ -56,8 +56,8 @@ def test_a_drape_knows_how_far_each_look_was(monkeypatch):
         states[len(after.positions), stepper.steps] = after.positions
         return after
 
-    def noted(garment, vertices):
-        coarser.append(coarsen(garment, vertices))
+    def noted(*given):
+        coarser.append(coarsen(*given))
         return coarser[-1]
 
     monkeypatch.setattr(Stepper, "run", kept)
