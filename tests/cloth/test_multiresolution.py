@@ -164,6 +164,14 @@ def test_what_is_too_small_and_jams_on_a_coarse_mesh_is_refused_there(monkeypatc
     assert (info.value.partial["draped"].vertices == put_on.vertices).all()
 
 
+def test_what_is_worn_stretched_and_jams_on_a_coarse_mesh_is_not_refused(monkeypatch):
+    """Snug cloth is stretched where it was scanned; none was enlarged to get the body into it."""
+    jam_on_coarse_meshes(monkeypatch)
+    snug, job = Garment(vest(), RestShape(vest().vertices / 1.1)), Job()
+    drape(snug, pear(), fabric(), {"settle_seconds": 0.1, "coarsen_above": 1000, "place": "as_it_stands"}, job)
+    assert any("jammed" in why for _, why in job.left_out)
+
+
 def test_where_a_coarse_mesh_jams_the_next_starts_where_the_garment_was_given(monkeypatch):
     job = Job()
     settings = {"settle_seconds": 0.1}

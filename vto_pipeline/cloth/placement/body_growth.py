@@ -153,7 +153,7 @@ def _freed(growth: BodyGrowth, thickness: float) -> BodyGrowth:
     if not _enclosed(growth.garment, full).any():  # it would be put beside the body
         return growth
     is_worn = _still_worn(growth.garment, full)
-    for steps in filter(lambda steps: steps < growth.thinned, _FREED_AFTER):
+    for steps in (steps for steps in _FREED_AFTER if steps < growth.thinned):
         body = growth.thinning.after(steps)
         start = find_collision_free_start(x, faces, x, thickness, Job(), body)
         if start.crossings_left > 0 or edge_stretches(start.positions, x, faces).max() > OVERSTRETCHED:

@@ -23,7 +23,7 @@ from vto_pipeline.cloth.model.build import ClothModel, ClothState, at_rest, buil
 from vto_pipeline.cloth.model.coarsening import CoarseGarment, coarsen
 from vto_pipeline.cloth.placement.clear_body import edge_stretches
 from vto_pipeline.cloth.rest.convergence import SettlingResult, rms
-from vto_pipeline.cloth.rest.phases import ENLARGED, ROUGH, Phases
+from vto_pipeline.cloth.rest.phases import ROUGH, Phases
 from vto_pipeline.cloth.rest.softened import softened
 from vto_pipeline.cloth.rest.true_distance import some_positions, with_true_distances
 from vto_pipeline.cloth.simulation import default_skin
@@ -39,6 +39,9 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 _FEWER = 4  # times fewer vertices on the next coarser mesh: edges twice as long
 _LONGEST = 0.03  # m: of longer edges, layers about an arm cannot lie clear of it and of each other
+_ENLARGED = (
+    1.15  # times its size: a place is found for it a fifth larger, or more; what is worn snugly is stretched less
+)
 _FIRST = 0.5  # of the progress, and of the time there is: the coarser meshes
 
 
@@ -125,7 +128,7 @@ class _CoarseToFine:
             now = time.perf_counter()
             found = self._rest_on(level, start, motion, now + _FIRST * (deadline - now), fresh=fresh)
             if isinstance(found, _TooCoarse):
-                self._refuse_if_too_small(start, found.why)
+                self._refuse_if_too_small(found.why)
                 self._job.leave_out(f"coming to rest on {found.vertices} vertices first", f"too coarse: {found.why}")
                 start, motion, fresh = garments[level - 1], body, True
                 continue
@@ -253,18 +256,19 @@ class _CoarseToFine:
             positions = coarse.prolong(positions)
         return some_positions(len(self._model.mass))(positions)
 
-    def _refuse_if_too_small(self, garment: Garment, why: str) -> None:
+    def _refuse_if_too_small(self, why: str) -> None:
         """Raise an error if a garment that failed on a coarser mesh was put in its place in another size than its own.
 
         Cloth that is drawn so far about a body passes through it at its first chance: a finer mesh takes minutes to
         find the same.
         """
-        times = float(np.median(edge_stretches(garment.mesh.vertices, garment.rest.positions, garment.mesh.faces)))
-        if times > ENLARGED:
+        mesh, rest = self._garment.mesh, self._garment.rest.positions
+        times = float(np.median(edge_stretches(mesh.vertices, rest, mesh.faces)))
+        if times > _ENLARGED:
             raise IntersectingError(
                 f"too small: this body needs the garment {times - 1:.0%} larger, and on a coarser mesh {why}",
                 hint="give a larger size, or a body that it is meant for",
-                partial={"draped": self._garment.mesh},
+                partial={"draped": mesh},
             )
 
     def _part(self, level: int) -> Job:

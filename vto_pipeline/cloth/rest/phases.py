@@ -40,11 +40,9 @@ In place, to see where it lies across the body before it goes on; roughly, for a
 What is in place has forces of ten times its weight while wrinkles snap here and there: the exact stiffness of the last
 steps is faster at ending that."""
 
-ENLARGED = 1.02
-"""Times its size: what starts so was enlarged, not just bent."""
-
 _GROWING = "growing the body inside the garment"
 _TURNS = 5  # of coming to rest and being cleared
+_LARGER = 1.02  # times its size: what starts so was enlarged, not just bent
 _LONG = 0.5  # steps per 1/60 s on the way to rest: backward Euler takes the more motion out, the longer they are
 _CALM = 20.0  # 1/s: velocities fade this fast while the body grows, where the way does not matter
 
@@ -152,7 +150,7 @@ class Phases:
         """
         faces = self._model.faces
         times = float(np.median(edge_stretches(growth.garment.vertices, self._rest.positions, faces)))
-        if times > ENLARGED:
+        if times > _LARGER:
             growth = growth.from_smaller(times)
         thin = TriangleMesh(growth.body.keyframes[0], growth.body.faces)
         state = self.resolve_crossings(at_rest(growth.garment.vertices), thin)
