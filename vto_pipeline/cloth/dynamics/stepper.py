@@ -31,7 +31,7 @@ from vto_pipeline.cloth.dynamics.residual import relative_residual
 from vto_pipeline.cloth.integrators import INTEGRATORS
 from vto_pipeline.cloth.integrators.integrator import Integrator
 from vto_pipeline.cloth.model.build import ClothModel, ClothState
-from vto_pipeline.cloth.solvers.newton import Newton
+from vto_pipeline.cloth.solvers.newton import Limits, Newton
 from vto_pipeline.errors import ConfigError, DivergedError
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.settings import Config
@@ -197,7 +197,7 @@ class Stepper:
         x, still = state.positions, np.zeros_like(state.positions)
         pairs = no_pairs() if self.self_contact is None else self.self_contact.find_pairs(x, x, FRAME)
         mass = self._model.inverse_mass
-        touched = active_set(self._contacts, pairs, 0.0, 1.0, mass, x, still, still, self.contact_memory)
+        touched = active_set(self._contacts, pairs, 0.0, 1.0, mass, x, still, self.contact_memory)
         return relative_residual(self._model, x, touched)
 
     @property
@@ -254,9 +254,13 @@ class Stepper:
         return isinstance(self._method, Newton) and self._method.can_use_exact_stiffness
 
     def use_exact_stiffness(self, on: bool) -> None:
-        """Let steps use the exact stiffness from now on, or no longer; after `prepare`."""
+        """Let steps use the exact stiffness from now on, or no longer; after `prepare`.
+
+        They take one iteration each: near rest it is the end that matters, not the way there.
+        """
         if isinstance(self._method, Newton):
             self._method.exact = on
+            self._method.limits = Limits(iterations=1) if on else Limits()
 
     @property
     def was_positive_definite(self) -> bool:

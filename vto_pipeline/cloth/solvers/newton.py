@@ -51,7 +51,7 @@ _SHORTEST = 1e-10  # share of a Newton step: from a point, cloth begins to grow 
 _ROUNDING = 1e-9  # relative change of the objective that is no change
 _CHANGED = 0.05  # of the contact forces: amiss by less, their set is good enough
 _FEW = 4.0  # contacts' mean force, amiss: with more, what lies on a fine mesh breaks loose in the next step
-_HARDLY = 0.04  # the same with the exact stiffness: a tight garment's contacts bear a hundred times its weight
+_HARDLY = 0.4  # the same with the exact stiffness: a tight garment's contacts bear a hundred times its weight
 _CROSSED = 0.01  # of an edge: how far a plane may be crossed without solving again
 
 
@@ -162,8 +162,7 @@ class Newton:
         target = x + move + (~held)[:, None] * (h * h * model.gravity)
         itself = self.self_contact
         pairs = no_pairs() if itself is None else itself.find_pairs(start, target, h, move)
-        guess, mass = target - start, model.inverse_mass
-        self.active = active_set(contacts, pairs, t0, t1, mass, start, guess, move, self.active)
+        self.active = active_set(contacts, pairs, t0, t1, model.inverse_mass, start, move, self.active)
         if led.any():  # what they pull at their neighbours by being led is no measure
             forces = model.mass[:, None] * model.gravity
             add_forces(start, model.constraints, forces)

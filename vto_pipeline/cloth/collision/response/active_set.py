@@ -23,6 +23,7 @@ from vto_pipeline.cloth.collision.response.plane_motion import plane_at
 from vto_pipeline.numerics.vector import axpy, dot, load, store
 
 _PAIRS = np.int64(1) << 40  # keys from here on are of pairs, those under it of planes
+_LYING = 1e-4  # m: what is nearer than this to something that it has not touched yet begins to push
 
 
 class ActiveSet(NamedTuple):
@@ -95,7 +96,7 @@ def no_contacts(count):
 
 
 @njit(cache=True, error_model="numpy")
-def active_set(contacts, pairs, t0, t1, inverse_mass, x, guess, drift, before):
+def active_set(contacts, pairs, t0, t1, inverse_mass, x, drift, before):
     """Return the contacts where they are at the end of a step, with a guess which of them push.
 
     Args:
@@ -104,8 +105,8 @@ def active_set(contacts, pairs, t0, t1, inverse_mass, x, guess, drift, before):
         t0, t1: Begin and end of the step as shares of the span.
         inverse_mass: [1/kg], shape (V,).
         x: Positions at the start [m], shape (V, 3).
-        guess: How far vertices would go by themselves [m], shape (V, 3).
-        drift: How far by their speed alone [m], shape (V, 3): cloth may hold what would else fall.
+        drift: How far vertices go by their speed alone [m], shape (V, 3). In a long step they would fall much farther,
+            were they free; but cloth holds most, and a contact guessed wrongly draws it to what it is far away from.
         before: The active set of the last step.
     """
     found = no_contacts(np.sum(contacts.active) + len(pairs.key))
@@ -126,7 +127,7 @@ def active_set(contacts, pairs, t0, t1, inverse_mass, x, guess, drift, before):
         _fill_from_pair(found, count, pairs, p)
         count += 1
     for c in range(count):
-        _warm_start(found, c, before, x, guess, drift)
+        _warm_start(found, c, before, x, drift)
     return _subset(found, np.arange(count))
 
 
@@ -153,7 +154,7 @@ def _new_contacts(pairs, places, contacts, x, guess):
     found = no_contacts(len(places))
     for c in range(len(places)):
         _fill_from_pair(found, c, pairs, places[c])
-        _warm_start(found, c, contacts, x, guess, guess)
+        _warm_start(found, c, contacts, x, guess)
     return found
 
 
@@ -192,20 +193,20 @@ def _subset(contacts, places):
 
 
 @njit(cache=True, error_model="numpy")
-def _warm_start(found, c, before, x, guess, drift):
+def _warm_start(found, c, before, x, way):
     """Guess whether contact c pushes and slides: as in the last step, or where its vertices are going."""
     n = load(found.normal, c)
     place = np.searchsorted(before.key, found.key[c])
-    pushed, way = False, guess
+    pushed, near = False, _LYING
     if place < len(before.key) and before.key[place] == found.key[c]:
-        pushed, way = before.pushing[place], drift
+        pushed, near = before.pushing[place], 0.0
         found.force[c], found.sliding[c] = before.force[place], before.sliding[place]
         store(found.trial, c, tangential(n, load(before.trial, place)))  # the normal has turned since
         store(found.initial_friction, c, tangential(n, load(before.friction_force, place)))
         store(found.friction_force, c, load(found.initial_friction, c))
     found.sliding[c] |= found.force[c] == 0.0  # how hard it will push, and so rub, is not known
     reached = dot(n, sum_at(found, c, x)) + dot(n, sum_at(found, c, way))
-    found.pushing[c] = reached < found.level[c] or pushed
+    found.pushing[c] = reached < found.level[c] + near or pushed
 
 
 @njit(cache=True, error_model="numpy")
