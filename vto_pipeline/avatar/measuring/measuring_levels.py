@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import gaussian_filter1d
-from scipy.signal import find_peaks
 from scipy.spatial import ConvexHull
 
 from vto_pipeline.avatar.model.shape import ShapeSpace
@@ -226,6 +225,8 @@ def _value(points: FloatArray, extreme: str) -> float:
 
 def _peak(at: FloatArray, value: FloatArray, level: MeasuringLevel) -> float | None:
     """Return where the highest prominent maximum of the smoothed profile lies, within reach; None if there is none."""
+    from scipy.signal import find_peaks
+
     smooth = gaussian_filter1d(value, level.width / _STEP_M, mode="nearest")
     inner = find_peaks(smooth, prominence=level.prominence)[0]
     inner = inner[np.abs(at[inner] - at.mean()) <= level.reach]

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from vto_pipeline.avatar.motion.soles import sole_points
@@ -92,6 +91,8 @@ def zero_moment_point(parts: FloatArray, masses: FloatArray, frame_time: float) 
         frame_time: [s].
     """
     if len(parts) > 30 and 1.0 / frame_time > 2.2 * _CUT_OFF_HZ:
+        from scipy.signal import butter, sosfiltfilt
+
         parts = sosfiltfilt(butter(4, _CUT_OFF_HZ, fs=1.0 / frame_time, output="sos"), parts, axis=0)
     speed = np.gradient(parts, frame_time, axis=0) if len(parts) > 2 else np.zeros_like(parts)
     pull = np.gradient(speed, frame_time, axis=0) if len(parts) > 2 else np.zeros_like(parts)

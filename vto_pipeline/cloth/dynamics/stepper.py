@@ -169,7 +169,7 @@ class Stepper:
             self._method.self_contact = self.self_contact
 
     def run(self, state: ClothState, seconds: float) -> ClothState:
-        """Return the state after so much simulated time [s]; earlier where it is `out_of_time`.
+        """Return the state after so much simulated time [s]; earlier where it is `out_of_time`, or no step is to be had.
 
         Raises:
             DivergedError: a position is no longer finite.
@@ -181,10 +181,12 @@ class Stepper:
             h = seconds / left
         while left > 0 and not self.out_of_time:
             began = time.perf_counter()
-            count = min(left, self._steps_per_span(state, h))
+            count, taken = min(left, self._steps_per_span(state, h)), self.steps
             state = self._advance_span(state, h, count)
             left -= count
             self._last_took = time.perf_counter() - began
+            if self.steps < taken + count:
+                break
         return state
 
     @property
@@ -256,7 +258,8 @@ class Stepper:
     def use_exact_stiffness(self, on: bool) -> None:
         """Let steps use the exact stiffness from now on, or no longer; after `prepare`.
 
-        They take one iteration each: near rest it is the end that matters, not the way there.
+        They take one iteration each: near rest it is the end that matters, not the way there. A run ends before a step
+        whose system is not positive definite.
         """
         if isinstance(self._method, Newton):
             self._method.exact = on
@@ -293,7 +296,7 @@ class Stepper:
         if self._pins is not None:
             state = self._with_pins_moved(state, self._pins, count * h)
         after = self._method.advance(state, self._contacts, h, count)
-        self.steps += count
+        self.steps += round((after.time - before.time) / h)
         self.contact_spans += 1
         self._refuse_divergence(after)
         if self.self_contact is not None and not isinstance(self._method, Newton):

@@ -9,7 +9,8 @@ from vto_pipeline.cloth.dynamics.stepper import Stepper
 
 LOOK = 0.1  # s of cloth time between looks
 LONGEST = 1.0  # s: inertia holds nothing back in a step of that length that cloth still waits for
-_LONGER = 4.0  # times, the next step while the system is positive definite
+_LONGER = 4.0  # times, the next step while the system is positive definite, at most
+_FORGOTTEN = 2.0  # times, after each step that was: the length from which on it is not changes with the cloth
 _ASIDE = 10.0  # times the left-over force at its begin, at first: what is soft comes first, at the expense of the stiff
 _FALLS = 0.5  # times that after each look
 _SLIGHT = 0.1  # of the left-over force that is enough: less is no sign of going astray
@@ -30,7 +31,10 @@ class StableNewtonSteps:
     grow so where it falls out of a place it was not stable in, and stays at, all but still, with the usual stiffness.
 
     Where the system is not positive definite in steps as long as usual, they are shorter until it is. The usual
-    stiffness leaves out what makes cloth buckle: with it, a fold that is about to only creeps, and never comes to rest.
+    stiffness leaves out what makes cloth buckle: with it, a fold that is about to only creeps, and may even come to
+    stand on its saddle. The nearer a step is to the length from which on there is no definite system, the farther it
+    goes along the mode that buckles. So that length is bracketed: each try is the geometric mean of what did and did
+    not, and what did is kept meanwhile. A step that fails is not taken, and costs little.
     Where it is not in the shortest ones either, as in cloth that buckles within an edge, time would stand still: so the
     usual stiffness goes on for a while. So it does where short steps snap cloth into a place that it is torn out of.
 
@@ -53,6 +57,7 @@ class StableNewtonSteps:
         self._enough = enough
         self._most = self._before = np.inf
         self._tried = False
+        self._did, self._failed = np.inf, np.inf  # s: lengths of steps with and without a definite system, of late
         self._wait, self._pause = 0, _PAUSE
 
     @property
@@ -81,7 +86,7 @@ class StableNewtonSteps:
         strays = stable and steps < self._usual and residual > self._most and not self._stands(moved)
         tears = not stable and steps > self._usual and residual > max(_TORN, _ASIDE * self._before)
         if strays:
-            self._shorten()
+            self._shorten(self._usual)
         elif tears:
             self._give_up()
         else:
@@ -107,10 +112,10 @@ class StableNewtonSteps:
         elif stepper.was_positive_definite:
             self._most = max(_FALLS * self._most, _SLIGHT * self._enough)
             if residual < self._enough or stands or stepper.substeps > self._usual:
-                stepper.substeps = max(stepper.substeps / _LONGER, FRAME / LONGEST)
+                self._lengthen()
         elif stepper.substeps < self._usual:
             self.indefinite_step = min(self.indefinite_step, stepper.step)
-            self._shorten()
+            self._shorten(self._usual)
         else:
             self._most = _ASIDE * max(residual, _SLIGHT * self._enough)
             if self._tried and stepper.substeps >= _SHORTER * self._usual:  # not even so: there is no end to that way
@@ -119,7 +124,7 @@ class StableNewtonSteps:
             if not near:
                 stepper.substeps = self._usual
             elif self._tried:
-                stepper.substeps = min(_LONGER * stepper.substeps, _SHORTER * self._usual)
+                self._shorten(_SHORTER * self._usual)
             self._tried = near
             stepper.use_exact_stiffness(near)
 
@@ -136,9 +141,18 @@ class StableNewtonSteps:
         self._tried = False
         self.end()
 
-    def _shorten(self) -> None:
-        self._stepper.substeps = min(_LONGER * self._stepper.substeps, self._usual)
-        self._stepper.use_exact_stiffness(True)
+    def _lengthen(self) -> None:
+        step = self._stepper.step
+        self._did = step
+        self._failed = self._failed * _FORGOTTEN if self._failed > step else np.inf
+        self._stepper.substeps = FRAME / min(_LONGER * step, np.sqrt(step * self._failed), LONGEST)
+
+    def _shorten(self, most: float) -> None:
+        """Let steps be as long as those that last did, or some times shorter, with `most` steps per 1/60 s at most."""
+        step = self._stepper.step
+        self._failed = step
+        shorter = step / _LONGER
+        self._stepper.substeps = min(FRAME / (max(shorter, self._did) if self._did < step else shorter), most)
 
     def end(self) -> None:
         """Go back to the usual steps."""

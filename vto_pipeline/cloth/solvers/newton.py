@@ -98,7 +98,8 @@ class Newton:
 
     Attributes:
         self_contact: What keeps the cloth from itself, if anything; may be set between runs.
-        exact: Whether steps use the exact stiffness, until the system is not positive definite with it; may be set.
+        exact: Whether steps use the exact stiffness, and are taken only where all systems are positive definite with it;
+            may be set.
         definite: Whether all systems of the last step were, with the exact stiffness.
         active: The contacts of the last step, and the forces they bore.
         limits: Of a step; may be lowered where its time is short.
@@ -130,7 +131,8 @@ class Newton:
     def advance(self, state: ClothState, contacts: Contacts, h: float, substeps: int) -> ClothState:
         """Return the state after `substeps` steps of h [s]. The contacts hold for their whole span.
 
-        Held vertices go on with the velocity they have.
+        Held vertices go on with the velocity they have. A step that would need the exact stiffness and has no system
+        that is positive definite is not taken, nor are those after it.
 
         Raises:
             ConfigError: a constraint is rigid.
@@ -143,7 +145,8 @@ class Newton:
         for step in range(substeps):
             if self.self_contact is not None:
                 self.self_contact.set_time_span(state.time + step * h, state.time + (step + 1) * h)
-            self._step(x, v, contacts, step / substeps, (step + 1) / substeps, h)
+            if not self._step(x, v, contacts, step / substeps, (step + 1) / substeps, h):
+                return ClothState(x, v, state.time + step * h, copy_sliders(self._model))
         return ClothState(x, v, state.time + substeps * h, copy_sliders(self._model))
 
     @property
@@ -151,9 +154,10 @@ class Newton:
         """How many contacts pushed in the last step."""
         return int(self.active.pushing.sum())
 
-    def _step(self, x: FloatArray, v: FloatArray, contacts: Contacts, t0: float, t1: float, h: float) -> None:
+    def _step(self, x: FloatArray, v: FloatArray, contacts: Contacts, t0: float, t1: float, h: float) -> bool:
+        """Take a step, in place; return whether it was taken, else all is as it was."""
         model, held = self._model, self._held
-        start = x.copy()
+        start, known = x.copy(), self.active
         self.definite = self.exact
         move = (h * exp(-self._damping * h)) * v
         move[held] = 0.0
@@ -171,12 +175,15 @@ class Newton:
         first = self._iterate(x, x, target, move, h, measured=bool(led.any()))
         if not led.any():  # else it is mostly what the led vertices have pulled at their neighbours
             self._allowed = max(self._allowed, _BENT * h * first.fall)
-        if first.share == 1.0 or first.foreseen < _SLIGHT * self._allowed:
+        if first.share == 1.0 or first.foreseen < _SLIGHT * self._allowed or self.exact:
             done = self._descend(x, target, h, first)
         else:  # the way there is curved: begin at its other end, and take the lower of the two
             done = self._descend(x, target, h, self._iterate(x, target, target, np.zeros_like(x), h))
             if done.share < 1.0 or done.left > first.left:
                 done = min(done, self._descend(x, target, h, first), key=lambda one: one.left)
+        if self.exact and not self.definite:
+            x[:], self.active = start, known
+            return False
         x[:] = done.y
         longest = self._max_speed * h
         resolve_plane_contacts(
@@ -187,6 +194,7 @@ class Newton:
             v[:] = (x - start) / h
             self._keep_momentum(v, (target - start) / h)  # what was cut short has pushed something else
         slip(x, model.constraints)
+        return True
 
     def _unbalanced(self, forces: FloatArray) -> FloatArray:
         """Return what residuals are measured against [N], shape (V, 3): the forces that set the cloth in motion.
@@ -206,6 +214,8 @@ class Newton:
         """Iterate on until the objective is a parabola, to within what is allowed, or will not fall."""
         zero = np.zeros_like(x)
         for iteration in range(1, max(self.limits.iterations, self._sweeps)):
+            if self.exact and not self.definite:
+                break
             straight = abs(done.fall - done.foreseen) <= self._allowed + _ROUNDING * abs(done.left)
             if done.share == 1.0 and iteration >= self._sweeps and (straight or iteration >= _ENOUGH):
                 break
@@ -270,9 +280,8 @@ class Newton:
                 project_to_contacts(self.active, model.inverse_mass, x, y, move)
             if self.definite:
                 self.definite = system.eliminated(right, move)
-                if not self.definite:  # once more, with a stiffness that is, and for now not tried again
-                    self.exact = False
-                    return self._iterate(x, y, target, guess, h, exactly=exactly, measured=True)
+                if not self.definite:
+                    return _Iteration(y, 0.0, 0.0, 0.0, np.inf)
             else:
                 system.solve(right, move, self._whole, _LEFT * h, exactly=exactly or touches)
             rounds -= 1
