@@ -14,6 +14,8 @@ def last_line(**beyond: float | None) -> str:
 
 def test_what_is_beyond_the_fabric_is_told_and_what_is_not_known_too():
     told = "cloth beyond what its fabric is known to bear, at most in a frame: "
-    assert last_line(warp=0.012, weft=0.0, shear=None) == told + "1.2% by its warp, 0.0% by its weft, not known of shear"
+    found = last_line(warp=0.012, weft=0.0, shear=None)
+    assert found == told + "1.2% by its warp, 0.0% by its weft, not known of shear"
     assert last_line(warp=None, weft=None, shear=None) == told + "not known of warp and weft and shear"
-    assert last_line(warp=0.5, weft=0.25, shear=0.0) == told + "50.0% by its warp, 25.0% by its weft, 0.0% by its shear"
+    found = last_line(warp=0.5, weft=0.25, shear=0.0)
+    assert found == told + "50.0% by its warp, 25.0% by its weft, 0.0% by its shear"
