@@ -32,6 +32,7 @@ AUDIT = (
     *("max_shear_deg", "seconds_per_frame"),
     *("cpu_seconds_per_frame", "most_cpu_seconds"),
 )
+BEYOND = {"warp": 0.25, "weft": None, "shear": 0.0}
 
 
 def patches(center: np.ndarray, apart: float = 2 * SIZE, size: float = SIZE) -> np.ndarray:
@@ -59,7 +60,7 @@ def test_frames_that_cross_body_or_cloth_are_counted(tmp_path):
     write_avatar(tmp_path / "body.npz", avatar)
     write_avatar_motion(tmp_path / "out" / "motion.npz", motion)
     write_cloth_motion(tmp_path / "out" / "partial" / "draped_motion.npz", cloth)
-    write_json(tmp_path / "out" / "partial" / "motion_audit.json", dict.fromkeys(AUDIT, 0))
+    write_json(tmp_path / "out" / "partial" / "motion_audit.json", dict.fromkeys(AUDIT, 0) | {"beyond_limits": BEYOND})
     found = run_figures(tmp_path, tmp_path / "body.npz")
     assert (found["ipc_crossing"], found["ipc_crossing_posed"], found["vertices"]) == (2, 2, 6)
     assert run_figures(tmp_path / "out", tmp_path / "body.npz") == {}

@@ -77,6 +77,15 @@ def test_presets_have_names_and_mistakes_have_exit_codes(vto):
     Path("file").write_text("")
     assert vto("motion", "sitting", "-o", "file").code == 2
     assert vto("motion", "sitting", "--lead-in", "3").code == 2
+    assert vto("motion", "sitting", "--hips-aside", "60").code == 2
+    said = vto("motion", "sitting", "--hips-aside", "5m")
+    assert (said.code, "hips_aside_mm" in said.err) == (2, True)
+
+
+def test_hips_move_aside_where_it_is_asked_for(vto):
+    aside = ["--hips-aside", "60mm"]
+    shares = [vto("motion", "walking_step", "--json", *more).data["balanced_share"] for more in ([], aside)]
+    assert shares[0] < shares[1]
 
 
 def test_joints_come_from_standard_input(vto, monkeypatch):

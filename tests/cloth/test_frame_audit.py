@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from vto_pipeline.cloth.judge.strain import cloth_triangles
-from vto_pipeline.cloth.moving.frame_audit import stretch_of_edges, thread_strains
+from vto_pipeline.cloth.judge.strain import cloth_triangles, gradients, warp_weft_strains
+from vto_pipeline.cloth.moving.frame_audit import largest_strains, stretch_of_edges
 from vto_pipeline.geometry.topology import laid_edge_lengths
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -26,7 +26,8 @@ def sheet() -> TriangleMesh:
 
 def judged(moved: np.ndarray) -> tuple[float, float, float]:
     mesh = sheet()
-    return thread_strains(moved, mesh.faces, cloth_triangles(mesh.vertices[mesh.faces]))
+    laid = cloth_triangles(mesh.vertices[mesh.faces])
+    return largest_strains(warp_weft_strains(gradients(moved, mesh.faces, laid)), laid.area)
 
 
 @pytest.mark.parametrize("angle", [0.3, -0.7])

@@ -68,6 +68,8 @@ def test_raw_data_give_curves_shear_and_loss(tmp_path: Path) -> None:
     assert_allclose(fabric.stretch_weft, 98.0665 / 0.15879104, rtol=3e-3)
     # On the bias 40 ε + 1000 ε² = 4.903325 at ε = 0.05282393; G = T / (4 ε)
     assert_allclose(fabric.shear, 4.903325 / (4 * 0.05282393), rtol=5e-3)  # chords
+    # Drawn to 1.3 of its length, the diagonal of a square is that of a rhombus sheared by γ, 1 + sin γ = 1.3²
+    assert_allclose(np.degrees(fabric.shear_angle), 43.6302, rtol=1e-5)
     # A fifth is lost: 0.2 ½ LT of the tension, with ½ LT = (a/2 + b ε/3) / (a + b ε), mean of warp and weft
     halves = [(a / 2 + b * e / 3) / (a + b * e) for a, b, e in ((800, 40000, 0.05), (300, 2000, 0.2))]
     assert_allclose(fabric.stretch_hysteresis, 0.2 * sum(halves) / 2 * 4.903325, rtol=0.01)  # chords, 0.08 N/m of zero

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from math import degrees
 from pathlib import Path
 from typing import Any
 
@@ -127,6 +128,9 @@ def in_the_trade_s_units(fabric: Fabric) -> dict[str, Any]:
             "poisson": fabric.poisson,
             "hysteresis": fabric.stretch_hysteresis,
             "shear_hysteresis": fabric.shear_hysteresis,
+            "elongation_warp": fabric.elongation_warp,
+            "elongation_weft": fabric.elongation_weft,
+            "shear_angle_deg": None if fabric.shear_angle is None else degrees(fabric.shear_angle),
             **{name: list(zip(c.strain, c.tension, strict=True)) for name, c in curves.items() if c is not None},
         },
         "bending": {

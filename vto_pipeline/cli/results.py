@@ -90,6 +90,15 @@ def motion_lines(found: Mapping[str, Any]) -> Iterator[str]:
         f"{found['max_thread_stretch']:.0%}, on 99% of the cloth by up to {found['p99_thread_stretch']:.0%}, and "
         f"sheared by up to {found['max_shear_deg']:.0f} degrees; {found['seconds_per_frame']:.1f} s a frame"
     )
+    yield f"  cloth beyond what its fabric is known to bear, at most in a frame: {_beyond(found)}"
+
+
+def _beyond(found: Mapping[str, Any]) -> str:
+    """Return in words how much of the cloth is beyond the limits of warp, weft and shear in motion_audit.json."""
+    shares = found["beyond_limits"].items()
+    known = [f"{share:.1%} by its {name}" for name, share in shares if share is not None]
+    lacking = [name for name, share in shares if share is None]
+    return ", ".join(known + ([f"not known of {' and '.join(lacking)}"] if lacking else []))
 
 
 def _girths(measured: Measurements) -> Iterator[tuple[str, str, str]]:

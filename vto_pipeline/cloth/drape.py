@@ -13,6 +13,7 @@ from vto_pipeline.cloth.dynamics.residual import elastic_energy
 from vto_pipeline.cloth.dynamics.warm_up import warm_up
 from vto_pipeline.cloth.judge.audit import audit
 from vto_pipeline.cloth.judge.elsewhere import warn_if_elsewhere
+from vto_pipeline.cloth.judge.limits import warn_beyond_limits
 from vto_pipeline.cloth.judge.residual import covers_all_energies
 from vto_pipeline.cloth.judge.too_small import warn_if_too_small
 from vto_pipeline.cloth.model.settings import checked
@@ -102,6 +103,7 @@ def drape(
             skin=stepper.skin,
         ),
         **warn_if_too_small(draped, garment.rest, config.stretch_limit, job),
+        **warn_beyond_limits(draped, garment.rest, fabric, job),
         **(warn_if_elsewhere(mesh, draped, garment.rest, body.final, job) if len(body.keyframes) == 1 else {}),
     }
     judged = findings.get("judged_residual")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from math import isfinite
+from math import isfinite, pi
 
 from vto_pipeline.errors import InputError
 
@@ -53,6 +53,9 @@ class Fabric:
         shear_hysteresis: Shear force per width lost to internal friction, 2HG [N/m].
         damping: Internal viscous loss in proportion to stiffness, Rayleigh's β [s].
         derived: How figures were worked out from others, for people.
+        elongation_warp, elongation_weft: Stretch that the threads are known to bear [share]: at break, at the
+            heaviest load of a test, or where a published model of it locks; `source` says which. None where not known.
+        shear_angle: Angle by which the threads are known to bear being sheared, to either side [rad]; None likewise.
     """
 
     name: str
@@ -74,6 +77,9 @@ class Fabric:
     shear_hysteresis: float = 0.0
     damping: float = 0.0
     derived: tuple[str, ...] = ()
+    elongation_warp: float | None = None
+    elongation_weft: float | None = None
+    shear_angle: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("areal_density", "thickness", "stretch_warp", "stretch_weft", "shear"):
@@ -85,3 +91,6 @@ class Fabric:
                 raise InputError(f"fabric {self.name}: {name} is {getattr(self, name)}; expected zero or more")
         if not -0.99 < self.poisson < 0.99:
             raise InputError(f"fabric {self.name}: poisson is {self.poisson}; expected -0.99 to 0.99")
+        for name, most in (("elongation_warp", 10.0), ("elongation_weft", 10.0), ("shear_angle", 0.5 * pi)):
+            if (known := getattr(self, name)) is not None and not 0 < known <= most:
+                raise InputError(f"fabric {self.name}: {name} is {known}; expected above 0, at most {most:.3g}")

@@ -12,5 +12,6 @@ timing: another frame rate; a smooth start from a pose, and a smooth end; a last
 path: the avatar at any time of its motion
 live: an avatar that follows a person frame by frame
 balance: mass of the parts, zero moment point, support
+hips_aside: hips that move aside to keep the balance
 figures: drift of planted feet, spikes, floor, crossings
 """

@@ -7,6 +7,7 @@ part turns about its own middle is left out.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError, cKDTree
@@ -32,11 +33,16 @@ class Balance:
 
     Args:
         zero_moment: On the floor [m], x and z, shape (T, 2).
-        outside: How far it lies outside of the feet's support [m], 0 inside; NaN in the air, shape (T,).
+        to_support: From it to the nearest point of the feet's support [m], 0 inside; NaN in the air, shape (T, 2).
     """
 
     zero_moment: FloatArray
-    outside: FloatArray
+    to_support: FloatArray
+
+    @property
+    def outside(self) -> FloatArray:
+        """How far it lies outside of the support [m], 0 inside; NaN in the air, shape (T,)."""
+        return np.asarray(np.linalg.norm(self.to_support, axis=1))
 
     @property
     def inside_share(self) -> float | None:
@@ -45,8 +51,20 @@ class Balance:
         return float((self.outside[stands] <= _UNSURE_M).mean()) if stands.any() else None
 
 
-def part_masses(avatar: Avatar) -> tuple[FloatArray, FloatArray]:
-    """Return each joint's share of the volume, shape (J,), and its middle in the bind pose [m], shape (J, 3).
+class PartMasses(NamedTuple):
+    """Masses of the parts of a body.
+
+    Args:
+        share: Each joint's share of the volume, shape (J,).
+        middle: In the bind pose [m], shape (J, 3).
+    """
+
+    share: FloatArray
+    middle: FloatArray
+
+
+def part_masses(avatar: Avatar) -> PartMasses:
+    """Return the masses of an avatar's parts.
 
     Points inside of the body, drawn at random with one seed, belong to the joint that holds the nearest vertex.
     """
@@ -57,10 +75,18 @@ def part_masses(avatar: Avatar) -> tuple[FloatArray, FloatArray]:
     owner = np.argmax(avatar.weights[nearest], axis=1)
     count = np.bincount(owner, minlength=len(avatar.joints)).astype(float)
     total = np.stack([np.bincount(owner, points[:, k], minlength=len(avatar.joints)) for k in range(3)], axis=1)
-    return count / len(points), np.where(count[:, None] > 0, total / np.maximum(count, 1)[:, None], avatar.joints)
+    middle = np.where(count[:, None] > 0, total / np.maximum(count, 1)[:, None], avatar.joints)
+    return PartMasses(count / len(points), middle)
 
 
-def balance(turn: FloatArray, place: FloatArray, avatar: Avatar, frame_time: float) -> Balance:
+def part_middles(turn: FloatArray, place: FloatArray, avatar: Avatar, masses: PartMasses) -> FloatArray:
+    """Return where the middles of the parts are [m], shape (T, J, 3); arguments as of `balance`."""
+    return np.asarray(place + np.einsum("tjab,jb->tja", turn, masses.middle - avatar.joints))
+
+
+def balance(
+    turn: FloatArray, place: FloatArray, avatar: Avatar, frame_time: float, masses: PartMasses | None = None
+) -> Balance:
     """Return the zero moment point of a motion.
 
     Args:
@@ -68,16 +94,16 @@ def balance(turn: FloatArray, place: FloatArray, avatar: Avatar, frame_time: flo
         place: World places of the joints [m], shape (T, J, 3).
         avatar: Whose.
         frame_time: [s].
+        masses: Of `part_masses`, where they are known.
     """
-    share, middle = part_masses(avatar)
-    parts = place + np.einsum("tjab,jb->tja", turn, middle - avatar.joints)
-    point = zero_moment_point(parts, share, frame_time)
+    masses = masses or part_masses(avatar)
+    point = zero_moment_point(part_middles(turn, place, avatar, masses), masses.share, frame_time)
     feet = []
     for side in ("left", "right"):
         ankle = avatar.joint_names.index(f"{side}_ankle")
         feet.append(place[:, ankle, None] + np.einsum("tab,nb->tna", turn[:, ankle], sole_points(avatar, side)))
     soles = np.concatenate(feet, axis=1)
-    return Balance(point, np.array([_outside(one, sole) for one, sole in zip(point, soles, strict=True)]))
+    return Balance(point, np.array([_to_support(one, sole) for one, sole in zip(point, soles, strict=True)]))
 
 
 def zero_moment_point(parts: FloatArray, masses: FloatArray, frame_time: float) -> FloatArray:
@@ -103,18 +129,19 @@ def zero_moment_point(parts: FloatArray, masses: FloatArray, frame_time: float) 
     return np.stack(level, axis=1)
 
 
-def _outside(point: FloatArray, sole: FloatArray) -> float:
-    """How far a point on the floor lies outside of what touches it [m]; NaN where nothing does."""
+def _to_support(point: FloatArray, sole: FloatArray) -> FloatArray:
+    """The way from a point on the floor to what touches it [m], shape (2,); NaN where nothing does."""
     touching = sole[sole[:, 1] < _CONTACT_M][:, [0, 2]]
     if len(touching) < 3 or not np.isfinite(point).all():
-        return float("nan")
+        return np.full(2, np.nan)
     try:
         hull = ConvexHull(touching)
     except QhullError:
-        return float("nan")
+        return np.full(2, np.nan)
     if (hull.equations[:, :2] @ point + hull.equations[:, 2] <= 0).all():
-        return 0.0
+        return np.zeros(2)
     start, end = touching[hull.simplices[:, 0]], touching[hull.simplices[:, 1]]
     side = end - start
     along = np.clip(((point - start) * side).sum(axis=1) / np.maximum((side**2).sum(axis=1), 1e-18), 0.0, 1.0)
-    return float(np.linalg.norm(start + along[:, None] * side - point, axis=1).min())
+    ways = start + along[:, None] * side - point
+    return np.asarray(ways[np.linalg.norm(ways, axis=1).argmin()])

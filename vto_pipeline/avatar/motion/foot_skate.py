@@ -7,6 +7,7 @@ before and after. No bone changes its length.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,7 @@ from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Avatar
 from vto_pipeline.numerics.kinematics import matrix_vectors, shortest_rotations, vector_matrices
 
+_SIDES = ("left", "right")
 _FADE_S = 0.25
 _LOWER_S = 0.15
 _HINGE_S = 0.1
@@ -55,23 +57,37 @@ def hold_feet(
         avatar: Whose.
         frame_time: [s].
     """
-    turn = turn.copy()
     points = contact_points(avatar)
     fade = max(1, round(_FADE_S / frame_time))
-    names = avatar.joint_names
-    held, drop = {}, np.zeros(len(turn))
-    for k, side in enumerate(("left", "right")):
-        ankle, hip = names.index(f"{side}_ankle"), names.index(f"{side}_hip")
-        where = slice(2 * k, 2 * k + 2)
-        held[side] = _hold(turn[:, ankle], place[:, ankle], planted[:, where], points[where], fade)
+    held = []
+    for k, side in enumerate(_SIDES):
+        ankle, where = avatar.joint_names.index(f"{side}_ankle"), slice(2 * k, 2 * k + 2)
+        held.append(_hold(turn[:, ankle], place[:, ankle], planted[:, where], points[where], fade))
+    return reach_for(turn, place, held, avatar, frame_time)
+
+
+def reach_for(
+    turn: FloatArray, place: FloatArray, held: Sequence[Held], avatar: Avatar, frame_time: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return rotations and places of the root of a motion whose feet are where they are to be.
+
+    Args:
+        turn: World rotations of the joints relative to the bind pose, shape (T, J, 3, 3).
+        place: World places of the joints [m], shape (T, J, 3).
+        held: Left and right foot.
+        avatar: Whose.
+        frame_time: [s].
+    """
+    turn, names, drop = turn.copy(), avatar.joint_names, np.zeros(len(turn))
+    for side, goal in zip(_SIDES, held, strict=True):
         length = _REACH * sum(np.linalg.norm(bone) for bone in _bones(avatar, side))
-        way = held[side].ankle - place[:, hip]
+        way = goal.ankle - place[:, names.index(f"{side}_hip")]
         level = np.minimum(way[:, 0] ** 2 + way[:, 2] ** 2, length**2)
         need = np.maximum(-way[:, 1] - np.sqrt(length**2 - level), 0.0)
         drop = np.maximum(drop, need)
     drop = lowering(drop, round(_LOWER_S / frame_time))
     root = place[:, names.index("pelvis")] - drop[:, None] * [0.0, 1.0, 0.0]
-    for side, goal in held.items():
+    for side, goal in zip(_SIDES, held, strict=True):
         hip, knee, ankle = (names.index(f"{side}_{joint}") for joint in ("hip", "knee", "ankle"))
         thigh, shank = _bones(avatar, side)
         first, second = two_bones(

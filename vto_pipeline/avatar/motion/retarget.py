@@ -13,6 +13,7 @@ from vto_pipeline.avatar.motion.balance import Balance, balance
 from vto_pipeline.avatar.motion.calm import calm, calm_on_held_feet
 from vto_pipeline.avatar.motion.figures import jerked_joints, plant_drift, spikes, worst_leap
 from vto_pipeline.avatar.motion.foot_skate import grounded
+from vto_pipeline.avatar.motion.hips_aside import balanced
 from vto_pipeline.avatar.motion.joint_places import posed_joints
 from vto_pipeline.avatar.motion.limits import limit_turns
 from vto_pipeline.avatar.motion.plants import find_plants, runs, speeds
@@ -38,6 +39,9 @@ class RetargetConfig(Config):
 
     frames_per_second: float = Field(default=0.0, ge=0.0, le=240.0, description="Of the result; 0 keeps the clip's")
     hold_feet: bool = Field(default=True, description="Whether feet that stand still are held where they stand")
+    hips_aside_mm: float = Field(
+        default=0.0, ge=0.0, le=300.0, description="How far hips may move aside to keep the balance [mm]; 0: not at all"
+    )
     lead_in_s: float = Field(
         default=0.0, ge=0.0, le=10.0, description="Time from the avatar's own pose to the first frame [s]"
     )
@@ -99,7 +103,7 @@ def retarget(
     calmed = contact_places(*posed_joints(avatar, poses, root), avatar)
     planted = find_plants(calmed, clip.frame_time)
     job.progress(0.3, "keep the limbs off the body")
-    poses, root, planted, arms_moved = _mended(avatar, poses, root, planted, clip.frame_time, config.hold_feet)
+    poses, root, planted, arms_moved = _mended(avatar, poses, root, planted, clip.frame_time, config)
     turn, place = posed_joints(avatar, poses, root)
     after = contact_places(turn, place, avatar)
     job.progress(0.7, "find the zero moment point")
@@ -134,7 +138,7 @@ def _mended(
     root: FloatArray,
     planted: NDArray[np.bool_],
     frame_time: float,
-    hold: bool,
+    config: RetargetConfig,
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], float]:
     """Return a motion whose feet stand, whose limbs have room, and that is calm.
 
@@ -146,25 +150,50 @@ def _mended(
         root: Places of the root [m], shape (T, 3).
         planted: Which of `model.motion.CONTACTS` stand still, shape (T, 4).
         frame_time: [s].
-        hold: Whether feet are held.
+        config: Whether feet are held, and how far hips may move aside.
 
     Returns:
         Poses, places of the root, what is planted, and the share of frames in which an arm had no room.
     """
-    legs, both, one = Legs(avatar), np.ones((len(poses), 2)), np.ones((len(poses), 1))
+    hold = config.hold_feet
+    both = np.ones((len(poses), 2))
     stands = grounded(planted, frame_time) if hold else 0.0 * both
-    poses, _ = legs.kept(poses, root, _halves(both * stands.prod(axis=1, keepdims=True)), frame_time)
+    poses, _ = Legs(avatar).kept(poses, root, _halves(both * stands.prod(axis=1, keepdims=True)), frame_time)
     if hold:
         poses, root, planted = calm_on_held_feet(avatar, poses, root, planted, frame_time)
         stands = grounded(planted, frame_time)
-    poses, around = legs.kept(poses, root, _halves(1.0 - stands), frame_time)
-    poses, _ = Trunk(avatar).kept(poses, root, one, frame_time)
-    poses, close = Arms(avatar).kept(poses, root, both, frame_time)
+    free = _halves(1.0 - stands)
+    poses, around, close = _with_room(avatar, poses, root, free, frame_time)
+    if config.hips_aside_mm:
+        poses, root = balanced(avatar, poses, root, frame_time, 1e-3 * config.hips_aside_mm)
+        poses, again, _ = _with_room(avatar, poses, root, free, frame_time)
+        around = around | again
     if hold and (around.any() or jerked_joints(posed_joints(avatar, poses, root)[1], frame_time).any()):
         poses, root, planted = calm_on_held_feet(avatar, poses, root, planted, frame_time)
     elif not hold:
         poses, root = calm(avatar, poses, root, frame_time)
     return poses, root, planted, float(close.mean())
+
+
+def _with_room(
+    avatar: Avatar, poses: FloatArray, root: FloatArray, free: FloatArray, frame_time: float
+) -> tuple[FloatArray, NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return poses with legs that are free kept off each other, the trunk off them, and arms off all.
+
+    Args:
+        avatar: Any of our bodies.
+        poses: Rotation vectors in the parents' frames [rad], shape (T, J, 3).
+        root: Places of the root [m], shape (T, 3).
+        free: How much of the way each leg goes, shape (T, 2).
+        frame_time: [s].
+
+    Returns:
+        Poses, and the frames in which a leg and an arm had no room, shape (T,).
+    """
+    poses, around = Legs(avatar).kept(poses, root, free, frame_time)
+    poses, _ = Trunk(avatar).kept(poses, root, np.ones((len(poses), 1)), frame_time)
+    poses, close = Arms(avatar).kept(poses, root, np.ones((len(poses), 2)), frame_time)
+    return poses, around, close
 
 
 def _halves(free: FloatArray) -> FloatArray:

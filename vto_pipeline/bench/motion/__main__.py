@@ -15,7 +15,7 @@ import numpy as np
 
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.motion.figures import crossing_frames
-from vto_pipeline.avatar.motion.retarget import retarget
+from vto_pipeline.avatar.motion.retarget import RetargetConfig, retarget
 from vto_pipeline.avatar.template.template import template
 from vto_pipeline.bench.motion.limb_angles import BONES, limb_angles
 from vto_pipeline.bench.printed_table import print_table
@@ -54,18 +54,19 @@ def bodies() -> dict[str, Avatar]:
     }
 
 
-def rows(sources: list[str]) -> Iterator[tuple[str, ...]]:
+def rows(sources: list[str], config: RetargetConfig) -> Iterator[tuple[str, ...]]:
     """Yield a row of figures for each motion and body.
 
     Args:
         sources: Files, or names of presets.
+        config: How they are carried over.
     """
     people = bodies()
     for source in sources:
         read = read_motion(source)
         for name, body in people.items():
             began = time.process_time()
-            motion, figures = retarget(read.clip, read.joints, body)
+            motion, figures = retarget(read.clip, read.joints, body, config)
             seconds = time.process_time() - began
             crossing, looked_at = crossing_frames(motion, body, _LOOKED_AT)
             share = figures.balance.inside_share
@@ -97,7 +98,9 @@ def main() -> int:
     """Read the command line and print the table."""
     parser = argparse.ArgumentParser(prog="python -m vto_pipeline.bench.motion", description=__doc__)
     parser.add_argument("sources", nargs="+", metavar="FILE", help="a motion, or the name of a preset")
-    return print_table(_HEADS, rows(parser.parse_args().sources))
+    parser.add_argument("--hips-aside", type=float, default=0.0, metavar="MM", help="how far hips may move aside")
+    arguments = parser.parse_args()
+    return print_table(_HEADS, rows(arguments.sources, RetargetConfig(hips_aside_mm=arguments.hips_aside)))
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ from vto_pipeline.io.runs.frame_log import read_cloth_motion
 
 _COLUMNS = (
     "garment",
+    "fabric",
     "motion",
     "vertices",
     "outcome",
@@ -38,6 +39,9 @@ _COLUMNS = (
     "thread_stretch",
     "thread_stretch_p99",
     "shear_deg",
+    "warp_beyond",
+    "weft_beyond",
+    "shear_beyond",
     "s_per_frame",
     "cpu_s_per_frame",
     "cpu_s_most",
@@ -50,6 +54,7 @@ def main() -> None:
     parser.add_argument("--garment", type=Path, nargs="+", required=True, help="mesh or pattern files")
     parser.add_argument("--motion", nargs="+", required=True, help="motion files, or names of presets")
     parser.add_argument("--body", type=Path, metavar="AVATAR", help="avatar.npz; by default the mean body")
+    parser.add_argument("--fabric", default="cotton_poplin", help="what they are made of, as `vto drape` takes it")
     parser.add_argument("--limit", type=float, default=3600.0, metavar="SECONDS", help="of a run")
     parser.add_argument("--set", dest="settings", nargs="*", default=[], metavar="STAGE.KEY=VALUE", help="of the runs")
     parser.add_argument("--out", type=Path, default=Path("runs/garment_motion"), metavar="DIR", help="for the runs")
@@ -61,11 +66,12 @@ def main() -> None:
     table = LiveRows(arguments.out, _COLUMNS)
     for garment in arguments.garment:
         for motion in arguments.motion:
-            table.add(motion_row(garment, motion, body, arguments.out, arguments.settings, arguments.limit))
+            made_of = arguments.fabric
+            table.add(motion_row(garment, motion, body, made_of, arguments.out, arguments.settings, arguments.limit))
 
 
 def motion_row(
-    garment: Path, motion: str, body: Path, out: Path, settings: Sequence[str], limit: float
+    garment: Path, motion: str, body: Path, fabric: str, out: Path, settings: Sequence[str], limit: float
 ) -> dict[str, Value]:
     """Return what became of one run; figures that it did not reach are None.
 
@@ -73,18 +79,21 @@ def motion_row(
         garment: Mesh or pattern file.
         motion: File, or name of a preset.
         body: Avatar.
+        fabric: Name of a preset, or file.
         out: For the run.
         settings: As `--set` takes them.
         limit: Wall time after which the run is ended, with all that it has started [s].
     """
     folder = out / garment.stem  # one for all motions, so that it is draped once
-    command = ["drape", "--garment", str(garment), "--body", str(body), "--motion", motion, "-o", str(folder)]
+    command = ["drape", "--garment", str(garment), "--body", str(body), "--fabric", fabric]
+    command += ["--motion", motion, "-o", str(folder)]
     for one in settings:
         command += ["--set", one]
     ended = run_vto(command, out / f"{garment.stem}_{Path(motion).stem}.log", limit)
     own = ended.outcome in ("done", "failed")  # else its files are of the run before
     reached = run_figures(folder, body) if own else {}
-    return {"garment": garment.stem, "motion": Path(motion).stem, "outcome": ended.outcome, **reached}
+    row: dict[str, Value] = {"garment": garment.stem, "fabric": Path(fabric).stem, "motion": Path(motion).stem}
+    return row | {"outcome": ended.outcome, **reached}
 
 
 def run_figures(folder: Path, body: Path) -> dict[str, Value]:
@@ -109,6 +118,7 @@ def run_figures(folder: Path, body: Path) -> dict[str, Value]:
                 "thread_stretch": found["max_thread_stretch"],
                 "thread_stretch_p99": found["p99_thread_stretch"],
                 "shear_deg": found["max_shear_deg"],
+                **{f"{name}_beyond": share for name, share in found["beyond_limits"].items()},
                 "s_per_frame": found["seconds_per_frame"],
                 "cpu_s_per_frame": found["cpu_seconds_per_frame"],
                 "cpu_s_most": found["most_cpu_seconds"],

@@ -6,6 +6,7 @@ flanks, bearing: where a body may carry a point, and what force it can carry the
 gap: how near a cloth comes to itself
 order: whether what is worn beneath lies beneath
 strain, too_small: stretch against the rest shape; whether the garment is too small
+limits: whether threads are drawn or sheared farther than the fabric is known to bear
 elsewhere: whether it ended far from where it was put on
 worn: strain of the yarns and pressure on the body, vertex by vertex
 """

@@ -7,7 +7,8 @@ from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
-_SHARE = 0.02  # of the area beyond the limit: less is a pull at a seam or a point of the body
+PULLED_SHARE = 0.02
+"""Of the area beyond a limit: less is a pull at a seam or a point of the body."""
 
 
 def warn_if_too_small(draped: TriangleMesh, rest: RestShape, limit: float, job: Job) -> dict[str, object]:
@@ -26,7 +27,7 @@ def warn_if_too_small(draped: TriangleMesh, rest: RestShape, limit: float, job: 
     strain = principal_strains(gradients(draped.vertices, draped.faces, laid)).max(axis=1)
     over = strain > limit
     share = float(laid.area[over].sum() / laid.area.sum())
-    too_small = share > _SHARE
+    too_small = share > PULLED_SHARE
     if too_small:
         worst = draped.vertices[draped.faces[laid.solid][strain.argmax()]].mean(axis=0)
         job.warn(

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from vto_pipeline.cloth.dynamics.warm_up import warm_up
+from vto_pipeline.cloth.judge.limits import fabric_limits, tell_beyond
 from vto_pipeline.cloth.judge.strain import cloth_triangles
 from vto_pipeline.cloth.model.build import build_cloth
 from vto_pipeline.cloth.model.settings import checked
@@ -70,6 +71,7 @@ def follow(
             model,
             stepper.natural,
             laid,
+            fabric,
             state,
             body,
             own_crossings=stepper.body.own_crossings(len(log.frames)),
@@ -96,13 +98,14 @@ def follow(
                 hint="a body that jumps or closes on the cloth leaves it no way: look at the motion there, or slow it",
                 partial={
                     "draped_motion": ClothMotion(np.array(log.frames), model.faces, path.frame_time),
-                    "motion_audit": summary(log.records),
+                    "motion_audit": summary(log.records, fabric),
                 },
             )
         keep(steps=reached.steps, attempts=reached.attempts, began=began)
-    found = summary(log.records)
+    found = summary(log.records, fabric)
     job.measure(**{name: value for name, value in found.items() if name != "per_frame"})
     _warn(found, job)
+    tell_beyond(found["fabric_limits"], found["beyond_limits"], fabric.name, job, " in a frame")
     return ClothMotion(np.array(log.frames), model.faces, path.frame_time), found
 
 
@@ -111,11 +114,15 @@ def _now() -> tuple[float, float]:
     return time.perf_counter(), time.process_time()
 
 
-def summary(records: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def summary(records: Sequence[Mapping[str, Any]], fabric: Fabric) -> dict[str, Any]:
     """Return the worst of all frames, then each, as JSON values."""
+    limits = fabric_limits(fabric)
 
     def most(name: str) -> float:
         return max(record[name] for record in records)
+
+    def most_beyond(name: str) -> float | None:
+        return None if limits[name] is None else max(record["beyond_limits"][name] for record in records)
 
     return {
         "frames": len(records),
@@ -127,6 +134,8 @@ def summary(records: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "penetration_mm": most("penetration_mm"),
         "body_yields_mm": most("yields_mm"),
         **{name: most(name) for name in ("max_stretch", "max_thread_stretch", "p99_thread_stretch", "max_shear_deg")},
+        "fabric_limits": limits,
+        "beyond_limits": {name: most_beyond(name) for name in limits},
         "seconds_per_frame": float(np.median([record["seconds"] for record in records])),
         "cpu_seconds_per_frame": float(np.median([record["cpu_seconds"] for record in records])),
         "most_cpu_seconds": most("cpu_seconds"),

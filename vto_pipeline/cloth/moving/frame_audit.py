@@ -8,11 +8,13 @@ import numpy as np
 
 from vto_pipeline.cloth.dynamics.residual import elastic_energy
 from vto_pipeline.cloth.judge.crossings import crossings_between, self_crossings
+from vto_pipeline.cloth.judge.limits import beyond_limits
 from vto_pipeline.cloth.judge.strain import RestTriangles, gradients, warp_weft_strains
 from vto_pipeline.cloth.model.build import ClothModel, ClothState
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import laid_edge_lengths
-from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.mesh import TriangleMesh
 
 
@@ -32,6 +34,8 @@ class FrameAudit:
         max_thread_stretch: Of the warp or weft that is stretched most, beyond rest [share].
         p99_thread_stretch: What the more stretched of warp and weft stays below on 99 % of the cloth [share].
         max_shear_deg: Largest angle by which warp and weft are sheared [degrees].
+        beyond_limits: Share of the cloth whose warp, weft or shear is beyond what the fabric is known to bear; None
+            where that is not known.
         elastic_j, kinetic_j: Energy [J].
         steps: Of the solver, in the attempt that was kept.
         attempts: How often the frame was tried.
@@ -49,6 +53,7 @@ class FrameAudit:
     max_thread_stretch: float
     p99_thread_stretch: float
     max_shear_deg: float
+    beyond_limits: dict[str, float | None]
     elastic_j: float
     kinetic_j: float
     steps: int
@@ -63,17 +68,15 @@ def stretch_of_edges(mesh: TriangleMesh, natural: FloatArray) -> FloatArray:
     return np.asarray(np.divide(length, natural, out=np.ones_like(length), where=natural > 0.0) - 1.0)
 
 
-def thread_strains(positions: FloatArray, faces: IntArray, laid: RestTriangles) -> tuple[float, float, float]:
+def largest_strains(strain: FloatArray, area: FloatArray) -> tuple[float, float, float]:
     """Return the largest stretch of a thread, what 99 % of the cloth stays below, and the largest shear [degrees].
 
     Args:
-        positions: [m], shape (V, 3).
-        faces: Shape (F, 3).
-        laid: Those at rest.
+        strain: Of `strain.warp_weft_strains`, shape (T, 3).
+        area: At rest [m²], shape (T,).
     """
-    strain = warp_weft_strains(gradients(positions, faces, laid))
     most = strain[:, :2].max(axis=1)
-    below = np.quantile(most, 0.99, weights=laid.area, method="inverted_cdf")
+    below = np.quantile(most, 0.99, weights=area, method="inverted_cdf")
     return max(0.0, float(most.max())), max(0.0, float(below)), float(np.degrees(np.abs(strain[:, 2]).max()))
 
 
@@ -81,6 +84,7 @@ def audit_frame(
     model: ClothModel,
     natural: FloatArray,
     laid: RestTriangles,
+    fabric: Fabric,
     state: ClothState,
     body: TriangleMesh,
     *,
@@ -97,6 +101,7 @@ def audit_frame(
         model: The cloth.
         natural: Lengths of its edges without forces [m], shape (E,).
         laid: Its triangles without forces.
+        fabric: What it is made of.
         state: Where it is.
         body: Where that is.
         own_crossings: Of the body as it is posed.
@@ -104,7 +109,8 @@ def audit_frame(
         steps, attempts, seconds, cpu_seconds: What it took.
     """
     mesh = TriangleMesh(state.positions, model.faces)
-    thread, below, shear = thread_strains(mesh.vertices, mesh.faces, laid)
+    strain = warp_weft_strains(gradients(mesh.vertices, mesh.faces, laid))
+    thread, below, shear = largest_strains(strain, laid.area)
     nearest = float(SurfaceDistance(body).signed(mesh.vertices).distance.min())
     return FrameAudit(
         time_s=state.time,
@@ -117,6 +123,7 @@ def audit_frame(
         max_thread_stretch=thread,
         p99_thread_stretch=below,
         max_shear_deg=shear,
+        beyond_limits=beyond_limits(strain, laid.area, fabric),
         elastic_j=elastic_energy(model, state.positions),
         kinetic_j=float(0.5 * np.einsum("i,ij,ij->", model.mass, state.velocities, state.velocities)),
         steps=steps,

@@ -14,6 +14,7 @@ from vto_pipeline.cloth.dynamics.residual import elastic_energy
 from vto_pipeline.cloth.judge.audit import JUST, audit, spread_places
 from vto_pipeline.cloth.judge.crossings import crossings_between
 from vto_pipeline.cloth.judge.gap import gaps_within
+from vto_pipeline.cloth.judge.limits import warn_beyond_limits
 from vto_pipeline.cloth.judge.order import outside_outer_garment
 from vto_pipeline.cloth.judge.residual import covers_all_energies
 from vto_pipeline.cloth.judge.too_small import warn_if_too_small
@@ -51,11 +52,11 @@ def audit_outfit(
         job: Warned of garments that are too small, and of layers out of order.
 
     Returns:
-        Under "layers" what `audit.audit` and `too_small.warn_if_too_small` find of each garment, a vertex that another
-        garment may bear counted as held. Of all: the sum of their crossings, and the worst of what else is in
-        its findings; layer_intersections (pairs of triangles of two garments), min_layer_gap_mm (None above 5 mm),
-        out_of_order_vertices (of inner garments, outside an outer one), the largest out_of_order_share of a garment's,
-        order_kept (there are none), and the places of these [m].
+        Under "layers" what `audit.audit`, `too_small.warn_if_too_small` and `limits.warn_beyond_limits` find of each
+        garment, a vertex that another garment may bear counted as held. Of all: the sum of their crossings, and the
+        worst of what else is in its findings; layer_intersections (pairs of triangles of two garments),
+        min_layer_gap_mm (None above 5 mm), out_of_order_vertices (of inner garments, outside an outer one), the
+        largest out_of_order_share of a garment's, order_kept (there are none), and the places of these [m].
     """
     x = np.vstack([layer.garment.mesh.vertices for layer in layers])
     touching = float(skin.min()) + JUST
@@ -79,8 +80,10 @@ def audit_outfit(
                 pinned=borne[(borne >= span.start) & (borne < span.stop)] - span.start,
             ),
             **warn_if_too_small(mesh, rest, config.stretch_limit, told),
+            **warn_beyond_limits(mesh, rest, layer.fabric, told),
         }
         job.warnings += [f"{layer.name}: {text}" for text in told.warnings]
+        job.notes += [f"{layer.name}: {text}" for text in told.notes]
     crossing = [
         (inner.garment.mesh, crossings_between(inner.garment.mesh, outer.garment.mesh)[:, 0])
         for inner, outer in combinations(layers, 2)

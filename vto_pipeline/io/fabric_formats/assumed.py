@@ -93,7 +93,10 @@ ASSUMED: dict[str, Assumption] = {
 
 
 def complete_fabric(found: Figures) -> Fabric:
-    """Return the fabric: curves give the stiffness of linear models, and `ASSUMED` gives what is still missing."""
+    """Return the fabric: curves give the stiffness of linear models and how far threads were tested.
+
+    `ASSUMED` gives what is still missing, but for what threads are known to bear: that is not known then.
+    """
     known = {name: value for name, value in found.values.items() if value is not None}
     derived = list(found.derived)
     for name, curve in found.curves.items():
@@ -101,6 +104,7 @@ def complete_fabric(found: Figures) -> Fabric:
         if stretch not in known:
             known[stretch], tension = secant_stiffness(curve)
             derived.append(f"{stretch}: secant of {name} from 0 to {tension:.3g} N/m")
+        known.setdefault(name.replace("curve", "elongation"), curve.strain[-1])
     filled = tuple(name for name in ASSUMED if name not in known)
     for name in filled:
         known[name] = ASSUMED[name].value(known)

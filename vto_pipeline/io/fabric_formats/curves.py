@@ -85,3 +85,13 @@ def hysteresis_share(strain: FloatArray, loading: FloatArray, unloading: FloatAr
     """
     lost = np.trapezoid(loading - unloading, strain) / (strain[-1] - strain[0])
     return float(np.clip(lost / loading[-1], 0.0, 1.0))
+
+
+def trellis_angle(extension: float) -> float | None:
+    """Return the angle [rad] by which threads are sheared in a strip on the bias that is this much longer [share].
+
+    A square of threads that keep their length has a diagonal √(1 + sin γ) times as long. None where no angle is so
+    long: there the threads themselves were stretched.
+    """
+    sine = (1.0 + extension) ** 2 - 1.0
+    return float(np.arcsin(sine)) if sine < 1.0 else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import radians
 from typing import Annotated
 
 from pydantic import Field
@@ -31,6 +32,15 @@ class MembraneFile(Config):
         default=None, ge=0, le=1e4, description="Tension lost to friction at a garment's own weight [N/m]"
     )
     shear_hysteresis: float | None = Field(default=None, ge=0, le=1e4, description="2HG, shear force lost [N/m]")
+    elongation_warp: float | None = Field(
+        default=None, gt=0, le=10, description="Stretch that the warp is known to bear; by default its curve's end"
+    )
+    elongation_weft: float | None = Field(
+        default=None, gt=0, le=10, description="Stretch that the weft is known to bear; by default its curve's end"
+    )
+    shear_angle_deg: float | None = Field(
+        default=None, gt=0, le=90, description="Angle by which threads are known to bear being sheared [degrees]"
+    )
 
 
 class BendingFile(Config):
@@ -66,6 +76,7 @@ def read_document(document: Document) -> Figures:
         ConfigError: an unknown key (with its line), a value out of range, a curve that does not rise.
     """
     stored: FabricFile = check_schema(document, FabricFile)
+    angle = stored.membrane.shear_angle_deg
     values = {
         "areal_density": stored.areal_density_gsm * GSM,
         "thickness": None if stored.thickness_mm is None else stored.thickness_mm / 1000,
@@ -80,6 +91,9 @@ def read_document(document: Document) -> Figures:
         "stretch_hysteresis": stored.membrane.hysteresis,
         "shear_hysteresis": stored.membrane.shear_hysteresis,
         "damping": stored.damping_s,
+        "elongation_warp": stored.membrane.elongation_warp,
+        "elongation_weft": stored.membrane.elongation_weft,
+        "shear_angle": None if angle is None else radians(angle),
     }
     given = sorted(name for name, value in values.items() if value is not None)
     for index, name in enumerate(stored.assumed):

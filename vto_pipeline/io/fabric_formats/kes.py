@@ -78,6 +78,7 @@ def read_kes(document: Document) -> Figures:
         tension = sheet.mean("Fmax") or _STANDARD_TENSION
         for direction, name in enumerate(("warp", "weft")):
             extension, linearity = sheet.values["EMT"][direction], _linearity(sheet, direction, tension, document)
+            values[f"elongation_{name}"] = extension
             if linearity is None:
                 values[f"stretch_{name}"] = tension / extension
                 derived.append(f"stretch_{name}: secant from 0 to {tension:.3g} N/m")

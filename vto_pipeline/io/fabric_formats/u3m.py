@@ -21,7 +21,13 @@ from pydantic import BaseModel, ConfigDict, Field
 from vto_pipeline.errors import FormatError, InputError
 from vto_pipeline.io.documents import Document, check_schema
 from vto_pipeline.io.fabric_formats.assumed import Figures
-from vto_pipeline.io.fabric_formats.curves import GRAM_FORCE, WEAR_TENSION, hysteresis_share, measured_curve
+from vto_pipeline.io.fabric_formats.curves import (
+    GRAM_FORCE,
+    WEAR_TENSION,
+    hysteresis_share,
+    measured_curve,
+    trellis_angle,
+)
 from vto_pipeline.io.files import check_file
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import StretchCurve
@@ -156,6 +162,7 @@ def _analysed(document: Document, name: str, physics: Physics | None) -> Figures
         if not field:
             bias = float(np.interp(WEAR_TENSION, curve.tension, curve.strain))
             values["shear"] = WEAR_TENSION / (4 * bias)
+            values["shear_angle"] = trellis_angle(curve.strain[-1])
             continue
         curves[field] = curve
         strain = np.array(curve.strain)

@@ -38,6 +38,9 @@ def _file_of(source: str) -> Iterator[str]:
 @click.option("-o", "--output", type=PATH, metavar="FOLDER", help="Write motion.npz and motion.glb there.")
 @click.option("--fps", type=click.FloatRange(1, 240), help="Frames per second. [default: the file's]")
 @click.option("--lead-in", type=Quantity(TIME_S), metavar="0.5s", help="Begin in the avatar's own pose.")
+@click.option(
+    "--hips-aside", type=Quantity(LENGTH_M), metavar="60mm", help="How far hips may move aside to keep the balance."
+)
 @click.option("--unit", type=click.Choice(sorted(LENGTH_M)), help="Unit of length. [default: found from the legs]")
 @click.option("--up", type=click.Choice(_UP), help="Axis that points up. [default: found from the body]")
 @message_options
@@ -49,6 +52,7 @@ def motion_command(
     output: Path | None,
     fps: float | None,
     lead_in: float | None,
+    hips_aside: float | None,
     unit: str | None,
     up: str | None,
 ) -> None:
@@ -68,6 +72,7 @@ def motion_command(
     from vto_pipeline.avatar.motion.retarget import RetargetConfig, retarget
     from vto_pipeline.avatar.template.template import template
     from vto_pipeline.cli.commands.motion.lines import FRAMES_LOOKED_AT, motion_facts, motion_lines
+    from vto_pipeline.cloth.model.settings import checked
     from vto_pipeline.geometry.topology import vertex_normals
     from vto_pipeline.io.bodies.avatars import receive_avatar
     from vto_pipeline.io.gltf.animate import animated_glb, write_glb_bytes
@@ -83,7 +88,9 @@ def motion_command(
         read = read_motion(file, unit=unit, up=up, job=job)
     body = template() if avatar is None else receive_avatar(avatar)
     session.say(f"carrying over {len(read.clip.rotations)} frames")
-    config = RetargetConfig(frames_per_second=fps or 0.0, lead_in_s=lead_in or 0.0)
+    aside = 1e3 * (hips_aside or 0.0)
+    wanted = {"frames_per_second": fps or 0.0, "lead_in_s": lead_in or 0.0, "hips_aside_mm": aside}
+    config = checked(RetargetConfig, wanted)
     motion, figures = retarget(read.clip, read.joints, body, config, job)
     crossing = crossing_frames(motion, body, FRAMES_LOOKED_AT)
     if crossing[0]:
