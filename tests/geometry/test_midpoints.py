@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 from numpy.testing import assert_allclose
 
-from vto_pipeline.geometry.remeshing.midpoints import split_edges, split_in_four
+from vto_pipeline.geometry.riding.midpoints import split_edges, split_in_four
 from vto_pipeline.model.mesh import Skin, TriangleMesh
 
 BALL = trimesh.creation.icosphere(1, 0.3)

@@ -8,8 +8,8 @@ import numpy as np
 from pydantic import Field
 
 from vto_pipeline.geometry.remeshing.decimate import decimate
-from vto_pipeline.geometry.remeshing.midpoints import split_in_four
 from vto_pipeline.geometry.remeshing.seams import cut_open
+from vto_pipeline.geometry.riding.midpoints import split_in_four
 from vto_pipeline.geometry.topology import vertex_normals
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh

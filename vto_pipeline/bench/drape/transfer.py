@@ -26,8 +26,8 @@ from scipy.sparse import coo_matrix, eye
 
 from vto_pipeline.bench.bench import Value
 from vto_pipeline.bench.live_rows import LiveRows
-from vto_pipeline.geometry.remeshing.midpoints import split_edges
 from vto_pipeline.geometry.riding.binding import Binding, apply, bind
+from vto_pipeline.geometry.riding.midpoints import split_edges
 from vto_pipeline.geometry.topology import edges, face_normals, vertex_normals
 from vto_pipeline.io.meshes import read_mesh
 from vto_pipeline.model.arrays import FloatArray, IntArray

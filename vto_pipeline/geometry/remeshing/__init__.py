@@ -3,7 +3,6 @@
 remesh, isotropic: triangles of one size; layers: each vertex back in its own layer
 rims, rim_ears: openings before that and how long they stay, flat triangles at rims after it
 decimate: fewer
-midpoints: every triangle in four
 clip: along the line where a value changes sign
 holes: filled so that the filling continues the surface; ears and triangulate span them, refine makes triangles even
 fold: how much two triangles fold
