@@ -212,7 +212,7 @@ def test_ears_lie_under_a_hood_and_fingers_in_a_sleeve(name: str) -> None:
     tucked = tuck(body.mesh, plain, [cloth])
     assert (SurfaceDistance(body.mesh).signed(cloth.vertices).distance < 0).sum() > 20  # ears and fingers did stand out
     assert (SurfaceDistance(tucked).signed(cloth.vertices).distance > 0).all()
-    (cleared,) = outside([cloth.vertices], tucked)
+    (cleared,) = outside([cloth], tucked)
     assert np.linalg.norm(cleared - cloth.vertices, axis=1).max() == 0.0
     nose = int(np.argmax(np.where(body.mesh.vertices[:, 1] > neck, body.mesh.vertices[:, 2], -1.0)))
     assert np.array_equal(tucked.vertices[nose], body.mesh.vertices[nose])  # the face is bare

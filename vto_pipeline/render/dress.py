@@ -9,6 +9,7 @@ from pydantic import Field
 
 from vto_pipeline.geometry.remeshing.decimate import decimate
 from vto_pipeline.geometry.remeshing.seams import cut_open
+from vto_pipeline.geometry.riding.midpoints import split_in_four
 from vto_pipeline.geometry.topology import vertex_normals
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -49,17 +50,33 @@ def deform_render_mesh(
     """
     if isinstance(garment, TexturedMesh):
         job.leave_out("thinning out", "the picture lies on these triangles; texture.max_triangles bounds them")
-        moved = replace(garment.mesh, vertices=apply(bind(garment.mesh, sim_mesh), draped.vertices))
+        shown = as_fine_as(garment.mesh, sim_mesh, config.max_triangles)
+        moved = replace(shown, vertices=apply(bind(shown, sim_mesh), draped.vertices))
         job.measure(triangles=len(moved.faces))
         return [cut_open("garment", moved, garment.picture)]
     if len(garment.faces) <= config.max_triangles:
         job.leave_out("thinning out", f"{len(garment.faces)} triangles, {config.max_triangles} are allowed")
-    detailed = decimate(garment, config.max_triangles)
+    detailed = as_fine_as(decimate(garment, config.max_triangles), sim_mesh, config.max_triangles)
     moved = replace(detailed, vertices=apply(bind(detailed, sim_mesh), draped.vertices))
     job.measure(triangles=len(moved.faces))
     if moved.texture is not None:
         return [cut_open("garment", moved, None)]
     return [GlbPart("garment", moved, normals=vertex_normals(moved))]
+
+
+def as_fine_as(garment: TriangleMesh, sim_mesh: TriangleMesh, most: int) -> TriangleMesh:
+    """Return a garment with its triangles split in four until they are about as many as those that were simulated.
+
+    Else it would hide folds that the simulation has: its triangles cannot bend.
+
+    Args:
+        garment: To be shown [m].
+        sim_mesh: What moves it [m].
+        most: Triangles it may have.
+    """
+    while 2 * len(garment.faces) <= len(sim_mesh.faces) and 4 * len(garment.faces) <= most:
+        garment = split_in_four(garment)
+    return garment
 
 
 def body_part(body: TriangleMesh, config: DressConfig) -> GlbPart:

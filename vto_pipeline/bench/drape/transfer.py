@@ -27,7 +27,8 @@ from scipy.sparse import coo_matrix, eye
 from vto_pipeline.bench.bench import Value
 from vto_pipeline.bench.live_rows import LiveRows
 from vto_pipeline.geometry.riding.binding import Binding, apply, bind
-from vto_pipeline.geometry.topology import edges, face_normals, half_edges, vertex_normals
+from vto_pipeline.geometry.riding.midpoints import split_edges
+from vto_pipeline.geometry.topology import edges, face_normals, vertex_normals
 from vto_pipeline.io.meshes import read_mesh
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
@@ -66,26 +67,6 @@ class Wave(NamedTuple):
         return cls(along, across, rng.uniform(0.15, 0.6), rng.uniform(0.0, 2 * np.pi))
 
 
-def refine(mesh: TriangleMesh) -> tuple[TriangleMesh, IntArray]:
-    """Return a mesh with a vertex in the middle of each edge, and the two vertices that each lies between, or is.
-
-    Args:
-        mesh: V vertices and E edges.
-
-    Returns:
-        V + E vertices and four times the faces; ends, shape (V + E, 2).
-    """
-    count, known = len(mesh.vertices), edges(mesh).astype(np.int64)
-    halves = np.sort(half_edges(mesh), axis=1).astype(np.int64)
-    number = np.searchsorted(known[:, 0] * count + known[:, 1], halves[:, 0] * count + halves[:, 1])
-    middle = (count + number).reshape(-1, 3)  # of the edges from each corner to the next
-    a, b, c = mesh.faces.T
-    ab, bc, ca = middle.T
-    faces = np.concatenate([np.column_stack(f) for f in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))])
-    ends = np.vstack([np.column_stack([np.arange(count)] * 2), known])
-    return TriangleMesh(mesh.vertices[ends].mean(axis=1), faces), ends.astype(np.int32)
-
-
 def violent_states() -> Iterator[list[Wave]]:
     """Yield the waves of each state in which a garment is shaken hard."""
     rng = np.random.default_rng(0)
@@ -114,7 +95,7 @@ def wrong_layer(sim: TriangleMesh, ends: IntArray, binding: Binding) -> int:
 
 def measure_transfer(sim: TriangleMesh) -> dict[str, Value]:
     """Return the figures of one simulation mesh; see the module."""
-    fine, ends = refine(sim)
+    fine, ends = split_edges(sim)
     lift = np.random.default_rng(1).uniform(-_LIFT_M, _LIFT_M, (len(fine.vertices), 1))
     fine = TriangleMesh(fine.vertices + lift * vertex_normals(fine), fine.faces)
     binding = bind(fine, sim)
@@ -143,7 +124,7 @@ def measure_transfer(sim: TriangleMesh) -> dict[str, Value]:
 def _speed(sim: TriangleMesh) -> dict[str, Value]:
     many = sim
     while len(many.vertices) < _MANY:
-        many, _ = refine(many)
+        many, _ = split_edges(many)
     began = time.perf_counter()
     binding = bind(many, sim)
     bound = time.perf_counter() - began

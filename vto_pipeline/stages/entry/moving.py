@@ -54,9 +54,10 @@ class MovingScene:
         if self.lifelike is not None:
             path, colors = self.lifelike
             body = tuck(TriangleMesh(path.at(time), path.faces, colors), body, [cloth])
-        worn = outside([apply(one, self.cloth.frames[frame]) for one in self._bound], body)
-        moved = [replace(mesh, vertices=place) for mesh, place in zip(self.garment, worn, strict=True)]
-        return [*moved, body]
+        there = self.cloth.frames[frame]
+        worn = [replace(mesh, vertices=apply(one, there)) for mesh, one in zip(self.garment, self._bound, strict=True)]
+        clear = outside(worn, body)
+        return [*(replace(mesh, vertices=place) for mesh, place in zip(worn, clear, strict=True)), body]
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Return the lowest and the highest corner of the box about all frames [m], each of shape (3,)."""
