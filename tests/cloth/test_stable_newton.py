@@ -212,6 +212,31 @@ def test_where_cloth_is_about_to_buckle_steps_are_short_enough_for_it_to():
     assert not strip.exact
 
 
+class Balancing(Buckling):
+    """The strip again: exact steps are taken where their system is definite, usual ones bring it back to the middle."""
+
+    c = 50.0**2  # 1/s²: in the middle, systems of steps below 1/50 s are
+
+    def run(self, state, seconds):
+        x, v, h = 1e3 * state.positions[0, 0], 1e3 * state.velocities[0, 0], self.step
+        self.was_positive_definite = False
+        for step in range(round(seconds / h)):
+            held = 1.0 + h * h * self.c * (3.0 * x * x - 1.0)
+            if self.exact and held <= 0.0:
+                return ClothState(*(np.array([[1e-3 * one, 0, 0]]) for one in (x, v)), state.time + step * h)
+            v = (v + h * self.c * x * (1.0 - x * x)) / held if self.exact else -0.5 * x / h
+            x += h * v
+        self.was_positive_definite = self.exact
+        return ClothState(*(np.array([[1e-3 * one, 0, 0]]) for one in (x, v)), state.time + seconds)
+
+
+def test_the_nearer_a_step_is_to_the_longest_the_sooner_cloth_leaves_a_saddle():
+    found = relax_to_rest(Balancing(), at_rest(np.array([[1e-9, 0, 0]])), SettleLimits(1e-5, 0.01, 10.0, 160))
+    assert found.settled
+    assert found.state.positions[0, 0] == pytest.approx(1e-3, abs=1e-5)
+    assert len(found.trace) < 20
+
+
 class Chattering(Straying):
     """The same, but what a longer step makes of its contacts is not positive definite."""
 

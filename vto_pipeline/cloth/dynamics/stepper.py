@@ -169,7 +169,7 @@ class Stepper:
             self._method.self_contact = self.self_contact
 
     def run(self, state: ClothState, seconds: float) -> ClothState:
-        """Return the state after so much simulated time [s]; earlier where it is `out_of_time`, or no step is to be had.
+        """Return the state after so much simulated time [s]; earlier where it is `out_of_time`, or a step is not taken.
 
         Raises:
             DivergedError: a position is no longer finite.

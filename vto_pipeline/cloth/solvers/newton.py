@@ -98,8 +98,8 @@ class Newton:
 
     Attributes:
         self_contact: What keeps the cloth from itself, if anything; may be set between runs.
-        exact: Whether steps use the exact stiffness, and are taken only where all systems are positive definite with it;
-            may be set.
+        exact: Whether steps use the exact stiffness, and are only taken where their systems are positive definite with
+            it; may be set.
         definite: Whether all systems of the last step were, with the exact stiffness.
         active: The contacts of the last step, and the forces they bore.
         limits: Of a step; may be lowered where its time is short.
