@@ -96,7 +96,7 @@ def test_no_vertex_is_left_inside_a_body_with_creases() -> None:
     )
     assert (before < 0).sum() > 300
     assert after.min() > 0.0001
-    far = before > 0.001
+    far = before > 0.009  # nearer ones may be raised, for these faces cut right through the body
     assert (parts[0].mesh.vertices[far] == points[far]).all()  # what is clear stays
     assert (before < 0).sum() < moved <= (~far).sum()
     assert np.abs(after[before < 0]).max() < 0.01  # just outside, not far off
