@@ -58,15 +58,18 @@ def run(tmp_path) -> Path:
 
 
 def goes_along(found: np.ndarray, draped: TriangleMesh, body: TriangleMesh, tolerance: float) -> None:
-    """It is where the motion has it, but for what an arm is in, which is at the arm's skin."""
+    """It is where the motion has it, but for what an arm is in or cuts, which is at the arm's skin or just above it."""
     wanted = draped.vertices @ TURN.T + SHIFT
     judge = o3d.t.geometry.RaycastingScene()
     judge.add_triangles(body.vertices.astype(np.float32), body.faces.astype(np.uint32))
     before, after = (judge.compute_signed_distance(x.astype(np.float32), nsamples=5).numpy() for x in (wanted, found))
-    assert_allclose(found[before > 1e-3], wanted[before > 1e-3], rtol=0, atol=tolerance)
+    raised, clear = 9e-3, before > 1e-3  # m: corners of triangles that an arm cuts, at most
+    assert_allclose(found[before > raised], wanted[before > raised], rtol=0, atol=tolerance)
+    moved = np.linalg.norm(found - wanted, axis=1) > tolerance
+    assert (moved & clear).sum() < 0.01 * len(wanted)
     assert 0 < (before < 0).sum() < 0.1 * len(wanted)
     assert after.min() > 0
-    assert after[before < 0].max() < 5e-3
+    assert after[moved].max() < raised
 
 
 def test_garment_and_body_are_where_the_motion_has_them(run):
