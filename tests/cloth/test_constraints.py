@@ -109,6 +109,20 @@ def test_stiffness_of_what_is_taut_is_the_slope_of_the_force(name):
     assert_allclose(found, exact, rtol=0, atol=2e-6 * np.abs(exact).max())  # central difference
 
 
+@pytest.mark.parametrize("damped", [0.0, 0.5])
+@pytest.mark.parametrize("name", NAMES)
+def test_exact_stiffness_is_the_slope_of_the_force(name, damped):
+    """In any state: pushed, sheared and folded. Damping adds its share of what the material resists."""
+    plain = EXAMPLES[name]
+    data = plain._replace(damping=damped) if name not in WITHOUT_DAMPER else plain
+    x = crumpled(amount=0.02, seed=5)
+    stiffness = Stiffness(model_of((data,), np.ones(len(x))))
+    found = to_scipy(stiffness.assemble_exact(x, damping_factor=1.0)).toarray()
+    expected = -slope(x, lambda y: forces(y, plain).ravel(), step=1e-7)
+    expected += to_scipy(stiffness.assemble(x, stiffness_factor=0.0, damping_factor=1.0)).toarray()
+    assert_allclose(found, expected, rtol=0, atol=2e-6 * np.abs(expected).max())  # central difference: step² and rounding
+
+
 @pytest.mark.parametrize("name", sorted(set(NAMES) - MOVED_BY_SPACE))
 def test_rigid_motion_costs_nothing_and_changes_nothing(name):
     data, x = EXAMPLES[name], crumpled()

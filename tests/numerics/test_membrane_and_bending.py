@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
 from vto_pipeline.numerics.mechanics import membrane, slider
-from vto_pipeline.numerics.mechanics.bending import dihedral
+from vto_pipeline.numerics.mechanics.bending import add_dihedral_hessian, dihedral
 from vto_pipeline.numerics.mechanics.plane_stress import inverse_compliance, plane_stress, scaled
 from vto_pipeline.numerics.mechanics.tension import tensile, tension_pulls, thread_tension
 
@@ -47,10 +47,26 @@ def test_its_gradient_is_the_slope():
     assert_allclose(gradient.sum(axis=0), 0.0, rtol=0, atol=1e-14)  # moved as one, it stays
 
 
+@pytest.mark.parametrize("angle", [-2.5, -0.7, 0.0, 0.7, 2.5])
+def test_its_second_derivatives_are_the_slopes_of_the_gradient(angle):
+    x = np.array(fold(angle)) + np.random.default_rng(1).normal(0.0, 0.1, (4, 3))
+    found = np.zeros((4, 4, 3, 3))
+    add_dihedral_hessian(2.0, *map(tuple, x), found)
+    for a, k in np.ndindex(4, 3):
+        step = np.zeros((4, 3))
+        step[a, k] = 1e-6
+        ahead, behind = (np.array(dihedral(*map(tuple, y))[1:]) for y in (x + step, x - step))
+        assert_allclose(found[:, a, :, k], 2.0 * (ahead - behind) / 2e-6, rtol=0, atol=1e-7 * np.abs(found).max())
+    assert_allclose(found, found.transpose(1, 0, 3, 2), rtol=0, atol=1e-13 * np.abs(found).max())
+
+
 def test_a_wing_without_area_rests():
     x = list(fold(0.5))
     x[2] = (0.5, 0.0, 0.0)
     assert dihedral(*x) == (0.0, *[(0.0, 0.0, 0.0)] * 4)
+    blocks = np.zeros((4, 4, 3, 3))
+    add_dihedral_hessian(1.0, *x, blocks)
+    assert not blocks.any()
 
 
 @pytest.mark.parametrize("angle", [-0.6, 0.0, 0.6])

@@ -15,6 +15,10 @@ And where the general way to the stiffness, ∇Cᵀ α⁻¹ ∇C + geometric, is
 
 * `stiffness(i, x, data, material, stress, blocks)`: write material ∇Cᵀ α⁻¹ ∇C + stress geometric into blocks.
 
+For the stiffness with all that stress adds, a sixth; where there is none, it is made of differences of the forces:
+
+* `exact(i, x, data, material, blocks)`: write -∂f/∂x + (material - 1) ∇Cᵀ α⁻¹ ∇C into blocks.
+
 And for kinds that remember, whose data have a `slider`, shape (N, ...):
 
 * `slip(i, x, data)`: at the end of a step, let the slider of stencil i give way; see `cloth.model.internal_friction`.
@@ -37,7 +41,7 @@ class Kind:
         data: Its NamedTuple of arrays, with at least `vertices` (N, S), `damping` [s], `starts` and `colours` (see
             `numerics.blocks.Blocks`).
         rows: Scalar constraints per stencil, B.
-        project, force, linearise, geometric, stiffness, slip: See above.
+        project, force, linearise, geometric, stiffness, slip, exact: See above.
     """
 
     data: type
@@ -48,3 +52,4 @@ class Kind:
     geometric: Callable[..., None] | None = None
     stiffness: Callable[..., None] | None = None
     slip: Callable[..., None] | None = None
+    exact: Callable[..., None] | None = None

@@ -291,6 +291,19 @@ def _stiffness_one_compiled(i, x, data, material, stress, blocks, scratch):
     return _general_stiffness
 
 
+def exact_one(i, x, data, material, blocks):
+    """Write the exact stiffness of one stencil into blocks, of a kind that has it; see `kind`. From compiled code only."""
+    raise NotImplementedError
+
+
+@overload(exact_one)
+def _exact_one_compiled(i, x, data, material, blocks):
+    exact = _BY_DATA[data.instance_class].exact
+    if exact is None:
+        return lambda i, x, data, material, blocks: None
+    return lambda i, x, data, material, blocks: exact(i, x, data, material, blocks)
+
+
 def _general_stiffness(i, x, data, material, stress, blocks, scratch):
     values, gradients, compliance, weighted = scratch
     linearise_one(i, x, data, values, gradients, compliance)

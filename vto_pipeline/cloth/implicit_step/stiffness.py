@@ -1,7 +1,8 @@
 """The matrix m M + s K of an implicit step: one pattern per cloth, values at each position.
 
 The stiffness that steps use as a rule is kept positive semidefinite by leaving out what pressure takes away. The exact
-one, indefinite where the cloth is about to buckle, is made of differences of the forces, stencil by stencil.
+one, indefinite where the cloth is about to buckle, is what a kind brings along, or else made of differences of the
+forces, stencil by stencil.
 """
 
 from __future__ import annotations
@@ -9,7 +10,14 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM, force_one, stiffness_one, stiffness_scratch
+from vto_pipeline.cloth.constraints.sweep import (
+    PARALLEL_FROM,
+    exact_one,
+    force_one,
+    kind_of,
+    stiffness_one,
+    stiffness_scratch,
+)
 from vto_pipeline.cloth.model.build import ClothModel
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.numerics.linear.block_matrix import BlockMatrix, pattern
@@ -61,7 +69,7 @@ class Stiffness:
         _clear(matrix, self._held, mass_factor * self._model.mass)
         for data, places in zip(self._model.constraints, self._places, strict=True):
             material = stiffness_factor + damping_factor * data.damping
-            _assemble(x, data, places, self._held, material, stiffness_factor, matrix.blocks)
+            _assemble(x, data, places, self._held, material, stiffness_factor, False, matrix.blocks)
         return matrix
 
     def assemble_exact(self, x: FloatArray, mass_factor: float = 0.0, damping_factor: float = 0.0) -> BlockMatrix:
@@ -69,10 +77,14 @@ class Stiffness:
 
         The matrix is overwritten by the next call.
         """
-        matrix = self.assemble(x, mass_factor, 0.0, damping_factor)
+        matrix = self._matrix
+        _clear(matrix, self._held, mass_factor * self._model.mass)
         here, forces = x.copy(), np.empty_like(x)
         for data, places in zip(self._model.constraints, self._places, strict=True):
-            _differ(here, data, places, self._held, _STEP * self._model.edge_length, forces, matrix.blocks)
+            known, damped = kind_of(data).exact is not None, damping_factor * data.damping
+            _assemble(x, data, places, self._held, damped + known, 0.0, known, matrix.blocks)
+            if not known:
+                _differ(here, data, places, self._held, _STEP * self._model.edge_length, forces, matrix.blocks)
         return matrix
 
 
@@ -85,29 +97,32 @@ def _clear(matrix, held, mass):
 
 
 @njit(cache=True, error_model="numpy")
-def _assemble(x, data, places, held, material, stress, blocks):
+def _assemble(x, data, places, held, material, stress, exact, blocks):
     for colour in range(len(data.colours) - 1):
         first, last = data.colours[colour], data.colours[colour + 1]
         if len(x) >= PARALLEL_FROM and last - first > 1:
-            _assemble_colour(x, data, places, held, material, stress, blocks, first, last)
+            _assemble_colour(x, data, places, held, material, stress, exact, blocks, first, last)
         else:
             for block in range(first, last):
-                _assemble_block(x, data, places, held, material, stress, blocks, block)
+                _assemble_block(x, data, places, held, material, stress, exact, blocks, block)
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
-def _assemble_colour(x, data, places, held, material, stress, blocks, first, last):
+def _assemble_colour(x, data, places, held, material, stress, exact, blocks, first, last):
     for block in prange(first, last):
-        _assemble_block(x, data, places, held, material, stress, blocks, block)
+        _assemble_block(x, data, places, held, material, stress, exact, blocks, block)
 
 
 @njit(cache=True, error_model="numpy")
-def _assemble_block(x, data, places, held, material, stress, blocks, block):
+def _assemble_block(x, data, places, held, material, stress, exact, blocks, block):
     corners = data.vertices.shape[1]
     local = np.empty((corners, corners, 3, 3))
     scratch = stiffness_scratch(data)
     for i in range(data.starts[block], data.starts[block + 1]):
-        stiffness_one(i, x, data, material, stress, local, scratch)
+        if exact:
+            exact_one(i, x, data, material, local)
+        else:
+            stiffness_one(i, x, data, material, stress, local, scratch)
         for a in range(corners):
             if held[data.vertices[i, a]]:
                 continue

@@ -1,7 +1,7 @@
 """Geometric stiffness of a triangle from its stress.
 
-A tension is what `tension_pulls` needs: the tensile plane stress S that acts along a normal n, and each thread's own
-tension against turning in the plane, along p and q.
+A tension is what `tension_pulls` needs: the plane stress S that acts along a normal n, and for each thread its tension
+against turning in the plane, along p or q, and what shear makes of it, which leans along the thread.
 """
 
 from __future__ import annotations
@@ -34,16 +34,44 @@ def thread_tension(stress, slopes, frame):
     tilt = stress[2] * (1.0 / cosine if cosine > 1e-7 else 0.0)
     uu = stress[0] * iu - tilt * sine * iu * iu
     vv = stress[1] * iv - tilt * sine * iv * iv
-    normal = unit(cross(slopes[0], slopes[1]))
+    normal, upright = unit(cross(slopes[0], slopes[1])), (0.0, 0.0, 0.0)
     turn_u, turn_v = max(stress[0], 0.0) * iu, max(stress[1], 0.0) * iv
-    return tensile(uu, vv, tilt * iu * iv), normal, turn_u, unit(slopes[2]), turn_v, unit(slopes[3])
+    whole = tensile(uu, vv, tilt * iu * iv)
+    return whole, normal, (turn_u, unit(slopes[2]), upright), (turn_v, unit(slopes[3]), upright)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def exact_thread_tension(stress, slopes, frame):
+    """Return all that a stress adds: Σ σ ∂²ε of the strains of `thread_strains`, indefinite where it compresses.
+
+    As the thread u turns by dφ in the plane, its strain's slope u turns to p; that of shear, p / |F_u|, turns to -u,
+    and shrinks as the thread gets longer: -(u pᵀ + p uᵀ) / |F_u|².
+    """
+    iu, iv, sine, cosine = frame
+    tilt = stress[2] * (1.0 / cosine if cosine > 1e-7 else 0.0)
+    uu = stress[0] * iu - tilt * sine * iu * iu
+    vv = stress[1] * iv - tilt * sine * iv * iv
+    lean_u, lean_v = scale(-stress[2] * iu * iu, slopes[0]), scale(-stress[2] * iv * iv, slopes[1])
+    return (
+        (uu, vv, tilt * iu * iv),
+        unit(cross(slopes[0], slopes[1])),
+        (stress[0] * iu, unit(slopes[2]), lean_u),
+        (stress[1] * iv, unit(slopes[3]), lean_v),
+    )
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def tension_pulls(tension, du, dv, m):
     """Return how the pulls on F_u and F_v change as a corner with shape gradient (du, dv) moves along axis m."""
-    (uu, vv, uv), n, turn_u, p, turn_v, q = tension
+    (uu, vv, uv), n, thread_u, thread_v = tension
     return (
-        axpy((uu * du + uv * dv) * n[m], n, scale(turn_u * du * p[m], p)),
-        axpy((uv * du + vv * dv) * n[m], n, scale(turn_v * dv * q[m], q)),
+        axpy((uu * du + uv * dv) * n[m], n, scale(du, _turned(thread_u, m))),
+        axpy((uv * du + vv * dv) * n[m], n, scale(dv, _turned(thread_v, m))),
     )
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _turned(thread, m):
+    """Return column m of turn p pᵀ + lean pᵀ + p leanᵀ."""
+    turn, p, lean = thread
+    return axpy(turn * p[m] + lean[m], p, scale(p[m], lean))

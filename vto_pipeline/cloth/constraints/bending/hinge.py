@@ -22,7 +22,7 @@ from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.numerics.linear.coloured_blocks import blocks
-from vto_pipeline.numerics.mechanics.bending import dihedral
+from vto_pipeline.numerics.mechanics.bending import add_dihedral_hessian, dihedral
 from vto_pipeline.numerics.mechanics.xpbd_row import multiplier_step
 from vto_pipeline.numerics.vector import axpy, dot, load, store, store_at, sub
 
@@ -195,5 +195,19 @@ def _linearise(i, x, data, values, gradients, compliance):
     compliance[0, 0] = data.compliance[i]
 
 
-# None for what stress adds: the second derivative of the angle is indefinite, and small beside the material's share.
-KIND = Kind(Bend, 1, _project, _force, _linearise, None)
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _exact(i, x, data, material, blocks):
+    angle, slopes = hinge_angle_gradients(i, x, data)
+    stiffness = 1.0 / data.compliance[i]
+    for a in range(4):
+        for b in range(4):
+            for k in range(3):
+                for m in range(3):
+                    blocks[a, b, k, m] = material * stiffness * slopes[a][k] * slopes[b][m]
+    a, b, c, d = data.vertices[i, 0], data.vertices[i, 1], data.vertices[i, 2], data.vertices[i, 3]
+    moment = stiffness * (angle - data.rest[i])
+    add_dihedral_hessian(moment, load(x, a), load(x, b), load(x, c), load(x, d), blocks)
+
+
+# None for what stress adds as a rule: the second derivative of the angle is indefinite.
+KIND = Kind(Bend, 1, _project, _force, _linearise, None, exact=_exact)

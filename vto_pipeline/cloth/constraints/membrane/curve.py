@@ -29,7 +29,7 @@ from vto_pipeline.model.garment import RestShape
 from vto_pipeline.numerics.mechanics.membrane import pulls, thread_strains
 from vto_pipeline.numerics.mechanics.monotone_curve import MonotoneCurve, curve_at
 from vto_pipeline.numerics.mechanics.plane_stress import scaled
-from vto_pipeline.numerics.mechanics.tension import thread_tension
+from vto_pipeline.numerics.mechanics.tension import exact_thread_tension, thread_tension
 from vto_pipeline.numerics.vector import scale
 
 _FLATTEST = 1e-6  # tangent as a share of the slope at rest: where a curve is level, its compliance must stay finite
@@ -136,4 +136,13 @@ def _stiffness(t, x, data, material, stress, blocks):
     write_stiffness(t, data, scaled(slope, material * data.area[t]), slopes, tension, blocks)
 
 
-KIND = Kind(Curve, 3, _project, _force, _linearise, None, _stiffness)
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _exact(t, x, data, material, blocks):
+    fu, fv = deformed(t, x, data)
+    strain, slopes, frame = thread_strains(fu, fv)
+    _, pull, slope = _law(strain, data)
+    tension = exact_thread_tension(scale(data.area[t], pull), slopes, frame)
+    write_stiffness(t, data, scaled(slope, material * data.area[t]), slopes, tension, blocks)
+
+
+KIND = Kind(Curve, 3, _project, _force, _linearise, None, _stiffness, exact=_exact)

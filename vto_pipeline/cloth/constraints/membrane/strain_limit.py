@@ -26,7 +26,7 @@ from vto_pipeline.cloth.constraints.membrane.triangle import (
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.numerics.mechanics.membrane import pulls, thread_strains
 from vto_pipeline.numerics.mechanics.plane_stress import scaled
-from vto_pipeline.numerics.mechanics.tension import thread_tension
+from vto_pipeline.numerics.mechanics.tension import exact_thread_tension, thread_tension
 from vto_pipeline.numerics.vector import scale
 
 
@@ -144,4 +144,12 @@ def _stiffness(t, x, data, material, stress, blocks):
     write_stiffness(t, data, scaled(stiff, material), slopes, tension, blocks)
 
 
-KIND = Kind(StrainLimit, 3, _project, _force, _linearise, None, _stiffness)
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _exact(t, x, data, material, blocks):
+    fu, fv = deformed(t, x, data)
+    strain, slopes, frame = thread_strains(fu, fv)
+    _, stiff, pull = _stops(strain, data, data.area[t])
+    write_stiffness(t, data, scaled(stiff, material), slopes, exact_thread_tension(pull, slopes, frame), blocks)
+
+
+KIND = Kind(StrainLimit, 3, _project, _force, _linearise, None, _stiffness, exact=_exact)

@@ -27,7 +27,7 @@ from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.numerics.mechanics.membrane import pulls, thread_strains
 from vto_pipeline.numerics.mechanics.plane_stress import inverse_compliance, plane_stress, scaled
-from vto_pipeline.numerics.mechanics.tension import thread_tension
+from vto_pipeline.numerics.mechanics.tension import exact_thread_tension, thread_tension
 from vto_pipeline.numerics.vector import dot, scale
 
 
@@ -114,4 +114,12 @@ def _stiffness(t, x, data, material, stress, blocks):
     write_stiffness(t, data, inverse_compliance(data.compliance, material * data.area[t]), slopes, tension, blocks)
 
 
-KIND = Kind(Stretch, 3, _project, _force, _linearise, None, _stiffness)
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _exact(t, x, data, material, blocks):
+    fu, fv = deformed(t, x, data)
+    strain, slopes, frame = thread_strains(fu, fv)
+    tension = exact_thread_tension(scale(data.area[t], plane_stress(strain, data.compliance)), slopes, frame)
+    write_stiffness(t, data, inverse_compliance(data.compliance, material * data.area[t]), slopes, tension, blocks)
+
+
+KIND = Kind(Stretch, 3, _project, _force, _linearise, None, _stiffness, exact=_exact)
