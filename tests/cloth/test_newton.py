@@ -14,7 +14,7 @@ from vto_pipeline.cloth.constraints.sweep import add_damping_forces, add_forces
 from vto_pipeline.cloth.integrators import INTEGRATORS
 from vto_pipeline.cloth.model.build import ClothState, at_rest, build_cloth, model_of
 from vto_pipeline.cloth.model.materials import Materials
-from vto_pipeline.cloth.solvers.newton import Newton
+from vto_pipeline.cloth.solvers.newton import Limits, Newton
 from vto_pipeline.model.garment import RestShape
 
 G = 9.81
@@ -308,6 +308,19 @@ def test_a_crumpled_landing_keeps_to_the_cone():
     state = ClothState(state.positions + RAISED, state.velocities + THROWN)
     forces, _ = landings(0.2, state, model, 1)
     assert np.hypot(forces[0, 0], forces[0, 2]) < 0.3 * forces[0, 1]
+
+
+def test_what_hangs_above_a_floor_is_not_drawn_to_it():
+    """A bead in balance on a thread, 5 mm above it: free, it would fall 11 mm in the step. One solution has to do."""
+    stiffness, mass = 1e3, 0.01
+    x = np.array([[0.0, 1.005, 0.0], [0.0, 0.005, 0.0]])
+    slack = x + np.array([[0.0, 0.0, 0.0], [0.0, mass * G / stiffness, 0.0]])
+    thread = springs([[0, 1]], slack, 1.0 / stiffness)
+    method = Newton(model_of((thread,), np.full(2, mass), pinned=(0,), gravity=(0.0, -G, 0.0)))
+    method.limits = Limits(contact_rounds=1)
+    state = at_rest(x)
+    after = method.advance(state, on_plane(state, (0.0, 1.0, 0.0), 0.3, h=1.0 / 30.0), 1.0 / 30.0, 1)
+    assert_allclose(after.positions, x, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.5])
