@@ -130,6 +130,22 @@ def test_what_meets_nothing_goes_all_the_way():
     assert len(met.key) == 0
 
 
+def test_a_vertex_that_a_trial_flings_does_not_make_everything_near_everything():
+    """Half a metre; the others stay. Their pairs are as few as before, and what it would pass through is found."""
+    mesh = sheet(40, 40, 0.4, 0.4, upright=False)
+    shelf = np.array([[0.1, 0.2, 0.1], [0.3, 0.2, 0.1], [0.2, 0.2, 0.3]])
+    x = np.vstack([mesh.vertices - mesh.vertices.mean(axis=0) + [0.2, 0.0, 0.2], shelf])
+    faces = np.vstack([mesh.faces, [[1600, 1601, 1602]]]).astype(np.int32)
+    flung = x.copy()
+    middle = int(np.argmin(np.linalg.norm(x[:1600] - [0.2, 0.0, 0.2], axis=1)))
+    flung[middle, 1] += 0.5
+    found = [SelfContact(faces, np.full(len(x), 1e-4), 0.3, force_all=brute) for brute in (False, True)]
+    ends = [one.collision_free(x, flung)[0] for one in found]
+    assert_array_equal(ends[0], ends[1])
+    assert ends[0][middle, 1] < 0.2  # below the shelf
+    assert found[0].counters.candidates < 4 * found[1].counters.candidates
+
+
 def test_safe_moves_have_the_same_bits_with_one_thread_and_two():
     x, faces = triangles(60, 5)
     wanted = x + np.random.default_rng(1).normal(scale=0.1, size=x.shape)

@@ -19,6 +19,7 @@ class CollisionCounters:
         reused: Of those, how often an earlier search still held.
         searched: Of those, how often candidates were searched for.
         rested: Of those reused, how often it was of an earlier step: nothing had left the room it looked in.
+        candidates: Most that a search has found.
         proof_s, search_s: Time taken by proofs and searches [s].
         body_asked, body_searched: How often candidates between cloth and bodies were asked and searched for.
         body_s: Time taken by those searches [s].
@@ -34,6 +35,7 @@ class CollisionCounters:
     reused: int = 0
     searched: int = 0
     rested: int = 0
+    candidates: int = 0
     proof_s: float = 0.0
     search_s: float = 0.0
     body_asked: int = 0

@@ -28,7 +28,8 @@ _RECOVERY = 0.1  # m/s: speed at which layers nearer than their thickness are le
 _REGAINED = 0.2  # of a gap that is lost, at most, in a step: at once, layers would be thrown apart
 _ROOM = 0.1  # of an edge: the most that layers are looked for beyond their thickness, or none could be proven apart
 _LOOK = 50  # searches after which to see whether the tree is still good, and what has come free
-_WIDER = 0.3  # of the longest way: how much farther than asked for a search looks, to serve the rest of the step too
+_WIDER = 0.3  # of the longest way: how much farther than asked for a search looks, to serve the rest of the step too;
+# of an edge at most: a single vertex that a trial flings must not make everything near everything
 _ASLEEP = 0.3  # of the reach: but at least so much, so that what hardly moves is not searched for at each step
 
 
@@ -285,6 +286,7 @@ class SelfContact:
         found = Candidates(*self_candidates(self._fitted(x, end, wider), self._cloth, x, end, wider, self._crossed))
         self._found = _CachedCandidates(found, *_swept_bounds(x, end, wider))
         self.counters.searched += 1
+        self.counters.candidates = max(self.counters.candidates, found.size)
         self.counters.search_s += time.perf_counter() - began
         return self._still_overlapping(found, x, end, radius)
 
@@ -324,7 +326,7 @@ class SelfContact:
         """Return radii to search within, with room for the rest of the step and for rest [m], shape (V,)."""
         if self._force_all:
             return self._reach
-        longest = float(np.sqrt(((end - x) ** 2).sum(axis=1).max(initial=0.0)))
+        longest = min(float(np.sqrt(((end - x) ** 2).sum(axis=1).max(initial=0.0))), self._edge(x))
         return self._reach + max(_WIDER * longest, _ASLEEP * float(self._reach.max(initial=0.0)))
 
     def _fitted(self, x: FloatArray, end: FloatArray, radius: FloatArray) -> bvh.Bvh:
