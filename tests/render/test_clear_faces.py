@@ -13,7 +13,9 @@ from vto_pipeline.geometry.remeshing.decimate import decimate
 from vto_pipeline.geometry.topology import submesh
 from vto_pipeline.io.meshes import read_mesh
 from vto_pipeline.model.mesh import TriangleMesh
-from vto_pipeline.render.clear_body import outside
+from vto_pipeline.model.render import GlbPart
+from vto_pipeline.render.clear_body import cut_by_body, outside
+from vto_pipeline.render.dress import BODY as BODY_PART
 
 BODY = Path(__file__).parents[2].parent / "shared" / "data" / "bodies" / "mh_female_averageweight.ply"
 RADIUS = 0.1
@@ -58,6 +60,26 @@ def test_both_sides_of_a_seam_are_raised_together() -> None:
     apart = TriangleMesh(made.vertices[made.faces].reshape(-1, 3), np.arange(3 * len(made.faces)).reshape(-1, 3))
     whole, cut = (outside([one], ball())[0] for one in (TriangleMesh(made.vertices, made.faces), apart))
     assert np.array_equal(cut.reshape(-1, 3, 3), whole[made.faces])
+
+
+def test_what_still_cuts_the_body_is_counted() -> None:
+    """A sheet through a ball's middle: its triangles cut whose nearest and farthest points lie on both sides."""
+    across = np.linspace(-0.15, 0.15, 16) + 0.0031
+    x, z = np.meshgrid(across, across, indexing="ij")
+    corner = np.arange(256).reshape(16, 16)
+    a, b, c, d = (part.ravel() for part in (corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]))
+    sheet = TriangleMesh(
+        np.column_stack([x.ravel(), np.zeros(256), z.ravel()]),
+        np.vstack([np.column_stack(t) for t in ((a, b, c), (a, c, d))]),
+    )
+    corners = sheet.vertices[sheet.faces]
+    nearest = np.linalg.norm(trimesh.triangles.closest_point(corners, np.zeros((len(corners), 3))), axis=1)
+    farthest = np.linalg.norm(corners, axis=2).max(axis=1)
+    cut = (nearest < RADIUS) & (farthest > RADIUS)
+    assert np.abs(np.concatenate([nearest, farthest]) - RADIUS).min() > 1e-4  # the ball's triangles lie nearer to it
+    worn, body = GlbPart("garment", sheet), GlbPart(BODY_PART, ball())
+    assert cut_by_body([worn, body]) == cut.sum() > 20
+    assert cut_by_body([worn]) == 0
 
 
 @pytest.mark.real_data

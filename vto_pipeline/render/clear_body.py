@@ -50,6 +50,16 @@ def clear_body(parts: Sequence[GlbPart]) -> tuple[list[GlbPart], int]:
     return found, sum(int((new.mesh.vertices != old.mesh.vertices).any(axis=1).sum()) for old, new in pairs)
 
 
+def cut_by_body(parts: Sequence[GlbPart]) -> int:
+    """Return how many triangles of what is worn pass through the body, of parts as `clear_body` takes them."""
+    bodies = [part.mesh for part in parts if part.name == BODY]
+    if not bodies:
+        return 0
+    body = concatenate(bodies)
+    worn = [part.mesh for part in parts if part.name != BODY]
+    return sum(len(np.unique(intersecting_faces(mesh, body)[:, 0])) for mesh in worn)
+
+
 def outside(worn: Sequence[TriangleMesh], body: TriangleMesh) -> list[FloatArray]:
     """Return the vertices of meshes, each of shape (V, 3), moved as little as clears them of the body [m].
 

@@ -22,7 +22,7 @@ from vto_pipeline.model.settings import Config
 from vto_pipeline.model.texture import TexturedMesh
 from vto_pipeline.pipeline.stage import Stage
 from vto_pipeline.render.carry_skin import carry_skin
-from vto_pipeline.render.clear_body import clear_body
+from vto_pipeline.render.clear_body import clear_body, cut_by_body
 from vto_pipeline.render.dress import BODY, DressConfig, body_part, deform_render_mesh
 from vto_pipeline.render.marks import mark_places
 from vto_pipeline.render.tuck import tuck
@@ -38,7 +38,10 @@ def _transfer(inputs: Inputs, settings: DressConfig, job: Job) -> Outputs:
     parts = deform_render_mesh(garment, inputs["sim_mesh"], inputs["draped"], settings, job)
     if "collider" in inputs:
         parts, moved = clear_body([*parts, body_part(_shown_body(inputs), settings)])
-        job.measure(moved_out_of_body=moved)
+        cut = cut_by_body(parts)
+        job.measure(moved_out_of_body=moved, cut_by_body=cut)
+        if cut:
+            job.warn(f"{cut} triangles of the render mesh pass through the body, deeper than pictures hide: skin shows")
         if not settings.body:
             parts.pop()
     return {"render_mesh": parts}
