@@ -97,10 +97,14 @@ def test_what_never_came_free_of_the_body_and_is_stretched_about_it_is_not_waite
     assert len(cleared) == (0 if caught else 1)
 
 
-def growing(monkeypatch, jams):
-    """How cloth is grown that jams on so many ways; the bodies that it began about, by their place [m]."""
+def growing(monkeypatch, jams, size=1.0):
+    """How cloth is grown that jams on so many ways; the bodies that it began about, by their place [m].
+
+    It starts so many times its size.
+    """
     mesh = sheet(4, 4, 0.1, 0.1)  # in the ball
-    model, rest = build_cloth(mesh, RestShape(mesh.vertices), fabric()), RestShape(mesh.vertices)
+    rest = RestShape(mesh.vertices / size)
+    model = build_cloth(mesh, rest, fabric())
     body, begun = ball(0.12, levels=1), []
 
     def way(place, otherwise):
@@ -114,10 +118,14 @@ def growing(monkeypatch, jams):
         return state
 
     ways = way(0.01, way(0.02, None))
+    monkeypatch.setattr(BodyGrowth, "from_smaller", lambda growth, times: growth)
     monkeypatch.setattr(module, "plan_body_growth", lambda *given: ways)
     monkeypatch.setattr(module, "run_body_motion", run)
     phases = Phases(model, rest, fabric(), DrapeConfig(grow_above_mm=0.0), Job())
-    phases.grow_body(at_rest(mesh.vertices), body)
+    try:
+        phases.grow_body(at_rest(mesh.vertices), body)
+    except IntersectingError:
+        begun.append(np.nan)
     return begun
 
 
@@ -127,5 +135,11 @@ def test_cloth_that_jams_begins_again_from_a_thinner_body(monkeypatch):
 
 
 def test_cloth_that_jams_on_every_way_is_refused(monkeypatch):
-    with pytest.raises(IntersectingError, match="jammed"):
-        growing(monkeypatch, 2)
+    assert growing(monkeypatch, 2) == pytest.approx([0.01, 0.02, np.nan], abs=1e-9, nan_ok=True)
+
+
+def test_what_is_far_too_small_is_refused_at_its_first_jam(monkeypatch):
+    """A second way costs as much as the first, and jams as well."""
+    assert growing(monkeypatch, 1, size=1.2) == pytest.approx([0.01, np.nan], abs=1e-9, nan_ok=True)
+    assert growing(monkeypatch, 1, size=1.1) == pytest.approx([0.01, 0.02], abs=1e-9)
+    assert growing(monkeypatch, 0, size=1.2) == pytest.approx([0.01], abs=1e-9)

@@ -23,7 +23,7 @@ from vto_pipeline.cloth.model.build import ClothModel, ClothState, at_rest, buil
 from vto_pipeline.cloth.model.coarsening import CoarseGarment, coarsen
 from vto_pipeline.cloth.placement.clear_body import edge_stretches
 from vto_pipeline.cloth.rest.convergence import SettlingResult, rms
-from vto_pipeline.cloth.rest.phases import ROUGH, Phases
+from vto_pipeline.cloth.rest.phases import ENLARGED, ROUGH, Phases
 from vto_pipeline.cloth.rest.softened import softened
 from vto_pipeline.cloth.rest.true_distance import some_positions, with_true_distances
 from vto_pipeline.cloth.simulation import default_skin
@@ -39,9 +39,6 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 _FEWER = 4  # times fewer vertices on the next coarser mesh: edges twice as long
 _LONGEST = 0.03  # m: of longer edges, layers about an arm cannot lie clear of it and of each other
-_ENLARGED = (
-    1.15  # times its size: a place is found for it a fifth larger, or more; what is worn snugly is stretched less
-)
 _FIRST = 0.5  # of the progress, and of the time there is: the coarser meshes
 
 
@@ -264,7 +261,7 @@ class _CoarseToFine:
         """
         mesh, rest = self._garment.mesh, self._garment.rest.positions
         times = float(np.median(edge_stretches(mesh.vertices, rest, mesh.faces)))
-        if times > _ENLARGED:
+        if times > ENLARGED:
             raise IntersectingError(
                 f"too small: this body needs the garment {times - 1:.0%} larger, and on a coarser mesh {why}",
                 hint="give a larger size, or a body that it is meant for",

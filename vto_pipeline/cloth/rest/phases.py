@@ -43,6 +43,8 @@ steps is faster at ending that."""
 _GROWING = "growing the body inside the garment"
 _TURNS = 5  # of coming to rest and being cleared
 _LARGER = 1.02  # times its size: what starts so was enlarged, not just bent
+ENLARGED = 1.15
+"""Times its size: a place is found for it a fifth larger, or more; what is worn snugly is stretched less."""
 _LONG = 0.5  # steps per 1/60 s on the way to rest: backward Euler takes the more motion out, the longer they are
 _CALM = 20.0  # 1/s: velocities fade this fast while the body grows, where the way does not matter
 
@@ -137,8 +139,8 @@ class Phases:
             try:
                 return self._grown(growth)
             except IntersectingError as error:
-                if growth.otherwise is None:
-                    raise
+                if growth.otherwise is None or self._times_its_size(mesh) > ENLARGED:
+                    raise  # what is far too small jams again from any beginning
                 growth = growth.otherwise
                 self._job.note(f"{error.problem}: begun again from a thinner body")
 
@@ -148,8 +150,7 @@ class Phases:
         Raises:
             IntersectingError: it jams on the way.
         """
-        faces = self._model.faces
-        times = float(np.median(edge_stretches(growth.garment.vertices, self._rest.positions, faces)))
+        times = self._times_its_size(growth.garment)
         if times > _LARGER:
             growth = growth.from_smaller(times)
         thin = TriangleMesh(growth.body.keyframes[0], growth.body.faces)
@@ -165,6 +166,10 @@ class Phases:
             only_grows=True,
         )
         return at_rest(grown.positions)
+
+    def _times_its_size(self, garment: TriangleMesh) -> float:
+        """Return how many times its edges are as long as at rest, by their median, in the garment's triangles."""
+        return float(np.median(edge_stretches(garment.vertices, self._rest.positions, self._model.faces)))
 
     def follow_body(
         self, state: ClothState, stepper: Stepper, collider: VariableSpeedBody, body: TriangleMesh

@@ -37,29 +37,31 @@ def collision_free_step(x, end, back, features, to_face, to_edge, reach, new):
     """
     share = np.ones(len(x))
     there = end.copy()
-    total = len(to_face) + len(to_edge)
-    times, hit, stuck = np.empty(total), np.zeros(total, np.bool_), np.zeros(total, np.bool_)
+    corners = _corners(features, to_face, to_edge)
+    total = len(corners)
+    due, times = np.empty(total, np.int64), np.empty(total)
+    hit, stuck = np.zeros(total, np.bool_), np.zeros(total, np.bool_)
     stale = new.copy()
     looked = 0
-    for p in range(total):
-        looked += _is_stale(p, features, to_face, to_edge, stale)
     for turn in range(total + _PATIENCE):
-        if total >= _SERIAL_BELOW:
-            _times_parallel(x, there, features, to_face, to_edge, reach, stale, times)
+        count = _find_due(corners, stale, due)
+        if count >= _SERIAL_BELOW:
+            _times_parallel(due[:count], corners, len(to_face), x, there, reach, times)
         else:
-            for p in range(total):
-                _time(p, x, there, features, to_face, to_edge, reach, stale, times)
+            for n in range(count):
+                times[n] = _time(due[n] < len(to_face), corners[due[n]], x, there, reach)
         if turn == 0:
-            for p in range(total):
-                hit[p] = times[p] <= 1.0
+            looked = count
+            for n in range(count):
+                hit[due[n]] = times[n] <= 1.0
         before = share.copy()
-        for p in range(total):
-            if times[p] <= 1.0:
+        for n in range(count):
+            if times[n] <= 1.0:
+                p = due[n]
                 stuck[p] = True
-                for s in range(4):
-                    i = _corner(p, s, features, to_face, to_edge)
+                for i in corners[p]:
                     stuck[p] &= before[i] == 0.0
-                    share[i] = min(share[i], before[i] * times[p] if turn < _PATIENCE else 0.0)
+                    share[i] = min(share[i], before[i] * times[n] if turn < _PATIENCE else 0.0)
         done = True
         for i in range(len(x)):
             stale[i] = share[i] < before[i]
@@ -71,45 +73,59 @@ def collision_free_step(x, end, back, features, to_face, to_edge, reach, new):
     return there, share, hit, stuck, looked
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
-def _times_parallel(x, there, features, to_face, to_edge, reach, stale, times):
-    for p in prange(len(times)):
-        _time(p, x, there, features, to_face, to_edge, reach, stale, times)
+@njit(cache=True, error_model="numpy")
+def _corners(features, to_face, to_edge):
+    """Return the vertices of each pair, shape (N + M, 4): a vertex and a face's, or two edges'."""
+    corners = np.empty((len(to_face) + len(to_edge), 4), np.int32)
+    for p in range(len(to_face)):
+        corners[p, 0] = to_face[p, 0]
+        for s in range(3):
+            corners[p, 1 + s] = features.faces[to_face[p, 1], s]
+    for p in range(len(to_edge)):
+        for s in range(4):
+            corners[len(to_face) + p, s] = features.edges[to_edge[p, s // 2], s % 2]
+    return corners
 
 
 @njit(cache=True, error_model="numpy")
-def _time(p, x, there, features, to_face, to_edge, reach, stale, times):
-    """Write when pair p meets, where one of its paths is new; it does not otherwise."""
-    times[p] = np.inf
-    if not _is_stale(p, features, to_face, to_edge, stale):
-        return
-    a, b = _corner(p, 0, features, to_face, to_edge), _corner(p, 1, features, to_face, to_edge)
-    c, d = _corner(p, 2, features, to_face, to_edge), _corner(p, 3, features, to_face, to_edge)
+def _find_due(corners, stale, due):
+    """Write which pairs have a path that is new, and return how many there are."""
+    count = 0
+    for p in range(len(corners)):
+        due[count] = p  # kept or overwritten
+        count += stale[corners[p, 0]] | stale[corners[p, 1]] | stale[corners[p, 2]] | stale[corners[p, 3]]
+    return count
+
+
+@njit(cache=True, error_model="numpy", parallel=True)
+def _times_parallel(due, corners, faces, x, there, reach, times):
+    for n in prange(len(due)):
+        times[n] = _time(due[n] < faces, corners[due[n]], x, there, reach)
+
+
+@njit(cache=True, error_model="numpy")
+def _time(is_face, corners, x, there, reach):
+    """Return when a pair meets, as a share of the step; infinite if it does not."""
+    a, b, c, d = corners[0], corners[1], corners[2], corners[3]
     a0, b0, c0, d0 = load(x, a), load(x, b), load(x, c), load(x, d)
     a1, b1, c1, d1 = load(there, a), load(there, b), load(there, c), load(there, d)
-    if _cannot_meet(p < len(to_face), (a0, b0, c0, d0), (a1, b1, c1, d1)):
-        return
+    found = np.inf
+    if _cannot_meet(is_face, (a0, b0, c0, d0), (a1, b1, c1, d1)):
+        return found
     keep = _KEEP
     for _ in range(2):
-        if p < len(to_face):
-            times[p] = vertex_face_time(a0, b0, c0, d0, a1, b1, c1, d1, keep)
+        if is_face:
+            found = vertex_face_time(a0, b0, c0, d0, a1, b1, c1, d1, keep)
         else:
-            times[p] = edge_edge_time(a0, b0, c0, d0, a1, b1, c1, d1, keep)
-        if times[p] > 1.0:  # most do not meet, and need not know how far apart they are
+            found = edge_edge_time(a0, b0, c0, d0, a1, b1, c1, d1, keep)
+        if found > 1.0:  # most do not meet, and need not know how far apart they are
             break
-        apart = _distance(p < len(to_face), a0, b0, c0, d0)
+        apart = _distance(is_face, a0, b0, c0, d0)
         own = max(reach[a], reach[b]) + max(reach[c], reach[d])
         if apart <= own or keep < _KEEP:
             break
         keep = _KEEP * own / apart
-
-
-@njit(cache=True, error_model="numpy")
-def _is_stale(p, features, to_face, to_edge, stale):
-    """Return whether one of the paths of pair p is new."""
-    a, b = _corner(p, 0, features, to_face, to_edge), _corner(p, 1, features, to_face, to_edge)
-    c, d = _corner(p, 2, features, to_face, to_edge), _corner(p, 3, features, to_face, to_edge)
-    return stale[a] or stale[b] or stale[c] or stale[d]
+    return found
 
 
 @njit(cache=True, error_model="numpy")
@@ -142,12 +158,3 @@ def _distance(is_face, a, b, c, d):
         return norm(sub(a, barycentric_point(on, b, c, d)))
     s, t = closest_on_segments(a, b, c, d)
     return norm(sub(axpy(s, sub(b, a), a), axpy(t, sub(d, c), c)))
-
-
-@njit(cache=True, error_model="numpy")
-def _corner(p, s, features, to_face, to_edge):
-    """Return vertex s of pair p: a vertex and a face's, or two edges'."""
-    if p < len(to_face):
-        return to_face[p, 0] if s == 0 else features.faces[to_face[p, 1], s - 1]
-    edge = to_edge[p - len(to_face), s // 2]
-    return features.edges[edge, s % 2]

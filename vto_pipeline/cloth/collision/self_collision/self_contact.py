@@ -169,19 +169,19 @@ class SelfContact:
                 self.counters.impacts_known += self._passed.pairs
                 return end, no_pairs()
         start, wanted, bodies = x, end, self._bodies
-        beside, step = no_candidates(), 0.0
+        beside = no_candidates()
         carried = pushed
         if bodies is not None:
             start, wanted = bodies.with_bodies(x, False), bodies.with_bodies(end, True)
             beside = self._body_candidates(bodies, x, end, bodies.step)
             if bodies.moving(beside).any():
                 led = bodies.carried_displacement(beside)
-                carried, step = led if pushed is None else np.where(led != 0.0, led, pushed), bodies.step
-        backs, room = [x], step
+                carried = led if pushed is None else np.where(led != 0.0, led, pushed)
+        backs, room = [x], np.zeros(len(x))
         if carried is not None and carried.any():
             common = carried.sum(axis=0) / max(int(carried.any(axis=1).sum()), 1)
             backs = [x + carried, x + common]
-            room = max(step, float(np.sqrt((carried**2).sum(axis=1).max())))
+            room = np.maximum(np.linalg.norm(carried, axis=1), np.linalg.norm(common))
         if bodies is not None:
             backs = [bodies.with_bodies(back, True) for back in backs]
         for ways in (_without_common_motion(x, end), end):  # what is cut short falls behind what all have in common
@@ -268,8 +268,8 @@ class SelfContact:
             return pairs
         return against_bodies(pairs, len(x), bodies.begin, bodies.end, bodies.friction)
 
-    def _candidates(self, x: FloatArray, end: FloatArray, room: float = 0.0) -> Candidates:
-        """Return candidates for paths that have in common what the vertices do not move."""
+    def _candidates(self, x: FloatArray, end: FloatArray, room: float | FloatArray = 0.0) -> Candidates:
+        """Return candidates for paths that have in common what the vertices do not move, with room about them [m]."""
         self.counters.asked += 1
         radius = self._reach + room
         if not self._force_all:

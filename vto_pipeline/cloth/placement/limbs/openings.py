@@ -23,6 +23,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 _MOST_OPENINGS = 7  # of a piece: more are slits and lace, and which limb is whose is anybody's guess
 _PASSES = 0.1  # m: round an opening that a hand gets through
+_BESIDE = 1e-9  # m: where a line meets a face is known to no better
 _IDLE = 10.0  # m: as far as that may a limb be from an opening that had none
 
 
@@ -142,13 +143,20 @@ def _nearest_ways(mesh: TriangleMesh, openings: Sequence[IntArray], limbs: Seque
 def _crossings(line: FloatArray, mesh: TriangleMesh) -> tuple[FloatArray, IntArray]:
     """Return where a line of segments meets faces, in order along it [m], shape (N, 3), and which faces, shape (N,).
 
-    Möller & Trumbore 1997, "Fast, minimum storage ray/triangle intersection", all segments with all triangles.
+    Möller & Trumbore 1997, "Fast, minimum storage ray/triangle intersection", each segment with all triangles whose
+    boxes meet its own.
     """
-    a, b, c = mesh.vertices[mesh.faces].transpose(1, 0, 2)
-    one, two = b - a, c - a
+    corners = mesh.vertices[mesh.faces]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    beside = _boxes_meet(low, high, line)
+    corners, low, high = corners[beside], low[beside], high[beside]
     where, faces = [np.zeros((0, 3))], [np.zeros(0, np.int64)]
     for start, end in pairwise(line):
-        way = end - start
+        near = _boxes_meet(low, high, np.stack([start, end]))
+        if len(near) == 0:
+            continue
+        a, b, c = corners[near].transpose(1, 0, 2)
+        one, two, way = b - a, c - a, end - start
         across = np.cross(way, two)
         size = np.einsum("fd,fd->f", one, across)
         size = np.where(np.abs(size) > 1e-30, size, np.inf)
@@ -159,5 +167,11 @@ def _crossings(line: FloatArray, mesh: TriangleMesh) -> tuple[FloatArray, IntArr
         hit = np.flatnonzero((u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (t >= 0.0) & (t < 1.0) & np.isfinite(size))
         hit = hit[np.argsort(t[hit], kind="stable")]
         where.append(start + t[hit, None] * way)
-        faces.append(hit)
+        faces.append(beside[near[hit]])
     return np.vstack(where), np.concatenate(faces)
+
+
+def _boxes_meet(low: FloatArray, high: FloatArray, points: FloatArray) -> IntArray:
+    """Return which boxes, from low to high, shapes (F, 3), meet the box about these points [m], shape (N, 3)."""
+    first, last = points.min(axis=0) - _BESIDE, points.max(axis=0) + _BESIDE
+    return np.flatnonzero(((low <= last) & (high >= first)).all(axis=1))
