@@ -120,7 +120,7 @@ def test_exact_stiffness_is_the_slope_of_the_force(name, damped):
     found = to_scipy(stiffness.assemble_exact(x, damping_factor=1.0)).toarray()
     expected = -slope(x, lambda y: forces(y, plain).ravel(), step=1e-7)
     expected += to_scipy(stiffness.assemble(x, stiffness_factor=0.0, damping_factor=1.0)).toarray()
-    assert_allclose(found, expected, rtol=0, atol=2e-6 * np.abs(expected).max())  # central difference: step² and rounding
+    assert_allclose(found, expected, rtol=0, atol=2e-6 * np.abs(expected).max())  # step², rounding
 
 
 @pytest.mark.parametrize("name", sorted(set(NAMES) - MOVED_BY_SPACE))

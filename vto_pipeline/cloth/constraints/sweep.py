@@ -292,7 +292,7 @@ def _stiffness_one_compiled(i, x, data, material, stress, blocks, scratch):
 
 
 def exact_one(i, x, data, material, blocks):
-    """Write the exact stiffness of one stencil into blocks, of a kind that has it; see `kind`. From compiled code only."""
+    """Write the exact stiffness of one stencil of a kind that has it; see `kind`. From compiled code only."""
     raise NotImplementedError
 
 

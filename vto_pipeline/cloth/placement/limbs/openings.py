@@ -150,7 +150,7 @@ def _crossings(line: FloatArray, mesh: TriangleMesh) -> tuple[FloatArray, IntArr
     low, high = corners.min(axis=1), corners.max(axis=1)
     beside = _boxes_meet(low, high, line)
     corners, low, high = corners[beside], low[beside], high[beside]
-    where, faces = [np.zeros((0, 3))], [np.zeros(0, np.int64)]
+    where, faces = [np.zeros((0, 3))], [np.zeros(0, np.int32)]
     for start, end in pairwise(line):
         near = _boxes_meet(low, high, np.stack([start, end]))
         if len(near) == 0:
@@ -174,4 +174,4 @@ def _crossings(line: FloatArray, mesh: TriangleMesh) -> tuple[FloatArray, IntArr
 def _boxes_meet(low: FloatArray, high: FloatArray, points: FloatArray) -> IntArray:
     """Return which boxes, from low to high, shapes (F, 3), meet the box about these points [m], shape (N, 3)."""
     first, last = points.min(axis=0) - _BESIDE, points.max(axis=0) + _BESIDE
-    return np.flatnonzero(((low <= last) & (high >= first)).all(axis=1))
+    return np.flatnonzero(((low <= last) & (high >= first)).all(axis=1)).astype(np.int32)
