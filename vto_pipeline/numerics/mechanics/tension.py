@@ -9,6 +9,7 @@ from __future__ import annotations
 from math import sqrt
 
 from numba import njit
+from numba.extending import overload
 
 from vto_pipeline.numerics.vector import axpy, cross, scale, unit
 
@@ -34,10 +35,9 @@ def thread_tension(stress, slopes, frame):
     tilt = stress[2] * (1.0 / cosine if cosine > 1e-7 else 0.0)
     uu = stress[0] * iu - tilt * sine * iu * iu
     vv = stress[1] * iv - tilt * sine * iv * iv
-    normal, upright = unit(cross(slopes[0], slopes[1])), (0.0, 0.0, 0.0)
+    normal = unit(cross(slopes[0], slopes[1]))
     turn_u, turn_v = max(stress[0], 0.0) * iu, max(stress[1], 0.0) * iv
-    whole = tensile(uu, vv, tilt * iu * iv)
-    return whole, normal, (turn_u, unit(slopes[2]), upright), (turn_v, unit(slopes[3]), upright)
+    return tensile(uu, vv, tilt * iu * iv), normal, (turn_u, unit(slopes[2])), (turn_v, unit(slopes[3]))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -65,13 +65,20 @@ def tension_pulls(tension, du, dv, m):
     """Return how the pulls on F_u and F_v change as a corner with shape gradient (du, dv) moves along axis m."""
     (uu, vv, uv), n, thread_u, thread_v = tension
     return (
-        axpy((uu * du + uv * dv) * n[m], n, scale(du, _turned(thread_u, m))),
-        axpy((uv * du + vv * dv) * n[m], n, scale(dv, _turned(thread_v, m))),
+        axpy((uu * du + uv * dv) * n[m], n, _turned(thread_u, du, m)),
+        axpy((uv * du + vv * dv) * n[m], n, _turned(thread_v, dv, m)),
     )
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _turned(thread, m):
-    """Return column m of turn p pᵀ + lean pᵀ + p leanᵀ."""
-    turn, p, lean = thread
-    return axpy(turn * p[m] + lean[m], p, scale(p[m], lean))
+def _turned(thread, share, m):  # type: ignore[no-untyped-def]
+    """Return a share of column m of turn p pᵀ, or, where shear leans, of turn p pᵀ + lean pᵀ + p leanᵀ."""
+    raise NotImplementedError
+
+
+@overload(_turned, inline="always")
+def _turned_compiled(thread, share, m):
+    if len(thread) == 2:
+        return lambda thread, share, m: scale(thread[0] * share * thread[1][m], thread[1])
+    return lambda thread, share, m: axpy(
+        share * (thread[0] * thread[1][m] + thread[2][m]), thread[1], scale(share * thread[1][m], thread[2])
+    )
