@@ -280,7 +280,7 @@ def test_the_ledger_knows_what_is_done(tmp_path: Path) -> None:
     shutil.rmtree(tmp_path / "rows" / "a")  # by hand
     assert read_ledger(tmp_path)["counts"] == {"lost": 1, "waiting": 2}
     assert not Ledger(tmp_path, ["a"]).is_done("a", "k")
-    assert (tmp_path / "batch.csv").read_text().splitlines()[1] == "a,done,0,,2.5,90.0,1,fits,,,"
+    assert (tmp_path / "batch.csv").read_text().splitlines()[1] == "a,done,0,,2.5,90.0,1,fits,,,,"
     (tmp_path / LEDGER).write_text('{"rows": [{}]}')
     with pytest.raises(InputError, match="not the record of a batch"):
         Ledger(tmp_path, ["a"])

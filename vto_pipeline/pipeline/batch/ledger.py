@@ -25,7 +25,7 @@ from vto_pipeline.pipeline.execution.folder import RECORD
 LEDGER = "batch.json"
 JOURNAL = "batch.partial.jsonl"
 
-_BLANK = {"result": "", "problem": "", "failure": "", "page": "", "picture": ""}
+_BLANK = {"result": "", "warnings": "", "problem": "", "failure": "", "page": "", "picture": ""}
 _REST = 50.0  # times as long as writing both files took, they are left alone
 
 
@@ -73,9 +73,10 @@ class Ledger:
         Args:
             result: How it ended.
             words: What it found.
-            shown: Its `page` and `picture`, and the `files` that it is done with, all as paths in BATCH.
+            shown: Its `warnings` in words, its `page` and `picture`, and the `files` that it is done with, all as paths
+                in BATCH.
         """
-        self.rows[result.name] = row = {**asdict(result), "result": words, **(shown or {})}
+        self.rows[result.name] = row = {**_BLANK, **(shown or {}), **asdict(result), "result": words}
         row["failure"] = failure_kind(row)
         with (self._folder / JOURNAL).open("a", encoding="utf-8") as journal:
             journal.write(json.dumps(row, ensure_ascii=False) + "\n")
