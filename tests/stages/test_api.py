@@ -53,6 +53,7 @@ def test_a_run_never_gives_what_a_later_one_made_in_its_folder(tmp_path, monkeyp
     (tmp_path / "tape.yaml").write_text(TAPE.replace("waist_girth: 78", "waist_girth: 90"))
     later = api.run(document)
     assert later.read("measurements").values["waist_girth"] == pytest.approx(0.90, abs=0.01)
+    assert "a later run has replaced" in first._repr_html_()  # and no traceback in a notebook
     for asked in (lambda: first.read("measurements"), lambda: again.path("avatar"), lambda: first.made("avatar")):
         with pytest.raises(InputError, match="a later run has replaced"):
             asked()
