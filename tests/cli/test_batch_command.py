@@ -122,6 +122,11 @@ def test_a_status_tells_whether_anything_works_on_the_rows_that_wait(vto) -> Non
         process.kill()
     assert "nothing is at work there" in vto("status", "b").out
     assert vto("status", "b", "--json").data["at_work"] == ""
+    (Path("b") / "rows").mkdir()
+    for command in ("report", "view"):  # which take one of its runs
+        said = vto(command, "b")
+        assert said.code == 3
+        assert "rows" in said.err
 
 
 @pytest.mark.filterwarnings("default")  # of dask and its worker processes

@@ -77,6 +77,7 @@ def test_a_name_is_one_of_a_file_everywhere(tmp_path: Path, name: str) -> None:
     ("key", "values", "names"),
     [
         ("stages.add.offset", "[0.5, 0.25, -1]", ["a_0.5", "a_0.25", "a_-1"]),
+        ("stages.add.offset", "[0.5, 1.25]", ["a_0.5", "a_1.25"]),  # distinct, and "0" would say something else
         ("given.right.number", "[Müller.txt, Möller.txt]", ["a_Müller", "a_Möller"]),
         ("given.right.number", "[s/17.txt, m/17.txt]", ["a_s_17.txt", "a_m_17.txt"]),
     ],

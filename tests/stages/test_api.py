@@ -12,6 +12,7 @@ import vto_pipeline
 from vto_pipeline import api
 from vto_pipeline.cli.main import main
 from vto_pipeline.errors import ConfigError, InputError
+from vto_pipeline.stages.entry import commands
 
 TAPE = "unit: cm\nsex: female\nmeasurements: {stature: 170, bust_girth: 93, waist_girth: 78, hip_girth: 101}\n"
 
@@ -76,6 +77,13 @@ def test_limits_reach_the_run(tmp_path, monkeypatch, limits, problem):
     with pytest.raises(ConfigError, match=problem):
         api.run(document, **limits)
     assert api.run(document, memory=7e9).record["memory_budget_mb"] == 7000.0
+
+
+def test_a_drape_takes_the_limits_of_a_run(monkeypatch):
+    taken = {}
+    monkeypatch.setattr(commands, "run_order", lambda *_, **options: taken.update(options))
+    api.drape("shirt.ply", body="customer.ply", time_budget=60.0, target_error=1e-3, memory=8e9)
+    assert (taken["time_budget"].seconds, taken["target_error"], taken["memory"]) == (60.0, 1e-3, 8e9)
 
 
 @pytest.mark.parametrize("package", [api, vto_pipeline])

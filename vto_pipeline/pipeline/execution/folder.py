@@ -17,6 +17,8 @@ from vto_pipeline.io.files import remove_partial
 _LOCK = ".lock"
 _LOOK = 0.2  # s between looks at a lock that another holds
 RECORD = "run.json"
+ROWS = "rows"
+"""Of a batch's folder: the folders of its runs."""
 
 
 def is_run(folder: Path) -> bool:
@@ -121,7 +123,8 @@ def existing_run(folder: Path) -> Path:
         InputError: it was not.
     """
     if not (folder / RECORD).is_file():
-        raise InputError("not a run folder: it has no run.json", where=str(folder))
+        hint = f"it holds many: the runs of a batch lie in {folder / ROWS}" if (folder / ROWS).is_dir() else ""
+        raise InputError("not a run folder: it has no run.json", where=str(folder), hint=hint)
     return folder
 
 
