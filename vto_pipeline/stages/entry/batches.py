@@ -107,7 +107,7 @@ def plan_rows(
 
 
 def _together(faults: Mapping[str, VtoError]) -> VtoError:
-    """Return the first fault of a batch, and in its hint those of the other rows, so that all are mended at once."""
+    """Return the first fault of a batch, and in its hint those of the other rows, which are then told at once."""
     first, *others = faults.items()
     lines = [f"row {name}: {error.problem}" for name, error in others[:_TOLD]]
     if len(others) > _TOLD:
