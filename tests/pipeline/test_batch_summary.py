@@ -63,6 +63,15 @@ def test_every_format_has_the_same_fields(entered: Path) -> None:
     assert json.loads((entered / "batch.json").read_text())["rows"][5]["status"] == "waiting"
 
 
+def test_a_row_whose_warnings_nobody_knows_is_not_done(entered: Path) -> None:
+    """Batches of earlier versions: a page without warnings would say that there were none."""
+    record = json.loads((entered / "batch.json").read_text())
+    del record["rows"][0]["warnings"]
+    (entered / "batch.json").write_text(json.dumps(record))
+    assert read_ledger(entered)["counts"]["waiting"] == 2
+    assert not Ledger(entered, "abcdef").is_done("a", "k")
+
+
 class Cells(HTMLParser):
     """The attributes of all elements, by tag."""
 

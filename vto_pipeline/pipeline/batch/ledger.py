@@ -122,12 +122,14 @@ def read_ledger(folder: Path) -> Mapping[str, Any]:
 
 
 def _with_its_files(row: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """Return a row as it is, or as waiting where files that it was done with have been removed since."""
+    """Return a row as it is, or as waiting where files that it was done with are gone, or nobody knows its warnings."""
     if row["status"] != "done":
         return row
     files = row.get("files", [f"rows/{row['name']}/{RECORD}"])
-    lacking = next((name for name in files if not (folder / name).exists()), None)
-    return row if lacking is None else {**row, **_BLANK, "status": "waiting", "problem": f"{lacking} is gone"}
+    lacking = next((f"{name} is gone" for name in files if not (folder / name).exists()), None)
+    if "warnings" not in row:  # its results are stored, so that it costs little
+        lacking = "done by an earlier version, which did not note warnings"
+    return row if lacking is None else {**row, **_BLANK, "status": "waiting", "problem": lacking}
 
 
 def _journal(path: Path) -> Iterator[dict[str, Any]]:
