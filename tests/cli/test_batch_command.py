@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -66,6 +67,8 @@ def test_a_batch_does_what_can_be_done_and_only_the_rest_again(ordered, tmp_path
     assert "sum diverged" in rows["c"]["problem"]
     assert record["failures"] == [{"kind": "exit 4: sum diverged", "count": 1, "rows": ["c"]}]
     assert "1 x exit 4: sum diverged (c)" in said.err
+    assert [rows[name]["warnings"] for name in "abc"] == ["add: toy sum", "add: toy sum", ""]
+    assert "warning: add: toy sum" in said.err  # at once: nobody opens the pages of a hundred rows
     page = Path("november/page.html").read_text()
     assert 'class="bad">failed' in page
     assert '<a href="#row-c">c</a>' in page
@@ -79,6 +82,8 @@ def test_a_batch_does_what_can_be_done_and_only_the_rest_again(ordered, tmp_path
     assert "[1/1] c: done" in again.err
     row, done = (json.loads(line) for line in Path("log.jsonl").read_text().splitlines())
     assert (row["event"], row["name"], row["status"], row["done"], row["count"]) == ("row", "c", "done", 1, 1)
+    assert row["warnings"] == "add: toy sum"
+    assert again.out.startswith("3 rows are done, 3 of them with warnings")
     assert (done["event"], done["counts"]) == ("done", {"done": 3})
     assert squared("c") == str((2 * 3 + 2 * 4) ** 2)
 
@@ -89,6 +94,39 @@ def test_a_batch_does_what_can_be_done_and_only_the_rest_again(ordered, tmp_path
     status = ordered("status", "november")
     assert status.code == 0
     assert status.out.startswith("3 rows: 3 done")
+    assert status.out.count("warning: add: toy sum") == 3
+    assert "at work" not in status.out
+
+
+def test_documents_of_a_run_and_of_a_batch_are_told_apart(ordered) -> None:
+    """Beginners mix them up, and "given: field required" helps nobody."""
+    Path("one.yaml").write_text("schema: 1\ngiven: {left: {number: left.txt}}\nwant: [total]\n")
+    for words, hint in ((("batch", "one.yaml"), "vto run"), (("run", "order.yaml"), "vto batch")):
+        said = ordered(*words, "-o", "out")
+        assert (said.code, Path("out").exists()) == (2, False)
+        assert f"`{hint}`" in said.err
+
+
+def test_a_status_tells_whether_anything_works_on_the_rows_that_wait(vto) -> None:
+    program = (
+        "from pathlib import Path; from vto_pipeline.pipeline.batch.ledger import Ledger\n"
+        "from vto_pipeline.pipeline.execution.folder import locked_run_folder\n"
+        "with locked_run_folder(Path('b')): Ledger(Path('b'), 'ab').save(); print('locked', flush=True); input()"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout
+        assert process.stdout.readline() == "locked\n"
+        assert f"at work: process {process.pid} on " in vto("status", "b").out
+        process.kill()
+    assert "nothing is at work there" in vto("status", "b").out
+    assert vto("status", "b", "--json").data["at_work"] == ""
+    (Path("b") / "rows").mkdir()
+    for command in ("report", "view"):  # which take one of its runs
+        said = vto(command, "b")
+        assert said.code == 3
+        assert "rows" in said.err
 
 
 @pytest.mark.filterwarnings("default")  # of dask and its worker processes

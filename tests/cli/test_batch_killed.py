@@ -102,6 +102,7 @@ def test_a_batch_that_is_cancelled_ends_and_is_resumed(client, gate, capfd):
     assert json.loads(capfd.readouterr().out) == {"cancelled": True, "process": batch.pid}
     assert batch.returncode == 130, said
     assert "interrupted; run the same command again to resume" in said.splitlines()
+    assert "distributed" not in said  # nobody who cancels a batch has to read of its workers
     assert not psutil.wait_procs(below, PATIENCE)[1]
     listed = done()
     assert 0 < len(listed) < 3

@@ -78,6 +78,16 @@ def test_a_batch_becomes_a_page_that_says_how_far_it_is_off(vto, batch):
     assert grid["fitted"][1]["fits"] == [{"verdict": "it fits", "ease_cm": {"hem": 2.0}}] * 3
 
 
+def test_a_drape_that_warns_warns_on_the_page(vto, batch):
+    record = json.loads((batch / "rows/row_1/run.json").read_text())
+    record["stages"] = [{"name": "drape", "status": "ran", "key": "k", "warnings": ["not at rest"]}]
+    write_json(batch / "rows/row_1/run.json", record)
+    assert vto("tryon", "sizes.yaml").code == 0
+    grid = json.loads((batch / "try_on.html").read_text().split('id="grid">')[1].split("</script>")[0])
+    told = [fit["verdict"] for one in grid["fitted"] for fit in one["fits"]]
+    assert sorted(told) == ["it fits"] * 5 + ["it fits; warning: not at rest"]
+
+
 def test_rows_that_are_not_done_are_named(vto, batch):
     ledger = Ledger(batch, [f"row_{k}" for k in range(1, 7)])
     ledger.enter(RowResult("row_4", "key", "failed", 4, 1.0, 1.0, 1, "it tore"), "")

@@ -125,6 +125,20 @@ def test_a_batch_with_a_root_reads_what_is_in_it(fenced) -> None:
     assert len(fenced(f"{RUN}every: {{seed: [1, 2]}}\n")) == 2
 
 
+def test_all_wrong_rows_are_told_at_once(fenced) -> None:
+    """Whoever has a table of a hundred rows would otherwise mend one, wait, and read of the next."""
+    wrong = [f"{{name: w{i}, given.left.number: none_{i}.txt}}" for i in range(23)]
+    rows = ["{name: a}", "{name: b, given.left.number: gone.txt}", "{name: c, stages.add.offset: far}", *wrong]
+    with pytest.raises(InputError, match="gone.txt") as caught:  # the first
+        fenced(f"{RUN}rows: [{', '.join(rows)}]\n")
+    assert "row b" in caught.value.where
+    assert "25 rows are wrong" in caught.value.hint
+    assert "row c: stages.add.offset: input should be a valid" in caught.value.hint
+    assert "none_18.txt" in caught.value.hint
+    assert "none_19.txt" not in caught.value.hint  # nobody reads a thousand lines
+    assert caught.value.hint.endswith("and 4 more")
+
+
 @pytest.mark.parametrize(
     "given",
     [
@@ -280,7 +294,7 @@ def test_the_ledger_knows_what_is_done(tmp_path: Path) -> None:
     shutil.rmtree(tmp_path / "rows" / "a")  # by hand
     assert read_ledger(tmp_path)["counts"] == {"lost": 1, "waiting": 2}
     assert not Ledger(tmp_path, ["a"]).is_done("a", "k")
-    assert (tmp_path / "batch.csv").read_text().splitlines()[1] == "a,done,0,,2.5,90.0,1,fits,,,"
+    assert (tmp_path / "batch.csv").read_text().splitlines()[1] == "a,done,0,,2.5,90.0,1,fits,,,,"
     (tmp_path / LEDGER).write_text('{"rows": [{}]}')
     with pytest.raises(InputError, match="not the record of a batch"):
         Ledger(tmp_path, ["a"])

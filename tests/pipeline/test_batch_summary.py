@@ -28,7 +28,8 @@ def entered(tmp_path: Path) -> Path:
     (tmp_path / "rows/a/out").mkdir(parents=True)
     (tmp_path / "rows/a/run.json").write_text("{}")
     ledger = Ledger(tmp_path, "abcdef")
-    shown = {"page": "rows/a/out/page.html", "picture": "pictures/1.png", "files": ["rows/a/run.json"]}
+    shown: dict = {"page": "rows/a/out/page.html", "picture": "pictures/1.png", "files": ["rows/a/run.json"]}
+    shown["warnings"] = "drape: <i>not</i> at rest"
     ledger.enter(RowResult("a", "k", "done", 0, 2.5, 90.0, 1), "<b>fits</b>", shown)
     for name, (status, code, problem) in PROBLEMS.items():
         ledger.enter(RowResult(name, "k", status, code, 1.0, 5.0, 1, problem), "")
@@ -62,6 +63,15 @@ def test_every_format_has_the_same_fields(entered: Path) -> None:
     assert json.loads((entered / "batch.json").read_text())["rows"][5]["status"] == "waiting"
 
 
+def test_a_row_whose_warnings_nobody_knows_is_not_done(entered: Path) -> None:
+    """Batches of earlier versions: a page without warnings would say that there were none."""
+    record = json.loads((entered / "batch.json").read_text())
+    del record["rows"][0]["warnings"]
+    (entered / "batch.json").write_text(json.dumps(record))
+    assert read_ledger(entered)["counts"]["waiting"] == 2
+    assert not Ledger(entered, "abcdef").is_done("a", "k")
+
+
 class Cells(HTMLParser):
     """The attributes of all elements, by tag."""
 
@@ -79,9 +89,10 @@ def test_the_page_shows_pictures_verdicts_and_kinds_of_failure(entered: Path) ->
     cells.feed(page)
     assert [one["src"] for one in cells.found["img"]] == ["pictures/1.png"]
     assert "&lt;b&gt;fits&lt;/b&gt;" in page
-    assert "b" not in cells.found  # what rows say is text
+    assert "drape: &lt;i&gt;not&lt;/i&gt; at rest" in page
+    assert not {"b", "i"} & set(cells.found)  # what rows say is text
     ids = {one.get("id") for one in cells.found["tr"]}
     assert {f"row-{name}" for name in "abcdef"} <= ids
     targets = [str(one["href"]).removeprefix("#") for one in cells.found["a"] if str(one["href"]).startswith("#")]
     assert sorted(targets) == ["row-b", "row-c", "row-d", "row-e"]
-    assert len(cells.found["button"]) == 6  # each sorts by its column
+    assert len(cells.found["button"]) == 7  # each sorts by its column

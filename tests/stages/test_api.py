@@ -12,6 +12,7 @@ import vto_pipeline
 from vto_pipeline import api
 from vto_pipeline.cli.main import main
 from vto_pipeline.errors import ConfigError, InputError
+from vto_pipeline.stages.entry import commands
 
 TAPE = "unit: cm\nsex: female\nmeasurements: {stature: 170, bust_girth: 93, waist_girth: 78, hip_girth: 101}\n"
 
@@ -40,6 +41,49 @@ def test_a_document_may_be_a_mapping_and_settings_a_mapping_too(tmp_path, monkey
     assert posed.folder.name == "document"
     with pytest.raises(ConfigError, match="unknown"):
         api.run(document, settings={"pose.posse": "t_pose"})
+
+
+def test_a_run_never_gives_what_a_later_one_made_in_its_folder(tmp_path, monkeypatch):
+    """Two calls that name no folder share one: the first must not answer with the second's avatar."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "tape.yaml").write_text(TAPE)
+    document = {"schema": 1, "given": {"body": {"measurements": "tape.yaml"}}, "want": ["avatar", "measurements"]}
+    first = api.run(document)
+    again = api.run(document)  # the same results
+    assert_array_equal(first.read("avatar").vertices, again.read("avatar").vertices)
+    (tmp_path / "tape.yaml").write_text(TAPE.replace("waist_girth: 78", "waist_girth: 90"))
+    later = api.run(document)
+    assert later.read("measurements").values["waist_girth"] == pytest.approx(0.90, abs=0.01)
+    assert "a later run has replaced" in first._repr_html_()  # and no traceback in a notebook
+    for asked in (lambda: first.read("measurements"), lambda: again.path("avatar"), lambda: first.made("avatar")):
+        with pytest.raises(InputError, match="a later run has replaced"):
+            asked()
+
+
+@pytest.mark.parametrize(
+    ("limits", "problem"),
+    [
+        ({"time_budget": 5.0}, "no stage of this run works to a time"),
+        ({"target_error": 1e-3}, "no drape in this run"),
+        ({"time_budget": 0}, "time_budget is a positive number"),
+        ({"memory": "8GB"}, "memory is a positive number"),
+        ({"target_error": float("nan")}, "target_error is a positive number"),
+    ],
+)
+def test_limits_reach_the_run(tmp_path, monkeypatch, limits, problem):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "tape.yaml").write_text(TAPE)
+    document = {"schema": 1, "given": {"body": {"measurements": "tape.yaml"}}, "want": ["avatar"]}
+    with pytest.raises(ConfigError, match=problem):
+        api.run(document, **limits)
+    assert api.run(document, memory=7e9).record["memory_budget_mb"] == 7000.0
+
+
+def test_a_drape_takes_the_limits_of_a_run(monkeypatch):
+    taken = {}
+    monkeypatch.setattr(commands, "run_order", lambda *_, **options: taken.update(options))
+    api.drape("shirt.ply", body="customer.ply", time_budget=60.0, target_error=1e-3, memory=8e9)
+    assert (taken["time_budget"].seconds, taken["target_error"], taken["memory"]) == (60.0, 1e-3, 8e9)
 
 
 @pytest.mark.parametrize("package", [api, vto_pipeline])

@@ -81,6 +81,8 @@ def _check_version(document: Document) -> dict[str, Any]:
     """The document's data without `schema`."""
     if not isinstance(document.data, Mapping):
         raise ConfigError("a pipeline document is a mapping with schema, given and want", where=document.where())
+    if "run" in document.data and "want" not in document.data:
+        raise ConfigError("a document of a batch, not of one run", where=document.where(), hint="`vto batch` takes it")
     data = dict(document.data)
     version = data.pop("schema", None)
     if version != VERSION:

@@ -91,6 +91,7 @@ def batch_command(
     from vto_pipeline.pipeline.batch.order import read_order
     from vto_pipeline.pipeline.batch.publish import Publisher
     from vto_pipeline.pipeline.batch.roots import Roots
+    from vto_pipeline.pipeline.batch.summary import row_lines
     from vto_pipeline.pipeline.batch.time_left import TimeLeft
     from vto_pipeline.pipeline.execution.folder import locked_run_folder
     from vto_pipeline.pipeline.execution.store import Store
@@ -129,17 +130,17 @@ def batch_command(
             if tasks and left.seconds() is not None:
                 session.say(f"{len(tasks)} rows to run: about {left.seconds():.0f} s, by earlier runs")
             for done, result in enumerate(results, start=1):
-                words: str = ""
-                shown: dict[str, Any] = {}
-                if result.status == "done":
-                    words, shown = _shown(open_run(folder / "rows" / result.name), folder)
+                is_done = result.status == "done"
+                words, shown = _shown(open_run(folder / "rows" / result.name), folder) if is_done else ("", {})
                 ledger.enter(result, words, shown)
                 left.ended(result.name)
-                session.enter("row", done=done, count=len(tasks), left_s=left.seconds(), **asdict(result), result=words)
+                row = ledger.rows[result.name]
+                said = {**asdict(result), "result": words, "warnings": row["warnings"]}
+                session.enter("row", done=done, count=len(tasks), left_s=left.seconds(), **said)
+                told = "; ".join(row_lines(row))
                 session.say(
                     f"[{done}/{len(tasks)}] {result.name}: {result.status} after {result.seconds:.1f} s"
-                    f"{': ' if result.problem or words else ''}{result.problem or words}"
-                    f"; about {left.seconds() or 0.0:.0f} s left"
+                    f"{': ' if told else ''}{told}; about {left.seconds() or 0.0:.0f} s left"
                 )
                 if publisher:
                     _publish_row(session, publisher, ledger.rows[result.name])
@@ -219,12 +220,14 @@ def _task(planned: PlannedRow, folder: Path, force_all: bool, workers: int, limi
 
 
 def _shown(outcome: Outcome, folder: Path) -> tuple[str, dict[str, Any]]:
-    """Return the verdicts of a run that has ended, and its page, picture and files as paths in BATCH."""
+    """Return the verdicts of a run that has ended, what it warns of, and its page, picture and files in BATCH."""
     from vto_pipeline.stages.entry.pictures import draw_outcome
 
     files = [path.relative_to(folder).as_posix() for path in outcome.files]
     page = next((name for name in files if name.endswith("page.html")), "")
-    return "; ".join(outcome.verdicts), {"page": page, "picture": draw_outcome(outcome, folder), "files": files}
+    warnings = "; ".join(f"{stage.replace('_', ' ')}: {text}" for stage, text in outcome.warnings)
+    shown = {"warnings": warnings, "page": page, "picture": draw_outcome(outcome, folder), "files": files}
+    return "; ".join(outcome.verdicts), shown
 
 
 def _write_tables(session: Session, folder: Path) -> None:
@@ -261,4 +264,6 @@ def _answer(session: Session, folder: Path, ledger: Ledger) -> None:
             where=str(folder),
             hint=f"`vto status {folder}` lists them; run the same command again to repeat them only",
         )
-    session.answer(read_ledger(folder), [f"{done} rows are done", f"  page  {folder / 'page.html'}"])
+    doubtful = sum(bool(row["warnings"]) for row in ledger.rows.values())
+    lines = [f"{done} rows are done{f', {doubtful} of them with warnings' if doubtful else ''}"]
+    session.answer(read_ledger(folder), [*lines, f"  page  {folder / 'page.html'}"])

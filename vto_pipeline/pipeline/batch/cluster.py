@@ -81,7 +81,7 @@ def run_rows(
                     memory_limit=0,  # rows are processes of their own, with limits of their own
                     dashboard_address=":0",  # any free port: two batches do not meet
                     local_directory=str(scratch),
-                    silence_logs=logging.WARNING,
+                    silence_logs=logging.ERROR,  # of rows that are cancelled it would tell with their traces
                 )
             )
         except RuntimeError as error:

@@ -25,7 +25,7 @@ from vto_pipeline.pipeline.execution.folder import RECORD
 LEDGER = "batch.json"
 JOURNAL = "batch.partial.jsonl"
 
-_BLANK = {"result": "", "problem": "", "failure": "", "page": "", "picture": ""}
+_BLANK = {"result": "", "warnings": "", "problem": "", "failure": "", "page": "", "picture": ""}
 _REST = 50.0  # times as long as writing both files took, they are left alone
 
 
@@ -73,9 +73,10 @@ class Ledger:
         Args:
             result: How it ended.
             words: What it found.
-            shown: Its `page` and `picture`, and the `files` that it is done with, all as paths in BATCH.
+            shown: Its `warnings` in words, its `page` and `picture`, and the `files` that it is done with, all as paths
+                in BATCH.
         """
-        self.rows[result.name] = row = {**asdict(result), "result": words, **(shown or {})}
+        self.rows[result.name] = row = {**_BLANK, **(shown or {}), **asdict(result), "result": words}
         row["failure"] = failure_kind(row)
         with (self._folder / JOURNAL).open("a", encoding="utf-8") as journal:
             journal.write(json.dumps(row, ensure_ascii=False) + "\n")
@@ -121,12 +122,14 @@ def read_ledger(folder: Path) -> Mapping[str, Any]:
 
 
 def _with_its_files(row: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """Return a row as it is, or as waiting where files that it was done with have been removed since."""
+    """Return a row as it is, or as waiting where files that it was done with are gone, or nobody knows its warnings."""
     if row["status"] != "done":
         return row
     files = row.get("files", [f"rows/{row['name']}/{RECORD}"])
-    lacking = next((name for name in files if not (folder / name).exists()), None)
-    return row if lacking is None else {**row, **_BLANK, "status": "waiting", "problem": f"{lacking} is gone"}
+    lacking = next((f"{name} is gone" for name in files if not (folder / name).exists()), None)
+    if "warnings" not in row:  # its results are stored, so that it costs little
+        lacking = "done by an earlier version, which did not note warnings"
+    return row if lacking is None else {**row, **_BLANK, "status": "waiting", "problem": lacking}
 
 
 def _journal(path: Path) -> Iterator[dict[str, Any]]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import re
+import unicodedata
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,18 +14,17 @@ from typing import Any
 
 from pydantic import Field
 
-from vto_pipeline.errors import ConfigError, MissingDependencyError
+from vto_pipeline.errors import ConfigError
 from vto_pipeline.io.documents import Document, check_schema, load_yaml
-from vto_pipeline.io.files import check_file
 from vto_pipeline.io.stalls import check_answers
 from vto_pipeline.io.stores import is_address
 from vto_pipeline.model.settings import Config
 from vto_pipeline.pipeline.batch.roots import ANYWHERE, Roots
-from vto_pipeline.pipeline.request import number_or_word
+from vto_pipeline.pipeline.batch.table import read_table
 
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
+_NAME = re.compile(r"[^\W_][\w.-]{0,99}")
+_NAME_BYTES = 200  # a file system allows 255 in the name of a file, with its suffix
 _SECTIONS = ("given", "stages", "choose", "seed", "want")
-_TABLE_BYTES = 100_000_000
 _MOST_ROWS = 100_000
 
 
@@ -73,6 +72,10 @@ def read_order(path: Path, roots: Roots = ANYWHERE) -> list[Row]:
         MissingDependencyError: a Parquet table, and no library for it.
     """
     document = load_yaml(path)
+    if isinstance(document.data, dict) and "want" in document.data and "run" not in document.data:
+        raise ConfigError(
+            "a document of one run, not of a batch", where=str(path), hint="`vto run` and `vto plan` take it"
+        )
     batch: BatchFile = check_schema(document, BatchFile)
     base = path.resolve().parent
     for name in (batch.run, batch.rows):
@@ -83,18 +86,28 @@ def read_order(path: Path, roots: Roots = ANYWHERE) -> list[Row]:
     changes = list(_changes(batch, document, base))
     rows: list[Row] = []
     for number, (change, where) in enumerate(changes, start=1):
-        name = str(change.pop("name", "") or f"row_{number:0{len(str(len(changes)))}d}")
-        if not _NAME.fullmatch(name):
+        name = _text(change.pop("name", None)) or f"row_{number:0{len(str(len(changes)))}d}"
+        if not _NAME.fullmatch(name) or len(name.encode()) > _NAME_BYTES:
             hint = "letters, digits, dots, dashes and underscores; a letter or digit first; 100 at most"
             raise ConfigError(f"{name!r} is not a valid name of a row", where=where, hint=hint)
         rows.append(Row(name, _absolute(_changed(whole, change, where), base), where, base))
     if not rows:
         raise ConfigError("the batch has no rows", where=str(path), hint="give rows: or every:")
+    _check_names(rows)
+    return rows
+
+
+def _text(name: Any) -> str:
+    """Return a name as text, composed: some systems write one letter as two characters."""
+    return "" if name is None else unicodedata.normalize("NFC", str(name))
+
+
+def _check_names(rows: Sequence[Row]) -> None:
+    """Refuse a name that is there twice."""
     times = Counter(row.name for row in rows)
     for row in rows:
         if times[row.name] > 1:
             raise ConfigError(f"the name {row.name!r} is there {times[row.name]} times", where=row.where)
-    return rows
 
 
 def _pipeline_document(run: dict[str, Any] | str, document: Document, base: Path) -> dict[str, Any]:
@@ -111,77 +124,27 @@ def _pipeline_document(run: dict[str, Any] | str, document: Document, base: Path
 def _changes(batch: BatchFile, document: Document, base: Path) -> Iterator[tuple[dict[str, Any], str]]:
     """Yield the changes of each row, and where they are written."""
     if isinstance(batch.rows, str):
-        table = list(_table(base / batch.rows))
+        table = list(read_table(base / batch.rows))
     else:
         given = batch.rows if batch.rows is not None else [{}] if batch.every else []
         table = [(dict(row), document.where(("rows", index))) for index, row in enumerate(given)]
     count = len(table) * prod(map(len, batch.every.values()))
     if count > _MOST_ROWS:
         raise ConfigError(f"{count} rows; the most is {_MOST_ROWS}", where=str(document.path))
+    words = [_words(values) for values in batch.every.values()]
     for row, where in table:
-        for values in product(*batch.every.values()):
+        name = _text(row.get("name"))
+        for values, parts in zip(product(*batch.every.values()), product(*words), strict=True):
             change = {**row, **dict(zip(batch.every, values, strict=True))}
-            if row.get("name"):
-                change["name"] = "_".join([str(row["name"]), *map(_word, values)])
-            yield change, where
+            yield {**change, **({"name": "_".join([name, *parts])} if name else {})}, where
 
 
-def _word(value: Any) -> str:
-    """Return a value as part of a name: the last part of a path, without its suffix."""
-    return re.sub(r"[^A-Za-z0-9_-]+", "_", Path(str(value)).stem)
-
-
-def _table(path: Path) -> Iterator[tuple[dict[str, Any], str]]:
-    """Yield the rows of a table and where each stands; empty cells change nothing."""
-    path = check_file(path, {".csv", ".yaml", ".yml", ".parquet"}, _TABLE_BYTES, error=ConfigError)
-    rows: Iterator[tuple[int, dict[str, Any]]]
-    if path.suffix.lower() == ".csv":
-        rows = _csv_rows(path)
-    elif path.suffix.lower() == ".parquet":
-        rows = enumerate(_parquet_rows(path), start=1)
-    else:
-        data = load_yaml(path).data
-        if not isinstance(data, list) or not all(isinstance(row, dict) for row in data):
-            raise ConfigError("a table in YAML is a list of mappings", where=str(path))
-        rows = enumerate(data, start=1)
-    for number, row in rows:
-        yield {str(key): value for key, value in row.items() if value not in (None, "")}, f"{path}, row {number}"
-
-
-def _csv_rows(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield the rows of a CSV file with a head, and their numbers in a spreadsheet; what is blank there is no row.
-
-    A cell is a number, true, false, or a word; a name is a word.
-    """
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as stream:
-            head, *rows = list(csv.reader(stream, strict=True)) or [[]]
-    except (csv.Error, UnicodeDecodeError) as e:
-        raise ConfigError(f"not a CSV table in UTF-8: {e}", where=str(path)) from None
-    twice = [key for key, times in Counter(head).items() if times > 1]
-    if twice:
-        raise ConfigError(f"the column {twice[0]!r} is there {head.count(twice[0])} times", where=f"{path}, row 1")
-    for number, row in enumerate(rows, start=2):
-        if len(row) > len(head):
-            raise ConfigError("a row has more cells than the head", where=f"{path}, row {number}")
-        if any(cell.strip() for cell in row):
-            cells = dict(zip(head, row, strict=False))
-            yield (
-                number,
-                {key: cell if key == "name" or not cell else number_or_word(cell) for key, cell in cells.items()},
-            )
-
-
-def _parquet_rows(path: Path) -> list[dict[str, Any]]:
-    try:
-        from pyarrow import ArrowException, parquet
-    except ImportError:
-        hint = "pip install pyarrow, or save the table as CSV"
-        raise MissingDependencyError("a Parquet table needs pyarrow", where=str(path), hint=hint) from None
-    try:
-        return list(parquet.read_table(path).to_pylist())
-    except (ArrowException, OSError) as e:
-        raise ConfigError(f"not a Parquet table: {e}", where=str(path)) from None
+def _words(values: Sequence[Any]) -> list[str]:
+    """Return values as parts of names: of a path its last part without suffix, or all of it."""
+    texts = [_text(value) for value in values]
+    words = [Path(text).stem if isinstance(value, str) else text for value, text in zip(values, texts, strict=True)]
+    distinct = len(set(words)) == len(set(texts))
+    return [re.sub(r"[^\w.-]+", "_", word).strip("_") for word in (words if distinct else texts)]
 
 
 def _changed(document: Mapping[str, Any], change: Mapping[str, Any], where: str) -> dict[str, Any]:

@@ -19,6 +19,7 @@ COLUMNS = {
     "peak_mb": "float64",
     "tries": "int64",
     "result": "string",
+    "warnings": "string",
     "problem": "string",
     "page": "string",
     "picture": "string",
@@ -59,6 +60,12 @@ def failure_lines(groups: Iterable[Mapping[str, Any]]) -> list[str]:
         f"{one['count']} x {one['kind']} ({', '.join(one['rows'][:3])}{', ...' if one['count'] > 3 else ''})"
         for one in groups
     ]
+
+
+def row_lines(row: Mapping[str, Any]) -> list[str]:
+    """Return what a row says: why it is not done, or else what it found, and what it warns of."""
+    warned = f"warning: {row['warnings']}" if row["warnings"] else ""
+    return [line for line in (row["problem"] or row["result"], warned) if line]
 
 
 def write_csv(rows: Iterable[Mapping[str, Any]], path: Path) -> None:

@@ -17,6 +17,8 @@ from vto_pipeline.io.files import remove_partial
 _LOCK = ".lock"
 _LOOK = 0.2  # s between looks at a lock that another holds
 RECORD = "run.json"
+ROWS = "rows"
+"""Of a batch's folder: the folders of its runs."""
 
 
 def is_run(folder: Path) -> bool:
@@ -89,18 +91,29 @@ def process_in(folder: Path) -> int | None:
         ConfigError: the process is on another machine.
     """
     try:
-        lock = (folder / _LOCK).open(encoding="utf-8")
+        found = holder_of(folder)
     except (FileNotFoundError, NotADirectoryError):
         raise InputError("not the folder of a run or of a batch", where=str(folder)) from None
-    with lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-            return None
-        except BlockingIOError:
-            process, _, host = lock.read().partition(" ")
+    if not found:
+        return None
+    process, _, host = found.partition(" ")
     if host != gethostname():
         raise ConfigError(f"the run is on another machine, {host or 'unknown'}", where=str(folder), hint="go there")
     return int(process)
+
+
+def holder_of(folder: Path) -> str:
+    """Return what works in a run's or a batch's folder as "PROCESS HOST"; empty where nothing does.
+
+    Raises:
+        OSError: the folder has no lock.
+    """
+    with (folder / _LOCK).open(encoding="utf-8") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return lock.read().strip() or "unknown"
+    return ""
 
 
 def existing_run(folder: Path) -> Path:
@@ -110,7 +123,8 @@ def existing_run(folder: Path) -> Path:
         InputError: it was not.
     """
     if not (folder / RECORD).is_file():
-        raise InputError("not a run folder: it has no run.json", where=str(folder))
+        hint = f"it holds many: the runs of a batch lie in {folder / ROWS}" if (folder / ROWS).is_dir() else ""
+        raise InputError("not a run folder: it has no run.json", where=str(folder), hint=hint)
     return folder
 
 

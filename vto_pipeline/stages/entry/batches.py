@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
@@ -24,6 +24,8 @@ from vto_pipeline.pipeline.plan import Plan, Step
 from vto_pipeline.pipeline.request import Request, read_setting, with_setting
 from vto_pipeline.stages.entry import planning
 from vto_pipeline.stages.entry.outcome import Outcome
+
+_TOLD = 20  # rows of which a message tells what is wrong
 
 
 @dataclass(frozen=True)
@@ -79,11 +81,11 @@ def plan_rows(
         roots: Where all given files must lie.
 
     Raises:
-        VtoError: of the first row that is wrong.
+        VtoError: of the first row that is wrong; it names what is wrong in the others, too.
     """
     tables, of_path = planning.catalogue(), cache(digest_path)
     forecast = _Forecast(store)
-    found = []
+    found, faults = [], dict[str, VtoError]()
     for row in rows:
         try:
             request, plan, _ = _plan(row, tables)
@@ -92,13 +94,28 @@ def plan_rows(
             key = run_key(request, plan, force_all, of_path)
         except VtoError as error:
             error.where = f"row {row.name}, {error.where or row.where}"
-            raise
+            faults[row.name] = error
+            continue
         done = is_done(row.name, key)
         results = [] if done else list(stored_results(request, plan, store, force_all, of_path))
         missing = [step for step, result in results if result is None]
         stored = not done and all(step.stage.final for step in missing)
         found.append(PlannedRow(row, key, done, stored, forecast.seconds(request, plan, missing)))
+    if faults:
+        raise _together(faults)
     return found
+
+
+def _together(faults: Mapping[str, VtoError]) -> VtoError:
+    """Return the first fault of a batch, and in its hint those of the other rows, which are then told at once."""
+    first, *others = faults.items()
+    lines = [f"row {name}: {error.problem}" for name, error in others[:_TOLD]]
+    if len(others) > _TOLD:
+        lines.append(f"and {len(others) - _TOLD} more")
+    if lines:
+        rest = f"{len(faults)} rows are wrong, also\n    " + "\n    ".join(lines)
+        first[1].hint = f"{first[1].hint}; {rest}" if first[1].hint else rest
+    return first[1]
 
 
 class _Forecast:

@@ -54,13 +54,14 @@ def outcome_card(outcome: Outcome) -> str:
     from vto_pipeline.report.wording import duration, label
 
     facts = {"folder": str(outcome.folder), "time": duration(outcome.seconds)}
-    picture, notes = None, [*outcome.verdicts, *(f"{label(name)}: {text}" for name, text in outcome.warnings)]
+    picture, notes = None, [f"{label(name)}: {text}" for name, text in outcome.warnings]
     try:
+        notes = [*outcome.verdicts, *notes]
         meshes = _shown(outcome)
         picture = _picture(meshes)
         facts |= {"drawn": f"{sum(len(mesh.faces) for mesh in meshes):,} triangles"} if meshes else {}
         facts |= _errors(outcome)
-    except VtoError as error:  # files of a run may be gone, and what its record says still counts
+    except VtoError as error:  # its files may be gone or another run's, and what its record says still counts
         notes.append(f"not all of it can be read: {error.problem}")
     rows = [("stage", "ended", "time")]
     for stage in outcome.record["stages"]:

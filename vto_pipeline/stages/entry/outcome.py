@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +63,11 @@ class Outcome(Presented):
         """Whether there is a file of an artifact.
 
         A run that was interrupted or failed has not made all it should, and not every table knows every artifact.
+
+        Raises:
+            InputError: a later run of other things has replaced in the folder what this one made.
         """
+        self._check_current()
         known = next((kind for kind in self.tables.kinds if kind.name == artifact), None)
         return known is not None and (self.folder / "out" / known.filename).is_file()
 
@@ -70,7 +75,7 @@ class Outcome(Presented):
         """Return the file of an artifact.
 
         Raises:
-            InputError: the run made none.
+            InputError: the run made none, or a later run has replaced it.
         """
         if not self.made(artifact):
             raise InputError(f"this run made no {artifact}", where=str(self.folder))
@@ -80,9 +85,27 @@ class Outcome(Presented):
         """Return the value of an artifact: a mesh, an avatar, measurements, a report.
 
         Raises:
-            InputError: the run made none.
+            InputError: the run made none, or a later run has replaced it.
         """
         return self.tables.kind(artifact).read(self.path(artifact))
+
+    def _check_current(self) -> None:
+        """Refuse to give what another run has made in the folder since, as where two calls name no folder."""
+        path = self.folder / RECORD
+        if path.is_file() and _results_there(path, path.stat().st_mtime_ns) != _results(self.record):
+            problem = "a later run has replaced what this one made"
+            raise InputError(problem, where=str(self.folder), hint="give each run an output folder of its own")
+
+
+def _results(record: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
+    """Return what tells the results of a run: each stage, and the key of what it made."""
+    return tuple((stage["name"], stage.get("key", "")) for stage in record["stages"])
+
+
+@lru_cache(maxsize=64)
+def _results_there(path: Path, changed: int) -> tuple[tuple[str, str], ...]:
+    """Return them of the record at a path, as it was at some time [ns]."""
+    return _results(read_json(path))
 
 
 def open_run(folder: Path | str) -> Outcome:

@@ -106,4 +106,5 @@ def _fit(run: Outcome) -> dict[str, Any]:
         garment = kind.name.removesuffix("fit_report").rstrip("_")
         for zone in run.read(kind.name)["zones"]:
             ease[f"{label(garment)}: {zone['zone']}" if garment else zone["zone"]] = 100.0 * zone["ease_m"]
-    return {"verdict": "; ".join(words.removeprefix("fit: ") for words in run.verdicts), "ease_cm": ease}
+    words = [text.removeprefix("fit: ") for text in run.verdicts] + [f"warning: {text}" for _, text in run.warnings]
+    return {"verdict": "; ".join(words), "ease_cm": ease}
