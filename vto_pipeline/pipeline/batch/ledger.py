@@ -25,6 +25,7 @@ from vto_pipeline.pipeline.execution.folder import RECORD
 LEDGER = "batch.json"
 JOURNAL = "batch.partial.jsonl"
 
+_UNKNOWN = "not known: done by an earlier version, which noted none"
 _BLANK = {"result": "", "warnings": "", "problem": "", "failure": "", "page": "", "picture": ""}
 _REST = 50.0  # times as long as writing both files took, they are left alone
 
@@ -122,14 +123,12 @@ def read_ledger(folder: Path) -> Mapping[str, Any]:
 
 
 def _with_its_files(row: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """Return a row as it is, or as waiting where files that it was done with are gone, or nobody knows its warnings."""
+    """Return a row as it is, or as waiting where files that it was done with are gone."""
     if row["status"] != "done":
         return row
     files = row.get("files", [f"rows/{row['name']}/{RECORD}"])
     lacking = next((f"{name} is gone" for name in files if not (folder / name).exists()), None)
-    if "warnings" not in row:  # its results are stored, so that it costs little
-        lacking = "done by an earlier version, which did not note warnings"
-    return row if lacking is None else {**row, **_BLANK, "status": "waiting", "problem": lacking}
+    return {"warnings": _UNKNOWN, **row} if lacking is None else {**row, **_BLANK, "status": "waiting", "problem": lacking}
 
 
 def _journal(path: Path) -> Iterator[dict[str, Any]]:
