@@ -128,7 +128,9 @@ def _with_its_files(row: dict[str, Any], folder: Path) -> dict[str, Any]:
         return row
     files = row.get("files", [f"rows/{row['name']}/{RECORD}"])
     lacking = next((f"{name} is gone" for name in files if not (folder / name).exists()), None)
-    return {"warnings": _UNKNOWN, **row} if lacking is None else {**row, **_BLANK, "status": "waiting", "problem": lacking}
+    if lacking is None:
+        return {"warnings": _UNKNOWN, **row}
+    return {**row, **_BLANK, "status": "waiting", "problem": lacking}
 
 
 def _journal(path: Path) -> Iterator[dict[str, Any]]:
