@@ -9,6 +9,7 @@ from vto_pipeline.cloth.collision.response.contact_springs import (
     add_contacts,
     contact_energy,
     linked_contacts,
+    project_to_contacts,
     update_active_set,
 )
 from vto_pipeline.numerics.linear.block_matrix import BlockMatrix
@@ -132,3 +133,26 @@ def test_friction_is_the_trial_or_the_limit_in_its_direction(seed):
     assert_allclose(made.friction_force[touches], wanted[touches], rtol=1e-12, atol=1e-15)
     assert (made.friction_force[~touches] == 0.0).all()
     assert not (made.sliding & (size <= limit) & touches).any()
+
+
+@pytest.mark.parametrize("share", [0.5, 1e-3])
+def test_held_places_are_not_put_right_by_what_is_hardly_beside_them(share):
+    """A free corner with so much of the place touched has to go gap / share; with little, out of all proportion."""
+    made, gap = no_contacts(1), 1e-3
+    made.key[0], made.vertices[0], made.weights[0] = 1 << 41, [0, 1, 2, 3], [1.0, -share, -0.4, share - 0.6]
+    made.normal[0], made.level[0], made.pushing[0] = [0.0, 1.0, 0.0], gap, True
+    x, held = np.zeros((4, 3)), np.array([True, False, True, True])
+    at = np.arange(4)
+    matrix = BlockMatrix(np.arange(5, dtype=np.int32), at.astype(np.int32), np.tile(1e3 * np.eye(3), (4, 1, 1)), at)
+    right, between = np.zeros((4, 3)), np.zeros((1, 3, 3))
+    _, weights = linked_contacts(made, held)
+    add_contacts(made, np.full(4, 1e-3), held, 0.01, x, x, matrix, right, between)
+    move = np.linalg.solve(matrix.blocks[1] + weights[0, 1] ** 2 * between[0], right[1])
+    by_guess = np.zeros((4, 3))
+    project_to_contacts(made, np.where(held, 0.0, 1e3), x, x, by_guess)
+    if share > 0.1:
+        assert 0.2 * gap / share < -move[1] <= gap / share
+        assert_allclose(by_guess[1, 1], -gap / share, rtol=1e-12)
+    else:
+        assert not move.any()
+        assert not by_guess.any()

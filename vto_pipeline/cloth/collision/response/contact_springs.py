@@ -14,6 +14,7 @@ _FIRM = 4.0  # last force / gap: with that stiffness, as much again would take a
 _LOST = 0.5  # share of the gap; where more is lost, the spring was too soft for what it bears
 _NO_LENGTH = 1e-300  # m
 _NOTHING = 1e-6  # m: of a gap smaller than this nothing can be lost
+_LEVER = 1e-4  # of the squares of all weights; where held vertices have the rest, a free one would go 100 times the gap
 _STIFFER = 1e3  # times mass / h²: a free vertex at rest on a plane sinks g h² / 1000, 3 µm at 1/60 s
 
 
@@ -91,17 +92,19 @@ def linked_contacts(contacts, held):
 def _set_springs(contacts, mass, held, h, matrix):
     """Make planes stiffer than the cloth holds what they touch, and all much stiffer than inertia."""
     for c in range(len(contacts.key)):
-        give = stiff_give = 0.0
+        give = stiff_give = free = whole = 0.0
         lone = _is_against_other(contacts, c)
         for s in range(4):
             i, w = contacts.vertices[c, s], contacts.weights[c, s]
+            whole += w * w
             if w != 0.0 and not held[i]:
+                free += w * w
                 inertia = mass[i] / (h * h)
                 block = matrix.blocks[matrix.diagonal[i]]
                 stiff = (block[0, 0] + block[1, 1] + block[2, 2]) / 3.0 + _STIFFER * inertia
                 stiff_give += w * w / stiff
                 give += w * w / (_SOFT * inertia)
-        if give == 0.0:  # nothing of it can move
+        if free <= _LEVER * whole:  # nothing of it can move, or what can is all but beside it
             contacts.normal_stiffness[c] = contacts.tangential_stiffness[c] = contacts.rest_offset[c] = 0.0
             continue
         if lone:
@@ -128,7 +131,7 @@ def project_to_contacts(contacts, inverse_mass, x, y, move):
         if not contacts.pushing[c]:
             continue
         give = inverse_effective_mass(contacts, c, inverse_mass)
-        if give == 0.0:
+        if give == 0.0 or contacts.normal_stiffness[c] == 0.0:
             continue
         n, now, moved = load(contacts.normal, c), sum_at(contacts, c, y), sum_at(contacts, c, move)
         shift = scale(contacts.level[c] - dot(n, now) - dot(n, moved), n)
