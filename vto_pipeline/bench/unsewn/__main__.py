@@ -18,7 +18,7 @@ import numpy as np
 from vto_pipeline.bench.printed_table import print_table
 from vto_pipeline.bench.unsewn.compare import PanelErrors, compare
 from vto_pipeline.bench.unsewn.scans import draped_truth, scanned
-from vto_pipeline.errors import InputError
+from vto_pipeline.errors import InputError, VtoError
 from vto_pipeline.garment.unsewn.recover import recover
 from vto_pipeline.garment.unsewn.unsew import Unsewn
 from vto_pipeline.geometry.topology import surface_area
@@ -26,6 +26,7 @@ from vto_pipeline.io.fabrics import read_fabric
 from vto_pipeline.io.meshes import read_mesh, write_ply
 from vto_pipeline.io.patterns.panels_obj import write_panels_obj
 from vto_pipeline.io.patterns.write import write_pattern
+from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.units import LENGTH_M
@@ -54,23 +55,30 @@ def rows(sources: list[str], args: argparse.Namespace) -> Iterator[tuple[str, ..
     """
     fabric = read_fabric(args.fabric)
     for source in map(Path, sources):
-        began = time.process_time()
-        job = Job()
-        scan: TriangleMesh | None = None
-        if source.is_dir():
-            truth = draped_truth(source)
-            scan, lines = scanned(truth, 1e-3 * args.edge_mm, 1e-3 * args.noise_mm, 0)
-            found = recover(scan, lines, fabric, source.name, job)
-        else:
-            truth = _true_panels(source)
-            found = recover(truth, "charts", fabric, source.stem, job)
-        seconds = time.process_time() - began
-        if args.out is not None:
-            _keep(args.out, source.stem, found, scan)
-        errors = compare(found, truth)
-        yield from _table(source.stem, errors, found)
-        passed = sum(map(_passes, errors))
-        yield (source.stem, f"{passed} of {len(errors)} pass", *[""] * 8, f"{seconds:.0f} s CPU")
+        try:
+            yield from _rows_of(source, fabric, args)
+        except VtoError as error:
+            yield (source.stem, f"refused: {error.problem}", *[""] * 8, "NO")
+
+
+def _rows_of(source: Path, fabric: Fabric, args: argparse.Namespace) -> Iterator[tuple[str, ...]]:
+    began = time.process_time()
+    job = Job()
+    scan: TriangleMesh | None = None
+    if source.is_dir():
+        truth = draped_truth(source)
+        scan, lines = scanned(truth, 1e-3 * args.edge_mm, 1e-3 * args.noise_mm, 0)
+        found = recover(scan, lines, fabric, source.name, job)
+    else:
+        truth = _true_panels(source)
+        found = recover(truth, "charts", fabric, source.stem, job)
+    seconds = time.process_time() - began
+    if args.out is not None:
+        _keep(args.out, source.stem, found, scan)
+    errors = compare(found, truth)
+    yield from _table(source.stem, errors, found)
+    passed = sum(map(_passes, errors))
+    yield (source.stem, f"{passed} of {len(errors)} pass", *[""] * 8, f"{seconds:.0f} s CPU")
 
 
 def _true_panels(path: Path) -> TriangleMesh:

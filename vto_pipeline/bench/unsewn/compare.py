@@ -93,18 +93,20 @@ def _panel_errors(
     there: FloatArray,
     area: FloatArray,
 ) -> PanelErrors:
+    starts = np.stack([edge.points[0] for edge in panel.edges])
+    near = cKDTree(here).query(starts)[1]
+    turn, shift = _rigid(here, there)
+    ends = there[near] + (starts - here[near]) @ turn.T  # where on the true panel an edge starts, by the cloth there
     corners = flat[piece.mesh.faces]
     true_area = 0.5 * float(np.linalg.det(corners[:, 1:] - corners[:, :1]).sum())
     outline = edges_points(panel.edges, 1e-4)
     true_outline = flat[np.append(piece.start, piece.start[0])]
-    turn, shift = _rigid(here, there)
     ours, theirs = _dense(outline), _dense(true_outline)
     tree = cKDTree(theirs)
     for _ in range(_ROUNDS):
         turn, shift = _rigid(ours, theirs[tree.query(ours @ turn.T + shift)[1]])
     moved = ours @ turn.T + shift
     off = np.concatenate([tree.query(moved)[0], cKDTree(moved).query(theirs)[0]])
-    ends = np.stack([edge.points[0] for edge in panel.edges]) @ turn.T + shift
     lengths = np.array([np.linalg.norm(np.diff(e.points, axis=0), axis=1).sum() for e in panel.edges])
     seams, worn = [], []
     for run in sewn:
