@@ -1,8 +1,8 @@
 """Lines drawn on a surface made edges of its mesh.
 
 Each line is first followed along edges, which cannot fail where the surface is whole; then the vertices on the way are
-drawn onto the line, and those around moved to the middle of their neighbours, all of them on the surface as it was. So
-no triangle is cut, and none is much worse than before.
+drawn onto the line, and those around moved along with them, the less the farther, all of them on the surface as it was.
+So no triangle is cut, none is much worse than before, and folds keep their vertices.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from scipy.spatial.distance import cdist
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.unsewn.cut import Bools
-from vto_pipeline.geometry.closest import closest_points
+from vto_pipeline.geometry.riding.surface_walk import SurfaceWalk
 from vto_pipeline.geometry.smooth import neighbour_mean
 from vto_pipeline.geometry.topology import edge_face_counts, edges, face_area_vectors, half_edges
 from vto_pipeline.model.arrays import FloatArray
@@ -68,6 +68,9 @@ class _Tracer:
         self._rim = np.zeros(len(mesh.vertices), np.bool_)
         self._rim[pair[count == 1]] = True
         self._rim_edges = count == 1
+        self._walk = SurfaceWalk(mesh)  # layers of cloth lie on each other in gathers: the nearest one may be another
+        self._face = np.empty(len(mesh.vertices), np.int32)
+        self._face[mesh.faces.ravel()] = np.repeat(np.arange(len(mesh.faces)), 3)
         self._x = mesh.vertices.copy()
         self._taken = np.zeros(len(mesh.vertices), np.bool_)
         self._ways: list[NDArray[np.int64]] = []
@@ -157,7 +160,7 @@ class _Tracer:
         elif on or self._rim[vertex]:
             return  # where lines meet already, or meet a rim
         else:
-            self._x[vertex] = closest_points(point[None], self._mesh.vertices, self._mesh.faces)[1][0]
+            self._x[vertex] = self._on_surface(np.array([vertex]), point[None])[0]
             return
         here = self._x[vertex]
         sides = self._x[around] - here
@@ -192,7 +195,13 @@ class _Tracer:
         place = 0.25 * padded[:-2] + 0.5 * place + 0.25 * padded[2:]
         number = np.arange(len(line))
         target = np.stack([np.interp(place, number, line[:, k]) for k in range(3)], axis=1)
-        self._x[inner] = closest_points(target, self._mesh.vertices, self._mesh.faces)[1]
+        self._x[inner] = self._on_surface(inner, target)
+
+    def _on_surface(self, vertex: NDArray[np.int64], target: FloatArray) -> FloatArray:
+        """Return the places on the surface (N, 3) that vertices come to on their way to targets (N, 3)."""
+        face = self._walk.follow(self._mesh.vertices[vertex], self._face[vertex], target)
+        weights, _ = self._walk.nearest_on(target, face)
+        return np.asarray(np.einsum("nk,nkd->nd", weights, self._mesh.vertices[self._mesh.faces[face]]))
 
     def seam(self) -> Bools:
         """Return which half-edges the lines run along, both sides, shape (3F,)."""
@@ -203,7 +212,7 @@ class _Tracer:
         return np.isin(halves[:, 0] * count + halves[:, 1], ends[:, 0] * count + ends[:, 1])
 
     def relaxed(self) -> TriangleMesh:
-        """Return the mesh with vertices near lines moved to make room, on the surface.
+        """Return the mesh with vertices near lines moved along with them, on the surface.
 
         Raises:
             GarmentError: no room is found: a triangle is flipped.
@@ -220,8 +229,10 @@ class _Tracer:
         if not self._ways or not free.any():
             return replace(mesh, vertices=x)
         mean = neighbour_mean(mesh)[free]
+        moved = x - mesh.vertices
         for _ in range(_ROUNDS):
-            x[free] = closest_points(mean @ x, mesh.vertices, mesh.faces)[1]
+            moved[free] = mean @ moved
+        x[free] = self._on_surface(np.flatnonzero(free), (mesh.vertices + moved)[free])
         found = replace(mesh, vertices=x)
         turned = np.einsum("fd,fd->f", face_area_vectors(found), face_area_vectors(mesh)) <= 0.0
         if turned.mean() > 0.01:
