@@ -257,13 +257,41 @@ def test_a_drawn_line_runs_along_edges_and_the_surface_stays():
     angle = 0.3 + 1.1 * share  # a helix
     line = np.column_stack([0.15 * np.sin(angle), 0.4 * share, 0.15 * np.cos(angle)])
     cut, seam = trace(mesh, [line])
-    ends = cut.vertices[half_edges(cut)[seam]]
+    ends = cut.vertices[half_edges(cut)[seam == 0]]
     length = 0.5 * np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum()  # each side once
     assert length == pytest.approx(np.hypot(0.4, 0.15 * 1.1), rel=5e-3)
     there = np.arctan2(ends[..., 0], ends[..., 2]) - 0.3 - 1.1 * ends[..., 1] / 0.4
     assert np.abs(0.15 * there).max() < 2e-3
     assert area_of(cut) == pytest.approx(area_of(mesh), rel=2e-3)
     assert (np.einsum("fd,fd->f", face_area_vectors(cut), face_area_vectors(mesh)) > 0.0).all()
+
+
+def test_a_line_across_folds_takes_no_cloth_out_of_them():
+    """A tube in 40 folds of six vertices each, 8 mm deep: the middle of its neighbours would take a vertex off its fold."""
+    tube = frustum(0.15, 0.15, 0.1, around=240, up=25)
+    angle = np.arctan2(tube.vertices[:, 0], tube.vertices[:, 2])
+
+    def folded(angle, height):
+        radius = 0.15 + 0.004 * np.cos(40 * angle)
+        return np.column_stack([radius * np.sin(angle), height, radius * np.cos(angle)])
+
+    mesh = replace(tube, vertices=folded(angle, tube.vertices[:, 1]))
+    around = np.linspace(0.0, 2.0 * np.pi, 721)
+    cut, seam = trace(mesh, [folded(around, np.full(721, 0.0512))])
+    assert (seam >= 0).any()
+    assert area_of(cut) == pytest.approx(area_of(mesh), rel=2e-3)
+
+
+def test_a_line_with_sharp_turns_is_one_seam():
+    """A tube cut up along one zigzag: the panel has two ends of the tube, and each side of the zigzag as one edge."""
+    share = np.linspace(0.0, 1.0, 201)
+    angle = 0.3 * np.abs((4.0 * share) % 2.0 - 1.0)  # turns by 84 degrees, three times
+    line = np.column_stack([0.15 * np.sin(angle), 0.2 * share, 0.15 * np.cos(angle)])
+    found = recover(frustum(0.15, 0.15, 0.2, around=190, up=40), {"zigzag": line}, POPLIN, "tube", Job())
+    (panel,) = found.pattern.panels
+    girth, side = 2.0 * np.pi * 0.15, 4.0 * float(np.hypot(0.045, 0.05))
+    assert sorted(edge_lengths(panel)) == pytest.approx(sorted([side, side, girth, girth]), rel=0.02)
+    assert len(found.pattern.stitches) == 1
 
 
 def test_a_corner_of_one_side_ends_the_other_side_of_the_seam_too():

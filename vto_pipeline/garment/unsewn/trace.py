@@ -19,11 +19,10 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from vto_pipeline.errors import GarmentError
-from vto_pipeline.garment.unsewn.cut import Bools
 from vto_pipeline.geometry.riding.surface_walk import SurfaceWalk
 from vto_pipeline.geometry.smooth import neighbour_mean
 from vto_pipeline.geometry.topology import edge_face_counts, edges, face_area_vectors, half_edges
-from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 
 _NEAR = 1.5  # edges between a line's end and the rim, or another line, that it is meant to reach
@@ -38,8 +37,8 @@ _SLID = 0.6  # of an edge that a vertex at a rim or on a line moves along it at 
 _GAP = 0.2  # of an even spacing: vertices on a line are never closer
 
 
-def trace(mesh: TriangleMesh, lines: Sequence[FloatArray], names: Sequence[str] = ()) -> tuple[TriangleMesh, Bools]:
-    """Return a mesh of the same surface with lines along its edges, and which half-edges those are, (3F,).
+def trace(mesh: TriangleMesh, lines: Sequence[FloatArray], names: Sequence[str] = ()) -> tuple[TriangleMesh, IntArray]:
+    """Return a mesh of the same surface with lines along its edges, and which line each half-edge is on, or -1, (3F,).
 
     Ends of lines that are within one and a half edges of a rim, of another line or of another end meet it.
 
@@ -53,7 +52,8 @@ def trace(mesh: TriangleMesh, lines: Sequence[FloatArray], names: Sequence[str] 
     """
     tracer = _Tracer(mesh)
     for number, line in enumerate(lines):
-        tracer.follow(np.asarray(line, dtype=np.float64), names[number] if number < len(names) else f"seam {number}")
+        name = names[number] if number < len(names) else f"seam {number}"
+        tracer.follow(number, np.asarray(line, dtype=np.float64), name)
     return tracer.relaxed(), tracer.seam()
 
 
@@ -74,9 +74,10 @@ class _Tracer:
         self._x = mesh.vertices.copy()
         self._taken = np.zeros(len(mesh.vertices), np.bool_)
         self._ways: list[NDArray[np.int64]] = []
+        self._numbers: list[int] = []  # of the line that each way is a part of
 
-    def follow(self, line: FloatArray, name: str) -> None:
-        """Add a line."""
+    def follow(self, number: int, line: FloatArray, name: str) -> None:
+        """Add a line with this number."""
         line = _evenly(line, _SAMPLES * self._edge)
         if self._taken[self._anchors(line[-1])].any() and not self._taken[self._anchors(line[0])].any():
             line = line[::-1]  # begun where it is known on which of two sheets in touch it lies
@@ -91,6 +92,7 @@ class _Tracer:
         for other, last in [*((np.array([k]), at) for k, at in stops), (ends, len(line) - 1)]:
             if (other != one).all():
                 one = self._between(line[first : last + 1], one, other, name)
+                self._numbers.append(number)
                 first = last
 
     def _crossed(self, line: FloatArray) -> list[tuple[int, int]]:
@@ -203,13 +205,16 @@ class _Tracer:
         weights, _ = self._walk.nearest_on(target, face)
         return np.asarray(np.einsum("nk,nkd->nd", weights, self._mesh.vertices[self._mesh.faces[face]]))
 
-    def seam(self) -> Bools:
-        """Return which half-edges the lines run along, both sides, shape (3F,)."""
+    def seam(self) -> IntArray:
+        """Return which line each half-edge is on, both sides of an edge, shape (3F,); -1: none."""
         count = len(self._x)
-        parts = [np.stack([way[:-1], way[1:]], axis=1) for way in self._ways]
-        ends = np.sort(np.concatenate(parts), axis=1) if parts else np.zeros((0, 2), np.int64)
         halves = np.sort(half_edges(self._mesh).astype(np.int64), axis=1)
-        return np.isin(halves[:, 0] * count + halves[:, 1], ends[:, 0] * count + ends[:, 1])
+        key = halves[:, 0] * count + halves[:, 1]
+        seam = np.full(len(key), -1, np.int32)
+        for number, way in zip(self._numbers, self._ways, strict=True):
+            ends = np.sort(np.stack([way[:-1], way[1:]], axis=1), axis=1)
+            seam[np.isin(key, ends[:, 0] * count + ends[:, 1])] = number
+        return seam
 
     def relaxed(self) -> TriangleMesh:
         """Return the mesh with vertices near lines moved along with them, on the surface.

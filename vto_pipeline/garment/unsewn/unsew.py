@@ -14,7 +14,7 @@ from vto_pipeline.garment.unsewn.names import panel_names
 from vto_pipeline.garment.unsewn.outline import crosses_itself, sharp_corners, smoothed
 from vto_pipeline.garment.unsewn.rims import Rims
 from vto_pipeline.geometry.topology import edges, face_areas
-from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -60,7 +60,7 @@ class Unsewn:
 
 def unsew(
     mesh: TriangleMesh,
-    seam: Bools,
+    seam: IntArray,
     warp: FloatArray,
     fabric: Fabric,
     rims: Rims | None,
@@ -72,7 +72,8 @@ def unsew(
 
     Args:
         mesh: The garment [m], manifold and oriented, +Y up, +Z the front.
-        seam: Which half-edges are on a seam, both sides of each, shape (3F,).
+        seam: Which line each half-edge is on, both sides of each seam, shape (3F,); -1: none. Along one line, nothing
+            is taken for a corner: where cloth is gathered, it lies flat with a wavy edge.
         warp: Which way the warp runs in each face, shape (F, 3); zero: unknown.
         fabric: Which stretch is taken first.
         rims: Its openings, if they tell its type: panels are named after them.
@@ -83,14 +84,14 @@ def unsew(
     Raises:
         GarmentError: a piece is no disc, or cannot be laid flat.
     """
-    pieces = cut_apart(mesh, seam)
+    pieces = cut_apart(mesh, seam >= 0)
     flat = []
     for number, piece in enumerate(pieces):
         job.progress(number / len(pieces), f"laying piece {number + 1} of {len(pieces)} flat")
         flat.append(flatten(piece.mesh, warp[piece.face], fabric))
     flat = _side_by_side(flat)
     names = panel_names(pieces, rims)
-    sharp = [sharp_corners(x[piece.start]) for piece, x in zip(pieces, flat, strict=True)]
+    sharp = [_corners(piece, x, seam) for piece, x in zip(pieces, flat, strict=True)]
     found = runs(mesh, pieces, sharp)
     panels = tuple(
         _panel(names[k], piece, flat[k], [run for run in found if run.piece == k], noise)
@@ -103,6 +104,12 @@ def unsew(
     _tell(figures, panels, job)
     whole = TriangleMesh(mesh.vertices, mesh.faces, texture=texture)
     return Unsewn(Pattern(name, panels, _stitches(found, names)), figures, whole)
+
+
+def _corners(piece: Piece, flat: FloatArray, seam: IntArray) -> Bools:
+    line = seam[piece.outline]
+    inside = (line >= 0) & (line == np.roll(line, 1))
+    return sharp_corners(flat[piece.start]) & ~inside
 
 
 def _panel(name: str, piece: Piece, flat: FloatArray, own: Sequence[Run], noise: float) -> Panel:
