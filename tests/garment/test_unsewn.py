@@ -267,7 +267,7 @@ def test_a_drawn_line_runs_along_edges_and_the_surface_stays():
 
 
 def test_a_line_across_folds_takes_no_cloth_out_of_them():
-    """A tube in 40 folds of six vertices each, 8 mm deep: the middle of its neighbours would take a vertex off its fold."""
+    """A tube in 40 folds of six vertices each, 8 mm deep; the middle of its neighbours takes a vertex off its fold."""
     tube = frustum(0.15, 0.15, 0.1, around=240, up=25)
     angle = np.arctan2(tube.vertices[:, 0], tube.vertices[:, 2])
 
