@@ -4,7 +4,8 @@ The panel is sought that costs the least membrane energy when it is stretched to
 its shear count as the fabric resists them. In front of that, a conformal map, and the symmetric Dirichlet energy
 (Smith & Schaefer 2015) lowered by SLIM (Rabinovich, Poranne, Panozzo & Sorkine-Hornung 2017, in libigl), which knows no
 directions. The last part is a Gauss-Newton method on the Green strain from the panel to the surface, which grows
-without bound where a triangle closes up: with steps cut short before any does, no triangle is ever flipped.
+without bound where a triangle closes up: with steps cut short before any does, no triangle is ever flipped. Where one
+grows, the strain tends to a half only: steps are cut short there as well, or corners fly off.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ _ROUNDS = 40
 _CONVERGED = 1e-6  # of the energy
 _HALVINGS = 12
 _LEAST = 1e-3  # of its area at first that a triangle keeps; of a side, the least height: scans have slivers
+_MOST = 3.0  # times its length at first that an edge grows to: the strain is bounded there, so corners would fly off
 _HOLD = 1e-7  # of the stiffness: which place and turn the panel has does not matter
 _UPRIGHT = 0.3  # a mean of unit vectors shorter than this points nowhere
 
@@ -144,6 +146,8 @@ def _orthotropic(mesh: TriangleMesh, own: FloatArray, flat: FloatArray, fabric: 
     about = flat - flat.mean(axis=0)
     turn = np.column_stack([-about[:, 1], about[:, 0]]).ravel()  # no step turns the panel: its warp is known
     least = _LEAST * flat_areas(flat, mesh.faces)
+    a, b = edges(mesh).T
+    most = _MOST * np.linalg.norm(flat[a] - flat[b], axis=1)
     before, right, normal = energy.at(x)
     for _ in range(_ROUNDS):
         solver = splu(normal, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
@@ -151,7 +155,8 @@ def _orthotropic(mesh: TriangleMesh, own: FloatArray, flat: FloatArray, fabric: 
         step = (step - (turn @ step) / (turn @ turning) * turning).reshape(-1, 2)
         for halving in range(_HALVINGS):
             tried = x + 0.5**halving * step
-            if (flat_areas(tried, mesh.faces) > least).all():
+            near = (np.linalg.norm(tried[a] - tried[b], axis=1) < most).all()
+            if near and (flat_areas(tried, mesh.faces) > least).all():
                 now, right, normal = energy.at(tried)
                 if now < before:
                     break
