@@ -59,9 +59,8 @@ def recover(mesh: TriangleMesh, seams: Seams, fabric: Fabric, name: str, job: Jo
             raise InputError(problem or "the garment has no texture coordinates, so no charts to cut along")
         job.note("seams: the borders of its charts" + (", which are panels at true scale" if laid is not None else ""))
         warp = up if laid is None else _warp(mesh, laid)
-        seam = seams_of_charts(mesh)
-        each = np.where(seam, np.arange(len(seam)), -1)  # which edges make one line is not known
-        found = unsew(mesh, each, warp, fabric, rims, 0.0, name, job)
+        each = np.arange(3 * len(mesh.faces), dtype=np.int32)  # which edges make one line is not known
+        found = unsew(mesh, np.where(seams_of_charts(mesh), each, np.int32(-1)), warp, fabric, rims, 0.0, name, job)
     else:
         if seams == "auto" and rims is None:
             count = len(boundary_loops(mesh))
