@@ -8,12 +8,17 @@ from cloth_scenes import ball, fabric, moved, sheet
 from numpy.testing import assert_allclose, assert_array_equal
 from unclean_bodies import doubled, fine_box, flipped, soup, together
 
+import vto_pipeline.cloth.dynamics.body_motion
 import vto_pipeline.cloth.dynamics.stepper
 from vto_pipeline.cloth import MeshCollider, simulate
 from vto_pipeline.cloth.collision.body.contacts import BodyCollider
 from vto_pipeline.cloth.collision.response.projected_gauss_seidel import separate_pairs
 from vto_pipeline.cloth.collision.self_collision.self_contact import SelfContact
+from vto_pipeline.cloth.dynamics.body_motion import VariableSpeedBody, run_body_motion
+from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
+from vto_pipeline.cloth.model.build import at_rest, build_cloth
 from vto_pipeline.model.body import MovingBody
+from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.numerics.cpu_threads import limited_threads
 
@@ -237,6 +242,24 @@ def test_a_body_that_rises_takes_a_sheet_along():
     there = TriangleMesh(rising.keyframes[-1], rising.faces)
     assert not crosses(ended.positions, mesh.faces, there)
     assert ended.positions[:, 1].max() > there.vertices[:, 1].max()
+
+
+@pytest.mark.parametrize(("aside", "seconds"), [(0.1, 0.04), (0.03, 0.02)])
+@pytest.mark.parametrize("again", [True, False])
+def test_fingers_that_spread_at_once_are_slowed_until_none_goes_through(aside, seconds, again, monkeypatch):
+    if not again:
+        monkeypatch.setattr(vto_pipeline.cloth.dynamics.body_motion, "_gone_through", lambda stepper: 0)
+    fingers = together(moved(cone(), -0.09, 0, 0), moved(cone(), 0.09, 0, 0))
+    apart = np.sign(fingers.vertices[:, :1]) * [aside, 0, 0] + [0, 0.1, 0]
+    body = MovingBody(np.stack([fingers.vertices, fingers.vertices + apart]), fingers.faces)
+    mesh = moved(sheet(9, 9, 0.5, 0.5, upright=False), 0.013 - 0.25, 0.253, 0.017 - 0.25)
+    collider = VariableSpeedBody(body, seconds, 0.3)
+    stepper = Stepper(
+        build_cloth(mesh, RestShape(mesh.vertices), FABRIC), [collider], np.full(81, 2e-3), StepConfig(**FEATURES)
+    )
+    state = run_body_motion(stepper, at_rest(mesh.vertices), collider, 2e-3, lambda done: None)
+    assert crosses(state.positions, mesh.faces, TriangleMesh(body.keyframes[-1], body.faces)) is not again
+    assert (collider.ends > seconds) is again
 
 
 @pytest.mark.parametrize("mend", [doubled, flipped, lambda mesh, _: soup(mesh)])

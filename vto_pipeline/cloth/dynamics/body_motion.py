@@ -19,7 +19,9 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 _WINDOW = 0.05  # s of cloth time between changes of speed
 _SLOWEST = 0.125  # of full speed
+_CAREFUL = 0.03  # of full speed: the slowest where parts of the body go through cloth in one step
 _BRAKE, _PICK_UP = 0.5, 1.25  # of the speed, where contact is deep and where it is not
+_AGAIN = 0.25  # of the speed, where a part went through
 _SHALLOW = 0.25  # of what counts as deep: between the two, the speed is kept
 _BESIDE = 0.15  # m: the body this near the cloth, where it begins or ends, sets the speed
 _JAMMED = 1000.0  # weights left over: cloth that is led about by a body has some hundreds
@@ -80,6 +82,9 @@ def run_body_motion(
 ) -> ClothState:
     """Return the cloth when the body's motion is over; where cloth is deep in the body, that waits for it.
 
+    Where its vertices and edges are kept out of the cloth, too, and a part of it goes through all the same, as fingers
+    that spread do, that is taken back and gone again more slowly.
+
     Args:
         stepper: The cloth among its colliders, the body one of them.
         state: Where to begin, at the motion's begin.
@@ -92,9 +97,16 @@ def run_body_motion(
         IntersectingError: the body only grows and the cloth is jammed: what is left over of its forces is far above its
             weight, and does not fall. Steps take minutes then, and lead nowhere. `partial` holds it there as "draped".
     """
-    speed, left = 1.0, [0.0]
+    speed, left, passed = 1.0, [0.0], _gone_through(stepper)
     while state.time < body.ends - 1e-9:
+        before, known = state, stepper.contact_memory
         state = stepper.run(state, min(_WINDOW, body.ends - state.time))
+        if _gone_through(stepper) > passed and speed > _CAREFUL:
+            passed, speed = _gone_through(stepper), max(_AGAIN * speed, _CAREFUL)
+            state, stepper.contact_memory = before, known
+            body.set_speed(state.time, speed)
+            continue
+        passed = _gone_through(stepper)
         watch(state.time / body.ends)
         left.append(stepper.residual(state))
         if only_grows and stepper.has_exact_rest and is_jammed(left):  # others leave forces that are no jam's
@@ -105,10 +117,15 @@ def run_body_motion(
             )
         depth = body.depth(state.time, state.positions)
         change = _BRAKE if depth > deep else _PICK_UP if depth < _SHALLOW * deep else 1.0
-        speed = float(np.clip(speed * change, _SLOWEST, 1.0))
+        speed = float(np.clip(speed * change, min(speed, _SLOWEST), 1.0))
         if state.time < body.ends - 1e-9:
             body.set_speed(state.time, speed)
     return state
+
+
+def _gone_through(stepper: Stepper) -> int:
+    """Return how many pairs of features of cloth and moving bodies have met that no shorter step kept apart."""
+    return 0 if stepper.self_contact is None else stepper.self_contact.counters.uncut
 
 
 def is_jammed(left: Sequence[float]) -> bool:

@@ -104,15 +104,18 @@ class Phases:
         seconds = body_travel(body, cloth) / self._config.body_speed
         return VariableSpeedBody(body, seconds, self._friction, self._job)
 
-    def stepper(self, model: ClothModel, collider: VariableSpeedBody, damping: float) -> Stepper:
-        """Return the cloth among its colliders."""
+    def stepper(
+        self, model: ClothModel, collider: VariableSpeedBody, damping: float, config: DrapeConfig | None = None
+    ) -> Stepper:
+        """Return the cloth among its colliders, by all its settings or by others."""
+        config = self._config if config is None else config
         made = Stepper(
             model,
             [collider],
             np.full(len(model.mass), self._skin),
-            self._config,
+            config,
             damping=damping,
-            max_speed=self._config.max_speed,
+            max_speed=config.max_speed,
             crossed=self._crossed,
             force_all=self._job.force_all,
         )
@@ -137,14 +140,36 @@ class Phases:
         growth.refuse_pierced()
         while True:
             try:
-                return self._grown(growth)
+                return self._grown_clear(growth, body)
             except IntersectingError as error:
                 if growth.otherwise is None or self._times_its_size(mesh) > ENLARGED:
                     raise  # what is far too small jams again from any beginning
                 growth = growth.otherwise
                 self._job.note(f"{error.problem}: begun again from a thinner body")
 
-    def _grown(self, growth: BodyGrowth) -> ClothState:
+    def _grown_clear(self, growth: BodyGrowth, body: TriangleMesh) -> ClothState:
+        """Return the cloth clear of the body as it ends; where that cannot be, it may cross.
+
+        What is finer than the cloth, as fingers and toes in long sleeves and legs are, grows out between its vertices.
+        Where that cannot be parted, the body grows again, and its vertices and edges keep out of the cloth, too.
+
+        Raises:
+            IntersectingError: it jams on the way.
+        """
+        grown = self._grown(growth, self._config)
+        if not self._config.self_collision or self._config.body_features:
+            return grown
+        rest, faces = self._rest.positions, self._model.faces
+        start = find_collision_free_start(grown.positions, faces, rest, self._fabric.thickness, Job(), body)
+        if start.crossings_left == 0:
+            return replace(grown, positions=start.positions)
+        self._job.progress(0.05, f"{_GROWING}, closely")
+        try:
+            return self._grown(growth, self._config.model_copy(update={"body_features": True}))
+        except IntersectingError:  # it jams before what it went through
+            return grown
+
+    def _grown(self, growth: BodyGrowth, config: DrapeConfig) -> ClothState:
         """Return the cloth outside the body as it ends.
 
         Raises:
@@ -156,7 +181,7 @@ class Phases:
         thin = TriangleMesh(growth.body.keyframes[0], growth.body.faces)
         state = self.resolve_crossings(at_rest(growth.garment.vertices), thin)
         collider = self.collider(growth.body, growth.garment)
-        stepper = self.stepper(without_gravity(self._model), collider, _CALM)
+        stepper = self.stepper(without_gravity(self._model), collider, _CALM, config)
         grown = run_body_motion(
             stepper,
             state,

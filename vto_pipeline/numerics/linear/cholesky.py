@@ -16,7 +16,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from vto_pipeline.numerics.linear.elimination import BINS, Elimination
-from vto_pipeline.numerics.linear.product_tile import COLUMNS, subtract_six, subtract_three
+from vto_pipeline.numerics.linear.product_tile import COLUMNS, TALL, subtract_six, subtract_tall, subtract_three
 
 _SIDE_BY_SIDE = 4e6  # flops; with less, starting the threads costs more than they save
 _SHARED = 1e6  # products; with more, all threads share what pivots make of the rest of a front
@@ -317,17 +317,19 @@ def _subtract_parallel(pivots, beside, rows, begin, end, shift):
 def _subtract(pivots, beside, rows, begin, end, shift):
     """Subtract from the columns of some rows that tiles cover; see `_subtract_all`."""
     width, count = rows.shape[1], len(pivots)
-    above = np.empty((count, 6))
+    above = np.empty((count, TALL))
     for first in range(0, width // COLUMNS, _BESIDE):
         i = begin
         while i < min(end, width - COLUMNS * first):
-            tall = 6 if end - i >= 6 else 3
+            tall = TALL if end - i >= TALL else 6 if end - i >= 6 else 3
             for p in range(count):
                 for k in range(tall):
                     above[p, k] = pivots[p, shift + i + k]
             for n in range(first, min(first + _BESIDE, (width - i + COLUMNS - 1) // COLUMNS, width // COLUMNS)):
                 j = width - COLUMNS * (n + 1)
-                if tall == 6:
+                if tall == TALL:
+                    subtract_tall(above, 0, beside[n], 0, count, rows, i, j)
+                elif tall == 6:
                     subtract_six(above, 0, beside[n], 0, count, rows, i, j)
                 else:
                     subtract_three(above, 0, beside[n], 0, count, rows, i, j)

@@ -1,8 +1,8 @@
 """A tile of a matrix product, summed in vector registers: the inner kernel of dense elimination.
 
 Left to itself, the compiler keeps no tile in registers, and a loop that reads and writes all it sums runs at a third of
-the speed. Here a tile of 6 x 8 sums takes twelve registers of four numbers, each loaded number serves six or eight
-times, and only the last sums meet the memory (Goto & van de Geijn 2008).
+the speed. Here a tall tile takes twelve registers: 6 x 8 sums in registers of four numbers, 12 x 8 in those of eight.
+Each loaded number serves six to twelve times, and only the last sums meet the memory (Goto & van de Geijn 2008).
 """
 
 from __future__ import annotations
@@ -13,12 +13,18 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
+from numba.core.registry import cpu_target
 from numba.extending import intrinsic
 
 COLUMNS = 8
 """How many a tile has."""
 
-_LANES = 4  # numbers in a vector: 256 bits; where registers are longer or shorter, the compiler joins or splits them
+_LONG = "+avx512f" in cpu_target.target_context.codegen().magic_tuple()[2]  # what the kernels are compiled for
+_LANES = 8 if _LONG else 4  # numbers in a vector; where registers are shorter, the compiler splits it
+
+TALL = 12 if _LONG else 6
+"""How many rows the tallest tile has."""
+
 _VECTOR = ir.VectorType(ir.DoubleType(), _LANES)
 _CONTRACT = ("contract",)  # a product and a sum in one instruction lose nothing
 
@@ -52,14 +58,14 @@ def _subtract_tile(height: int) -> Any:
     return subtract
 
 
-subtract_six = _subtract_tile(6)
-"""Subtract above[:count, i : i + 6]ᵀ beside[:count, j : j + 8] from out[row : row + 6, column : column + 8].
+subtract_tall = _subtract_tile(TALL)
+"""Subtract above[:count, i : i + TALL]ᵀ beside[:count, j : j + 8] from out[row : row + TALL, column : column + 8].
 
 Args (above, i, beside, j, count, out, row, column): arrays float64, of two dimensions and in C order; all within them.
 """
 
-subtract_three = _subtract_tile(3)
-"""The same for three rows."""
+subtract_six, subtract_three = _subtract_tile(6), _subtract_tile(3)
+"""The same for fewer rows."""
 
 
 def _places(builder: ir.IRBuilder) -> Callable[..., ir.Value]:
