@@ -67,6 +67,9 @@ def broken(how):
     if how == "a button":
         ball = trimesh.creation.icosphere(subdivisions=1, radius=0.004)
         return together(mesh, TriangleMesh(ball.vertices + np.array([0.12, 0.1, 0.0]), ball.faces))
+    if how == "a thick button":  # of more area than four squares, but no larger than two of them side by side
+        ring = trimesh.creation.torus(0.014, 0.005)
+        return together(mesh, TriangleMesh(ring.vertices + np.array([0.12, 0.1, 0.0]), ring.faces))
     return mesh
 
 
@@ -78,6 +81,7 @@ CASES = {
     "turned faces": ["to agree with their neighbours"],
     "vertices on each other": ["welded", "degenerate faces"],
     "a button": ["dropped 1 of 2 pieces"],
+    "a thick button": ["dropped 1 of 2 pieces"],
 }
 
 

@@ -46,7 +46,11 @@ class SimulationMeshConfig(Config):
     )
     least_angle_deg: float = Field(20.0, ge=0, le=60, description="A piece with sharper triangles is remeshed [degree]")
     least_piece: float = Field(
-        4.0, ge=0, le=1000, description="Smaller pieces, such as buttons, are dropped [squares of the target edge]"
+        4.0,
+        ge=0,
+        le=1000,
+        description="Smaller pieces, and those in a box of twice the side of such a square, such as buttons, are "
+        "dropped: nothing would hold them [squares of the target edge]",
     )
 
 
@@ -127,11 +131,13 @@ def _pieces(
     if len(area) == 1:
         yield mesh, np.ones(len(mesh.faces), dtype=bool)
         return
-    small = area < min(config.least_piece * (1e-3 * config.edge_mm) ** 2, float(area.max()))
+    least = config.least_piece * (1e-3 * config.edge_mm) ** 2
+    longest = np.array([np.ptp(mesh.vertices[mesh.faces[piece == k]], axis=(0, 1)).max() for k in range(len(area))])
+    small = ((area < least) | (longest < 2.0 * np.sqrt(least))) & (area < area.max())
     if small.any():
         lost = f"{1e4 * float(area[small].sum()):.1f} cm² in all"
-        least = f"{config.least_piece:g} squares of the target edge"
-        job.note(f"dropped {int(small.sum())} of {len(area)} pieces smaller than {least}: {lost}")
+        squares = f"{config.least_piece:g} squares of the target edge"
+        job.note(f"dropped {int(small.sum())} of {len(area)} pieces smaller than {squares}, or in a small box: {lost}")
     for k in np.flatnonzero(~small):
         yield submesh(mesh, piece == k)[0], piece == k
 

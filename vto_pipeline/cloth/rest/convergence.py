@@ -37,7 +37,6 @@ class SettleLimits:
         seconds: Cloth time at most [s]; in longer steps than usual, as if they were of that length.
         finest: Steps per 1/60 s that are not refined further.
         deadline: `time.perf_counter` at which to stop; without effect on the result unless it is reached.
-        lowest: Height under which there is nothing that could hold cloth [m].
     """
 
     error: float
@@ -45,7 +44,6 @@ class SettleLimits:
     seconds: float
     finest: int
     deadline: float = np.inf
-    lowest: float = -np.inf
 
 
 @dataclass
@@ -98,6 +96,7 @@ def relax_to_rest(
     limits: SettleLimits,
     watch: Callable[[float, float], None] = lambda done, error: None,
     is_caught: Callable[[FloatArray], bool] = lambda positions: False,
+    fallen: Callable[[FloatArray], str] = lambda positions: "",
     some: Callable[[FloatArray], FloatArray] = lambda positions: positions[:0],
 ) -> SettlingResult:
     """Run until rest; where that depends on the steps, halve them until halving changes no more than the bound.
@@ -120,10 +119,11 @@ def relax_to_rest(
         limits: When to stop.
         watch: Receives the share of time used and the error [m] at each look.
         is_caught: Whether there is no way on from positions [m], shape (V, 3); asked once the first pull is over.
+        fallen: Tells what of it is where nothing can hold it, at positions [m], shape (V, 3); nothing if none is.
         some: Returns those of the positions [m], shape (V, 3), that are to be kept of each look, shape (S, 3).
 
     Raises:
-        FallenError: all of it is under the lowest thing that could hold it.
+        FallenError: it has fallen off what it lay on, or a piece of it has.
     """
     began = time.perf_counter()
     result = SettlingResult(state)
@@ -150,10 +150,11 @@ def relax_to_rest(
             stepper.contact_memory = known
             continue
         result.state, result.residual = after, residual
-        if after.positions[:, 1].max() < limits.lowest:
+        if lost := fallen(after.positions):
             raise FallenError(
-                "the garment has fallen off the body: nothing holds it",
-                hint="does it go around the body, right way up, and is it tight enough above the legs to be held?",
+                f"{lost} has fallen off the body: nothing holds it",
+                hint="does it go around the body, right way up, and is it tight enough above the legs to be held? "
+                "Is each piece joined to what holds it?",
             )
         if rms(after.positions - stood_at) > _THERE * limits.error:
             stood, stood_at = 0.0, after.positions

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from vto_pipeline.cloth.collision.body.yielding import give_way
 from vto_pipeline.cloth.collision.self_collision.counters import CollisionCounters, report_counters
+from vto_pipeline.cloth.collision.self_collision.pieces import surface_components
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.dynamics.body_motion import VariableSpeedBody, beside, body_travel, run_body_motion
 from vto_pipeline.cloth.dynamics.stepper import Stepper
@@ -25,7 +26,7 @@ from vto_pipeline.cloth.simulation import default_skin
 from vto_pipeline.errors import IntersectingError
 from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.cloth import TraceRow
 from vto_pipeline.model.fabric import Fabric
@@ -242,7 +243,6 @@ class Phases:
             seconds=self._config.settle_seconds,
             finest=self._config.finest,
             deadline=deadline,
-            lowest=_lowest_hold(body, state.positions),
         )
 
         def is_caught(positions: FloatArray) -> bool:
@@ -257,7 +257,8 @@ class Phases:
         stepper.prepare(state.positions)
         if self._config.substeps is None and stepper.has_exact_rest:
             stepper.substeps = min(stepper.substeps, _LONG)
-        return relax_to_rest(stepper, state, limits, watch, is_caught, self.some)
+        fallen = _falls_off(body, state.positions, self._model.faces)
+        return relax_to_rest(stepper, state, limits, watch, is_caught, fallen, self.some)
 
     def settle_and_clear(
         self,
@@ -312,10 +313,28 @@ class Phases:
         report_counters(counters, [collider for one in every for collider in one._colliders], self._job)
 
 
-def _lowest_hold(body: TriangleMesh, positions: FloatArray) -> float:
-    """Return the height under which nothing can hold cloth that is here [m].
+def _falls_off(body: TriangleMesh, positions: FloatArray, faces: IntArray) -> Callable[[FloatArray], str]:
+    """Return what tells which cloth is lower than anything that can hold it, by its positions [m], shape (V, 3).
 
-    That is where the body ends; or where its legs part, for cloth above: what slides past its hips ends at its feet.
+    That is where the body ends; or where its legs part, for a piece that begins above: what slides past its hips ends
+    at its feet. A piece that is not joined to the rest falls alone, and would never come to rest.
     """
-    parting = Limbs(body).parting
-    return max(float(body.vertices[:, 1].min()), parting if float(positions[:, 1].max()) > parting else -np.inf)
+    piece = surface_components(faces, len(positions)).of_vertex
+    size = np.bincount(piece)
+
+    def tops(positions: FloatArray) -> FloatArray:
+        top = np.full(len(size), -np.inf)
+        np.maximum.at(top, piece, positions[:, 1])
+        return top
+
+    ends = float(body.vertices[:, 1].min())
+    parting = max(Limbs(body).parting, ends)
+    lowest = np.where(tops(positions) > parting, parting, ends)
+
+    def fallen(positions: FloatArray) -> str:
+        lost = tops(positions) < lowest
+        if not lost.any():
+            return ""
+        return "the garment" if lost.all() else f"a piece of {size[lost].max()} of the garment's {len(piece)} vertices"
+
+    return fallen
