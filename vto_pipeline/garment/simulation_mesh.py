@@ -49,8 +49,8 @@ class SimulationMeshConfig(Config):
         4.0,
         ge=0,
         le=1000,
-        description="Smaller pieces, and those in a box of twice the side of such a square, such as buttons, are "
-        "dropped: nothing would hold them [squares of the target edge]",
+        description="Pieces smaller than so many squares of the target edge are dropped, as buttons are. So are those "
+        "that fit in a box of four: they would fall off",
     )
 
 

@@ -162,8 +162,9 @@ class Phases:
             return grown
         rest, faces = self._rest.positions, self._model.faces
         start = find_collision_free_start(grown.positions, faces, rest, self._fabric.thickness, Job(), body)
-        if start.crossings_left == 0:
-            return replace(grown, positions=start.positions)
+        freed = replace(grown, positions=start.positions)
+        if start.crossings_left == 0 or len(intersecting_faces(TriangleMesh(freed.positions, faces), body)) == 0:
+            return freed
         self._job.progress(0.05, f"{_GROWING}, closely")
         try:
             return self._grown(growth, self._config.model_copy(update={"body_features": True}))
