@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from cloth_scenes import ball, fabric, sheet
+from cloth_scenes import ball, fabric, moved, sheet
 
 import vto_pipeline.cloth.rest.phases as module
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.model.build import at_rest, build_cloth
+from vto_pipeline.cloth.placement.collision_free_start import Start
 from vto_pipeline.cloth.placement.thinning import BodyGrowth
 from vto_pipeline.cloth.rest.convergence import SettlingResult
 from vto_pipeline.cloth.rest.phases import Phases
@@ -143,3 +144,23 @@ def test_what_is_far_too_small_is_refused_at_its_first_jam(monkeypatch):
     assert growing(monkeypatch, 1, size=1.2) == pytest.approx([0.01, np.nan], abs=1e-9, nan_ok=True)
     assert growing(monkeypatch, 1, size=1.1) == pytest.approx([0.01, 0.02], abs=1e-9)
     assert growing(monkeypatch, 0, size=1.2) == pytest.approx([0.01], abs=1e-9)
+
+
+@pytest.mark.parametrize(("place", "left", "closely"), [(0.0, 3, True), (0.0, 0, False), (1.0, 3, False)])
+def test_the_body_grows_closely_where_cloth_is_not_freed_of_it(monkeypatch, place, left, closely):
+    """Cloth across the ball, or far from it and tangled in itself; it is clear of both where features are kept out."""
+    mesh, body, asked = moved(sheet(4, 4, 0.4, 0.4), place, 0.0, 0.0), ball(0.1, levels=1), []
+    rest = RestShape(mesh.vertices)
+
+    def grown(phases, growth, config):
+        asked.append(config.body_features)
+        return at_rest(mesh.vertices + 2.0 * config.body_features)
+
+    monkeypatch.setattr(Phases, "_grown", grown)
+    monkeypatch.setattr(
+        module, "find_collision_free_start", lambda x, *given: Start(x, 3, left, np.zeros(len(x), bool))
+    )
+    phases = Phases(build_cloth(mesh, rest, fabric()), rest, fabric(), DrapeConfig(), Job())
+    found = phases._grown_clear(None, body)
+    assert asked == [False, True][: 1 + closely]
+    assert (found.positions == mesh.vertices + 2.0 * closely).all()
