@@ -88,7 +88,7 @@ def test_what_never_came_free_of_the_body_and_is_stretched_about_it_is_not_waite
     monkeypatch.setattr(
         module,
         "relax_to_rest",
-        lambda stepper, state, limits, watch, is_caught, some: SettlingResult(
+        lambda stepper, state, limits, watch, is_caught, *given: SettlingResult(
             state, True, 1e-4, 1e-3, caught=is_caught(state.positions)
         ),
     )
