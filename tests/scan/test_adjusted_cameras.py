@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import cv2
 import numpy as np
 import pytest
@@ -107,26 +109,29 @@ def test_cameras_of_a_faint_print_come_closer(tmp_path, monkeypatch):
 
 
 class Placed:
-    """A model that knows its error only."""
+    """A model that knows the errors of its points only."""
 
-    def __init__(self, error):
-        self.error = error
-
-    def compute_mean_reprojection_error(self):
-        return self.error
+    def __init__(self, *errors):
+        self.points3D = {number: SimpleNamespace(error=error) for number, error in enumerate(errors)}
 
 
-@pytest.mark.parametrize("after", [0.5, float("nan"), None])
+@pytest.mark.parametrize("after", [0.6, float("nan"), None])
 def test_cameras_stay_where_an_adjustment_fails(monkeypatch, after):
     def spoil(model, *rest):
         if after is None:
             raise ValueError("no convergence")
-        model.error = after
-        return 100
+        return Placed(after), 100
 
     monkeypatch.setattr(adjust_module, "_adjust", spoil)
     model, job = Placed(0.4), Job()
     assert adjust_module.adjust(model, None, job) is model
-    assert model.error == 0.4
     assert "as their features placed them" in job.notes[0]
     assert "tracked_points" not in job.metrics
+
+
+def test_wrong_sightings_farther_off_do_not_spoil_an_adjustment(monkeypatch):
+    better = Placed(*[0.2] * 98, 20.0, 26.0)
+    monkeypatch.setattr(adjust_module, "_adjust", lambda *given: (better, 100))
+    job = Job()
+    assert adjust_module.adjust(Placed(*[0.3] * 98, 1.0, 3.0), None, job) is better
+    assert not job.notes

@@ -21,7 +21,7 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.numerics.cpu_threads import in_order
 from vto_pipeline.scan.grey import best_shares, in_grey
 from vto_pipeline.scan.library_message import COLMAP_ERRORS, library_message
-from vto_pipeline.scan.photos.matching.mapping import lens_of
+from vto_pipeline.scan.photos.matching.mapping import STRAIGHT, bend, lens_of
 from vto_pipeline.scan.photos.matching.tracks import TrackedPhoto, follow, without_light
 
 LONGER_SIDE = 1600
@@ -58,13 +58,13 @@ def adjust(model: Any, photos: PhotoSet, job: Job) -> Any:
     """
     import cv2
 
-    adjusted, before = copy.deepcopy(model), model.compute_mean_reprojection_error()
+    before = _own_error(model)
     try:
-        added = _adjust(adjusted, photos, job)
+        adjusted, added = _adjust(copy.deepcopy(model), photos, job)
     except (*COLMAP_ERRORS, cv2.error) as error:
         job.note(f"cameras stay as their features placed them: {library_message(error)}")
         return model
-    after = adjusted.compute_mean_reprojection_error()
+    after = _own_error(adjusted)
     if not after <= SPOILT * before:
         job.note(f"cameras stay as their features placed them: an adjustment takes {before:.2f} px to {after:.2f}")
         return model
@@ -72,13 +72,16 @@ def adjust(model: Any, photos: PhotoSet, job: Job) -> Any:
     return adjusted
 
 
-def solve(model: Any, soft_px: float, bent: bool) -> None:
-    """Adjust a model's cameras and points to its sightings, in place.
+def solve(model: Any, soft_px: float, bent: bool) -> float:
+    """Adjust a model's cameras and points to its sightings, in place, and return what is left of their errors.
 
     Args:
         model: A pycolmap Reconstruction.
         soft_px: Errors beyond this lose their weight [px].
         bent: Whether the lens's distortion is adjusted, too.
+
+    Returns:
+        The sum of the losses: half of each squared error, less for those beyond `soft_px` [px²].
 
     Raises:
         ValueError: no solution was found.
@@ -95,13 +98,36 @@ def solve(model: Any, soft_px: float, bent: bool) -> None:
     for number in sorted(number for number, image in model.images.items() if image.has_pose):
         gauge.add_image(number)
     gauge.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
-    solved = pycolmap.create_default_bundle_adjuster(options, gauge, model).solve()
+    solved: Any = pycolmap.create_default_bundle_adjuster(options, gauge, model).solve()
     if not solved.is_solution_usable():
         raise ValueError(solved.brief_report())
+    return float(solved.ceres_summary.final_cost)
 
 
-def _adjust(model: Any, photos: PhotoSet, job: Job) -> int:
-    """Adjust a model in place, and return how many points were added for it."""
+def _from_both_sides(model: Any) -> Any:
+    """Return a model adjusted, lens and all; of a lens found much bent, from there and from a straight one.
+
+    Focal length, bend and the depths of points make up for each other: the sum of losses has more than one minimum.
+    """
+    straight = copy.deepcopy(model) if bend(model) > STRAIGHT else None
+    cost = solve(model, SOFT_PX, bent=True)
+    if straight is None:
+        return model
+    for camera in straight.cameras.values():
+        focal, cx, cy, _ = camera.params
+        camera.params = [focal, cx, cy, 0.0]
+    return straight if solve(straight, SOFT_PX, bent=True) < cost else model
+
+
+def _own_error(model: Any) -> float:
+    """Return the error of a model's points that sets their mean loss [px]: wrong sightings, which a right lens leaves
+    farther off than the wrong one that they were chosen by, hardly count."""
+    errors = np.array([model.points3D[number].error for number in sorted(model.points3D)])
+    return float(SOFT_PX * np.sqrt(np.log1p((errors / SOFT_PX) ** 2).mean()))
+
+
+def _adjust(model: Any, photos: PhotoSet, job: Job) -> tuple[Any, int]:
+    """Return a model adjusted, and how many points were added for it; the one given is used up."""
     ids = sorted(number for number, image in model.images.items() if image.has_pose)
     shared = _shared(model, ids)
     views, scales = _views(model, photos, ids)
@@ -124,11 +150,14 @@ def _adjust(model: Any, photos: PhotoSet, job: Job) -> int:
             tracks.append((points[n], track))
         job.progress(0.85 + 0.1 * (index + 1) / len(ids), f"adjusting cameras, photo {index + 1} of {len(ids)}")
     fresh = _enter(model, extra, tracks)
-    solve(model, SOFT_PX, bent=len(fresh) >= LENS * len(ids))
+    if len(fresh) >= LENS * len(ids):
+        model = _from_both_sides(model)
+    else:
+        solve(model, SOFT_PX, bent=False)
     for number in fresh:
         model.delete_point3D(number)
     model.update_point_3d_errors()
-    return len(fresh)
+    return model, len(fresh)
 
 
 def _enter(model: Any, extra: Mapping[int, list[FloatArray]], tracks: list[Track]) -> list[int]:
