@@ -12,6 +12,8 @@ from vto_pipeline.cloth.collision.response.contact_springs import (
     project_to_contacts,
     update_active_set,
 )
+from vto_pipeline.cloth.collision.response.projected_gauss_seidel import separate_pairs
+from vto_pipeline.cloth.collision.self_collision.pairs import Pairs
 from vto_pipeline.numerics.linear.block_matrix import BlockMatrix
 
 COUNT, STEP = 6, 1e-7
@@ -156,3 +158,15 @@ def test_held_places_are_not_put_right_by_what_is_hardly_beside_them(share):
     else:
         assert not move.any()
         assert not by_guess.any()
+
+
+@pytest.mark.parametrize("share", [0.5, 1e-3])
+def test_neither_are_they_by_position_based_contacts(share):
+    """Here each contact is put right as a whole: the free corner goes gap / share, or not at all."""
+    weights, gap = np.array([[1.0, -share, -0.4, share - 0.6]]), np.array([1e-3])
+    up, nothing = np.array([[0.0, 1.0, 0.0]]), np.zeros((1, 3))
+    pairs = Pairs(np.array([7]), np.arange(4, dtype=np.int32)[None], weights, up, gap, np.zeros(1), nothing, nothing)
+    x = np.zeros((4, 3))
+    separate_pairs(pairs, np.array([0.0, 1e3, 0.0, 0.0]), np.zeros((4, 3)), x)
+    assert_allclose(x[1, 1], -gap[0] / share if share > 0.1 else 0.0, rtol=1e-12)
+    assert not np.delete(x, 1, axis=0).any()

@@ -23,6 +23,8 @@ from vto_pipeline.cloth.collision.response.plane_motion import plane_at
 from vto_pipeline.numerics.vector import axpy, dot, load, store
 
 _PAIRS = np.int64(1) << 40  # keys from here on are of pairs, those under it of planes
+LEVER = 1e-4
+"""Of the squares of all weights; where held vertices have the rest, a free one would go 100 times the gap."""
 _LYING = 1e-4  # m: what is nearer than this to something that it has not touched yet begins to push
 
 
@@ -220,11 +222,18 @@ def sum_at(contacts, c, x):
 
 @njit(cache=True, error_model="numpy")
 def inverse_effective_mass(contacts, c, inverse_mass):
-    """Return how far a unit of force times time squared moves what contact c keeps apart [1/kg]."""
-    total = 0.0
+    """Return how far a unit of force times time squared moves what contact c keeps apart [1/kg].
+
+    None where nothing of it can move, or what can is all but beside it.
+    """
+    total = free = whole = 0.0
     for s in range(4):
-        total += contacts.weights[c, s] ** 2 * inverse_mass[contacts.vertices[c, s]]
-    return total
+        w_sq, inverse = contacts.weights[c, s] ** 2, inverse_mass[contacts.vertices[c, s]]
+        total += w_sq * inverse
+        whole += w_sq
+        if inverse > 0.0:
+            free += w_sq
+    return total if free > LEVER * whole else 0.0
 
 
 @njit(cache=True, error_model="numpy")

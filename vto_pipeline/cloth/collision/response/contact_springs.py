@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from vto_pipeline.cloth.collision.response.active_set import inverse_effective_mass, sum_at, tangential
+from vto_pipeline.cloth.collision.response.active_set import LEVER, inverse_effective_mass, sum_at, tangential
 from vto_pipeline.numerics.vector import axpy, dot, load, norm, scale, store, sub, unit
 
 _HARD = 30.0  # times the stiffness of what lies on a plane
@@ -14,7 +14,6 @@ _FIRM = 4.0  # last force / gap: with that stiffness, as much again would take a
 _LOST = 0.5  # share of the gap; where more is lost, the spring was too soft for what it bears
 _NO_LENGTH = 1e-300  # m
 _NOTHING = 1e-6  # m: of a gap smaller than this nothing can be lost
-_LEVER = 1e-4  # of the squares of all weights; where held vertices have the rest, a free one would go 100 times the gap
 _STIFFER = 1e3  # times mass / h²: a free vertex at rest on a plane sinks g h² / 1000, 3 µm at 1/60 s
 
 
@@ -104,7 +103,7 @@ def _set_springs(contacts, mass, held, h, matrix):
                 stiff = (block[0, 0] + block[1, 1] + block[2, 2]) / 3.0 + _STIFFER * inertia
                 stiff_give += w * w / stiff
                 give += w * w / (_SOFT * inertia)
-        if free <= _LEVER * whole:  # nothing of it can move, or what can is all but beside it
+        if free <= LEVER * whole:  # nothing of it can move, or what can is all but beside it
             contacts.normal_stiffness[c] = contacts.tangential_stiffness[c] = contacts.rest_offset[c] = 0.0
             continue
         if lone:
