@@ -45,7 +45,7 @@ def test_fine_triangles_count_no_more_than_their_area():
     """Half of a sheet in many more triangles, that half raised: the mean is that of the areas."""
     left, right = sheet(0.2, 0.2, (4, 4)), sheet(0.2, 0.2, (40, 40), 0.01)
     both = TriangleMesh(
-        np.concatenate([left.vertices, right.vertices + [5.0, 0.0, 0.0]]),
+        np.concatenate([left.vertices, right.vertices + np.array([5.0, 0.0, 0.0])]),
         np.concatenate([left.faces, right.faces + len(left.vertices)]),
     )
     level = TriangleMesh(both.vertices * [1.0, 1.0, 0.0], both.faces)
