@@ -126,3 +126,25 @@ def test_a_place_that_was_chosen_by_hand_is_kept():
     assert_allclose(kept.mesh.vertices, drawn.vertices, rtol=0, atol=0)
     placed = place_garment(Garment(drawn, rest, True), figure(BELOW), DrapeConfig(), Job())
     assert placed.mesh.vertices[:, 1].max() == pytest.approx(1.0, abs=0.15)
+
+
+def test_a_pattern_found_on_a_body_stays_where_it_was_worn():
+    """A loose skirt is filled as well some way off, and its file was drawn for no other stature."""
+    drawn, job = skirt(1.0), Job()
+    body = figure(BELOW)
+    body = TriangleMesh(body.vertices * 0.9, body.faces)
+    kept = place_garment(Garment(drawn, RestShape(drawn.vertices), True, True), body, DrapeConfig(), job)
+    assert_allclose(kept.mesh.vertices, drawn.vertices, rtol=0, atol=0)
+    assert "were worn" in job.notes[-1]
+    moved_off = place_garment(Garment(drawn, RestShape(drawn.vertices), True), body, DrapeConfig(), Job())
+    assert abs(moved_off.mesh.vertices - drawn.vertices).max() > CUBE
+
+
+@pytest.mark.parametrize("shift", [(0.0, 1.5, 0.0), (1.0, 0.0, 0.0)])
+def test_a_pattern_found_on_another_body_is_moved_to_this_one(shift):
+    """Above the head, or beside: the body is not in it there."""
+    drawn = moved(skirt(1.0), *shift)
+    found = find_placement(drawn, figure(BELOW), PlaceConfig(), Job(), laid_out=True, worn=True)
+    top, _ = top_and_bottom(found, drawn)
+    assert 0.5 < top < SHOULDER[1]
+    assert_allclose(found.start_positions(drawn.vertices)[:, 0].mean(), 0.0, rtol=0, atol=0.1)

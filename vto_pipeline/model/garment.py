@@ -103,8 +103,10 @@ class Garment(Presented):
         mesh: Simulation mesh where it is now [m].
         rest: Its rest shape.
         laid_out: Whether it stands as a pattern's file has it, upright about a body that is not known.
+        worn: Whether that is where it was worn, on a body in the same room.
     """
 
     mesh: TriangleMesh
     rest: RestShape
     laid_out: bool = False
+    worn: bool = False

@@ -195,12 +195,14 @@ class Pattern:
         panels: In all sizes.
         stitches: Hold for each size.
         unit: The unit of length in the file, and how that is known.
+        worn: Whether its panels stand where they were worn, in the room of that body; else where they are laid out.
     """
 
     name: str
     panels: tuple[Panel, ...]
     stitches: tuple[Stitch, ...] = ()
     unit: str = "m"
+    worn: bool = False
 
     def __post_init__(self) -> None:
         if not self.panels:
@@ -239,4 +241,4 @@ class Pattern:
         panels = tuple(panel for panel in self.panels if panel.size == size)
         names = {panel.name for panel in panels}
         held = tuple(s for s in self.stitches if all(side.panel in names for side in (*s.first, *s.second)))
-        return Pattern(self.name, panels, held, self.unit)
+        return Pattern(self.name, panels, held, self.unit, self.worn)

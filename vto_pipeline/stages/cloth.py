@@ -72,7 +72,8 @@ def _drape(inputs: Inputs, settings: DrapeConfig, job: Job) -> Outputs:
     for text in assumption_notes(inputs["fabric"]):
         job.note(text)
     mesh = in_body_frame(inputs["sim_mesh"], inputs)
-    garment = Garment(mesh, inputs["worn_rest"], laid_out="garment_pattern" in inputs)
+    pattern = inputs.get("garment_pattern")
+    garment = Garment(mesh, inputs["worn_rest"], pattern is not None, pattern is not None and pattern.worn)
     draped = drape(garment, inputs["collider"], inputs["fabric"], settings, job)
     return {"draped": draped.mesh, "audit": dict(draped.audit), "trace": tuple(draped.trace)}
 

@@ -123,7 +123,7 @@ def _texture(inputs: Inputs, settings: TextureConfig, job: Job) -> Outputs:
 def _sew(inputs: Inputs, settings: SewConfig, job: Job) -> Outputs:
     pattern = inputs["garment_pattern"]
     sewn = sew(pattern, settings, job)
-    return {"garment_mesh": in_shape(sewn, job), "panels": pattern}
+    return {"garment_mesh": in_shape(sewn, job, pattern.worn), "panels": pattern}
 
 
 def _take_mesh(inputs: Inputs, settings: RepairConfig, job: Job) -> Outputs:

@@ -215,9 +215,10 @@ def _drape_row(stage: Stage, names: Sequence[str]) -> Stage:
         for name in names:
             fabric = inputs[_own("fabric", name)]
             job.notes += [f"{name}: {text}" for text in assumption_notes(fabric)]
-            laid_out = _own("garment_pattern", name) in inputs
+            pattern = inputs.get(_own("garment_pattern", name))
             mesh = in_body_frame(inputs[_own("sim_mesh", name)], inputs)
-            garment = Garment(mesh, inputs[_own("worn_rest", name)], laid_out)
+            worn = pattern is not None and pattern.worn
+            garment = Garment(mesh, inputs[_own("worn_rest", name)], pattern is not None, worn)
             layers.append(Layer(name, garment, fabric))
         outfit = drape_layers(layers, inputs["collider"], settings, job)
         meshes = {_own("draped", name): mesh for name, mesh in outfit.meshes.items()}

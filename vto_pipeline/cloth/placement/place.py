@@ -103,7 +103,12 @@ _AS_IT_STANDS = Placement(1.0, np.eye(3), 1.0, np.zeros(3))
 
 
 def find_placement(
-    garment: TriangleMesh, body: TriangleMesh, config: PlaceConfig, job: Job, laid_out: bool = False
+    garment: TriangleMesh,
+    body: TriangleMesh,
+    config: PlaceConfig,
+    job: Job,
+    laid_out: bool = False,
+    worn: bool = False,
 ) -> Placement:
     """Return the placement that a pattern's file means, or else that in which the body fills the garment best.
 
@@ -113,6 +118,8 @@ def find_placement(
         config: Search and thresholds.
         job: Receives what is done, and why.
         laid_out: Whether it stands as a pattern file has it, in metres and upright: its own place is the first choice.
+        worn: Whether it was worn there: then it is not moved at all, unless the body is not in it, or a limb goes
+            through it.
 
     Raises:
         InputError: in no unit is this a garment for a body of this size, or the body fills it nowhere.
@@ -122,7 +129,7 @@ def find_placement(
         return _AS_IT_STANDS
     cubes = BodyCubes(body, 1e-3 * config.cube_mm, config.cloth_in_body)
     if laid_out and config.place == "auto":
-        own = _as_laid_out(garment, cubes, job)
+        own = _as_worn(garment, cubes, job) if worn else _as_laid_out(garment, cubes, job)
         if own is not None:
             return own
     scale = _scale(garment, cubes, job)
@@ -175,11 +182,23 @@ def place_garment(garment: Garment, body: TriangleMesh, config: PlaceConfig, job
 
     Args, Raises: See `find_placement`.
     """
-    placed = find_placement(garment.mesh, body, config, job, garment.laid_out)
+    placed = find_placement(garment.mesh, body, config, job, garment.laid_out, garment.worn)
     mesh = TriangleMesh(placed.start_positions(garment.mesh.vertices), garment.mesh.faces, garment.mesh.colors)
     rest = garment.rest
     panels = None if rest.panels is None else placed.scale * rest.panels
     return Garment(mesh, replace(rest, positions=placed.rest_positions(rest.positions), panels=panels))
+
+
+def _as_worn(garment: TriangleMesh, body: BodyCubes, job: Job) -> Placement | None:
+    """Return that it stays, where the body fills it and no limb goes through it; None: it was not on this body.
+
+    The body fills a loose garment as well some way off, so its best place by the cubes is not where it was worn.
+    """
+    best = body.fit(garment).best_placement(np.eye(3))
+    if best.score_in_place <= max(_WORTH_A_TRY * best.score, 0.0) or Thinning(body.mesh).limbs_astray(garment):
+        return None
+    job.note("garment left where its panels were worn, as its file says")
+    return _AS_IT_STANDS
 
 
 def _as_laid_out(garment: TriangleMesh, body: BodyCubes, job: Job) -> Placement | None:

@@ -35,15 +35,16 @@ _BULGE = 0.1  # of its reach
 _LEAST_COT = 0.05  # weights stay positive where a corner is blunt
 
 
-def in_shape(sewn: Sewn, job: Job) -> TriangleMesh:
+def in_shape(sewn: Sewn, job: Job, worn: bool = False) -> TriangleMesh:
     """Return a sewn mesh bent so that hardly an edge is stretched.
 
     Args:
         sewn: As it comes from the welding.
         job: Measures what stretch is left.
+        worn: Whether the panels stand where they were worn: then their middle stays where it is, and not their top.
     """
     placed = sewn.mesh.vertices
-    mesh = replace(sewn.mesh, vertices=_as_placed(embed(sewn.mesh, sewn.frames), placed))
+    mesh = replace(sewn.mesh, vertices=_as_placed(embed(sewn.mesh, sewn.frames), placed, worn))
     assert mesh.texture is not None
     stretch = laid_edge_lengths(mesh, mesh.vertices[mesh.faces]) / laid_edge_lengths(mesh, mesh.texture) - 1.0
     low, high = np.percentile(stretch, [1, 99])
@@ -89,15 +90,17 @@ def embed(mesh: TriangleMesh, frames: FloatArray) -> FloatArray:
     return x
 
 
-def _as_placed(x: FloatArray, placed: FloatArray) -> FloatArray:
+def _as_placed(x: FloatArray, placed: FloatArray, worn: bool) -> FloatArray:
     """Return the positions turned and shifted to where the panels are placed, its top, which it hangs from, as high.
 
-    Without stretch, cloth that is free to turn does: an open jacket by more than a right angle.
+    Without stretch, cloth that is free to turn does: an open jacket by more than a right angle. Panels that were worn
+    stand nearest to their cloth, so it is their middle that says how high it was; corners of a flat flare stand higher.
     """
     around = x - x.mean(axis=0)
     turn, _ = Rotation.align_vectors(placed - placed.mean(axis=0), around)
     found = turn.apply(around) + placed.mean(axis=0)
-    found[:, 1] += placed[:, 1].max() - found[:, 1].max()
+    if not worn:
+        found[:, 1] += placed[:, 1].max() - found[:, 1].max()
     return np.asarray(found)
 
 

@@ -103,7 +103,7 @@ def unsew(
     figures = tuple(_figures(panel, piece, x) for panel, piece, x in zip(panels, pieces, flat, strict=True))
     _tell(figures, panels, job)
     whole = TriangleMesh(mesh.vertices, mesh.faces, texture=texture)
-    return Unsewn(Pattern(name, panels, _stitches(found, names)), figures, whole)
+    return Unsewn(Pattern(name, panels, _stitches(found, names), worn=True), figures, whole)
 
 
 def _corners(piece: Piece, flat: FloatArray, seam: IntArray) -> Bools:

@@ -86,6 +86,7 @@ class _PatternRecord(_Record):
     unit: Literal["m"]
     name: str
     source_unit: str = "m"
+    worn: bool = False
     panels: list[_PanelRecord]
     stitches: list[_StitchRecord] = []
 
@@ -102,6 +103,7 @@ def record_of(pattern: Pattern) -> dict[str, Any]:
         "unit": "m",
         "name": pattern.name,
         "source_unit": pattern.unit,
+        "worn": pattern.worn,
         "panels": [_panel_record(panel) for panel in pattern.panels],
         "stitches": [{"first": _sides(s.first), "second": _sides(s.second)} for s in pattern.stitches],
     }
@@ -132,7 +134,7 @@ def pattern_of(data: Any, where: str) -> Pattern:
             Stitch(*(tuple(Side(s.panel, s.edge, s.forward) for s in chain) for chain in (one.first, one.second)))
             for one in record.stitches
         )
-        return Pattern(record.name, panels, stitches, record.source_unit)
+        return Pattern(record.name, panels, stitches, record.source_unit, record.worn)
     except InputError as e:
         raise FormatError(e.problem, where=where, hint=e.hint) from None
 

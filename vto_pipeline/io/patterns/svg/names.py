@@ -6,7 +6,7 @@ SCHEMA = "data-vto-pattern"
 """Attribute of the root: version of this marking."""
 
 HEAD = "data-vto-head"
-"""Attribute of the root, JSON: name, unit, stitches, and the panel coordinates [m] of the corner of the page."""
+"""Attribute of the root, JSON: name, unit, if worn, stitches, panel coordinates [m] of the corner of the page."""
 
 PANEL = "data-vto-panel"
 """Attribute of each shape: number of the panel it belongs to, from 0."""

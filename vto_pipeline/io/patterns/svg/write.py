@@ -44,7 +44,7 @@ def write_svg(path: Path, pattern: Pattern) -> None:
     low, high = points.min(axis=0) - _MARGIN_M, points.max(axis=0) + _MARGIN_M
     width, height = (_MM * (high - low)).tolist()
     x, y = float(_MM * low[0]), float(-_MM * high[1])
-    head = {"name": pattern.name, "source_unit": pattern.unit, "stitches": record["stitches"]}
+    head = {"name": pattern.name, "source_unit": pattern.unit, "worn": pattern.worn, "stitches": record["stitches"]}
     head["origin"] = [low[0], high[1]]
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
