@@ -161,7 +161,7 @@ def test_held_places_are_not_put_right_by_what_is_hardly_beside_them(share):
 
 
 @pytest.mark.parametrize("share", [0.5, 1e-3])
-def test_neither_are_they_by_position_based_contacts(share):
+def test_nor_by_position_based_contacts_that_are_hardly_beside_them(share):
     """Here each contact is put right as a whole: the free corner goes gap / share, or not at all."""
     weights, gap = np.array([[1.0, -share, -0.4, share - 0.6]]), np.array([1e-3])
     up, nothing = np.array([[0.0, 1.0, 0.0]]), np.zeros((1, 3))
