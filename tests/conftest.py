@@ -1,4 +1,4 @@
-"""Shared scenes on the import path; threads as `vto` has them; one worker compiles while another does without kernels."""
+"""Shared scenes on the import path; threads as `vto` has them; one worker compiles while another needs no kernels."""
 
 from __future__ import annotations
 
