@@ -92,6 +92,24 @@ def test_two_machines_do_a_batch_and_a_scheduler_that_dies_is_told(client, clust
     assert squares(4) == expected(4)
 
 
+@pytest.mark.slow  # a scheduler waits long before it gives a machine up
+def test_a_machine_that_dies_takes_no_row_with_it(client, cluster, gate):
+    address, (_, machine, _) = cluster
+    gate.touch()
+    batch = client(4, "--scheduler", address)
+    wait(lambda: done() or batch.poll() is not None)
+    kept = results()
+    for process in [psutil.Process(machine.pid), *psutil.Process(machine.pid).children(recursive=True)]:
+        with suppress(psutil.NoSuchProcess):
+            process.kill()
+    gate.unlink()
+    said = batch.communicate()[0]
+    assert batch.returncode == 0, said
+    assert "Traceback" not in said
+    assert kept.items() <= results().items()
+    assert squares(4) == expected(4)
+
+
 def test_a_batch_that_is_cancelled_ends_and_is_resumed(client, gate, capfd):
     gate.touch()
     batch = client(3, "--workers", "1")

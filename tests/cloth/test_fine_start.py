@@ -27,7 +27,7 @@ HOOD = DATA / "patterns" / "garment_pattern_generator" / "basic tee" / "tee_hood
 SHIRT = DATA / "garments" / "berkeley" / "shirt" / "shirt-iso.obj"
 
 
-@pytest.mark.parametrize(("made_for", "worn_by"), [(0.0, 1.1), (0.9, 0.0)])
+@pytest.mark.parametrize(("made_for", "worn_by"), [pytest.param(0.0, 1.1, marks=pytest.mark.slow), (0.9, 0.0)])
 def test_sleeves_go_on_arms_however_fine_they_are(made_for, worn_by):
     coarse, body = tunic(made_for), figure(worn_by)
     split = trimesh.Trimesh(coarse.vertices, coarse.faces, process=False).subdivide()
