@@ -38,6 +38,18 @@ def test_a_second_run_comes_from_the_cache(vto):
     assert "[3/7] add  from the cache" in said.err
 
 
+def test_a_result_that_takes_the_place_of_another_says_so(vto):
+    """Where the folder was not named, that is: who names it again means it."""
+    text, held = Path("toy.yaml").read_text(), "runs/toy held the result of another left.number; it holds this one now"
+    Path("other.txt").write_text("5")
+    assert held not in vto("run", "toy.yaml").err
+    assert held not in vto("run", "toy.yaml").err
+    Path("toy.yaml").write_text(text.replace("left.txt", "other.txt"))
+    assert held not in vto("run", "toy.yaml", "-o", "runs/toy").err
+    Path("toy.yaml").write_text(text)
+    assert held in vto("run", "toy.yaml").err
+
+
 def test_json_is_alone_on_stdout(vto):
     said = vto("run", "toy.yaml", "--json", "--set", "add.offset=1")
     assert said.code == 0

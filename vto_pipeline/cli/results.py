@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from itertools import chain
+from pathlib import Path
 from typing import Any
 
 from vto_pipeline.cli.progress import show_progress
 from vto_pipeline.cli.session import Session
 from vto_pipeline.cli.tables import table_lines
+from vto_pipeline.errors import InputError
+from vto_pipeline.io.documents import read_json
 from vto_pipeline.model.body import Measurements
 from vto_pipeline.pipeline.execution.budget import TimeBudget
+from vto_pipeline.pipeline.execution.folder import RECORD
 from vto_pipeline.report.budgets import budget_lines
 from vto_pipeline.stages.entry.commands import run_order
 from vto_pipeline.stages.entry.documents import Order
@@ -34,11 +38,25 @@ def perform(session: Session, order: Order, time_budget: float | None = None, **
     """
     for note in order.notes:
         session.say(note)
+    before = {} if options.get("output") else _given_in(order.folder)
     with show_progress(session) as listener:
         whole = None if time_budget is None else TimeBudget(time_budget, session.began)
         outcome = run_order(order, listener=listener, time_budget=whole, **options)
+    if other := [one["key"] for name, one in outcome.record["given"].items() if before.get(name, one) != one]:
+        session.say(
+            f"{outcome.folder} held the result of another {', '.join(other)}; it holds this one now. "
+            "To keep both, name a folder for each with -o"
+        )
     session.enter("done", run=str(outcome.folder), seconds=outcome.seconds, verdicts=outcome.verdicts)
     session.answer({**outcome.record, "run": str(outcome.folder)}, chain(outcome_lines(outcome), result_lines(outcome)))
+
+
+def _given_in(folder: Path) -> dict[str, Any]:
+    """Return what the last run in a folder was given, as run.json holds it; nothing where there was none."""
+    try:
+        return dict(read_json(folder / RECORD)["given"])
+    except (InputError, KeyError, TypeError, ValueError):  # none yet, or not ours
+        return {}
 
 
 def outcome_lines(outcome: Outcome) -> Iterator[str]:

@@ -32,6 +32,7 @@ class Publisher:
         check_address(address, "--publish")
         self._folder, self._address = folder, address.rstrip("/")
         self._done: dict[str, str] = {}
+        self._copied = 0
         try:
             record = read_json(folder / PUBLISHED)
             if record["address"] == self._address:
@@ -54,7 +55,7 @@ class Publisher:
         return self.put([*others, *filter(None, [row["picture"]]), record])
 
     def put_batch(self, batch: Mapping[str, Any]) -> str:
-        """Copy what is not there yet of all rows, and then the summary; return in words what was done.
+        """Copy what is not there yet of all rows, and then the summary; return in words how many files were copied in all.
 
         Args:
             batch: What batch.json holds.
@@ -63,12 +64,13 @@ class Publisher:
             BatchError: the store fails.
         """
         try:
-            count = sum(self.put_row(row) for row in batch["rows"])
-            count += self.put(name for name in _SUMMARY if (self._folder / name).is_file())
+            for row in batch["rows"]:
+                self.put_row(row)
+            self.put(name for name in _SUMMARY if (self._folder / name).is_file())
         except VtoError as error:
             hint = "run the same command again; what is there is not copied again"
             raise BatchError(f"not all is published: {error.problem}", where=error.where, hint=hint) from None
-        return f"{count} files were copied to {self._address}"
+        return f"{self._copied} files were copied to {self._address}"
 
     def put(self, names: Iterable[str]) -> int:
         """Copy files that are not there as they are here; return how many were.
@@ -88,6 +90,7 @@ class Publisher:
                     copy_there(path, address)
                     self._done[name] = digest
                     count += 1
+                    self._copied += 1
         finally:
             write_json(self._folder / PUBLISHED, {"address": self._address, "digests": self._done})
         return count
