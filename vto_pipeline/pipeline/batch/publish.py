@@ -55,7 +55,7 @@ class Publisher:
         return self.put([*others, *filter(None, [row["picture"]]), record])
 
     def put_batch(self, batch: Mapping[str, Any]) -> str:
-        """Copy what is not there yet of all rows, and then the summary; return in words how many files were copied in all.
+        """Copy what is not there yet of all rows, and then the summary; return in words how many files were copied.
 
         Args:
             batch: What batch.json holds.
