@@ -389,7 +389,7 @@ def test_what_is_found_was_worn_and_files_keep_that(tmp_path):
     """The middle of a cone stays where it was worn: corners of its flat panels stand higher than its rim."""
     mesh = frustum(0.3, 0.17, 0.5)
     found = recover(mesh, "auto", POPLIN, "cone", Job()).pattern
-    for suffix in (".json", ".svg"):
+    for suffix in (".json", ".svg", ".dxf"):
         write_pattern(tmp_path / f"cone{suffix}", found)
         read = read_pattern(tmp_path / f"cone{suffix}", job=Job())
         assert read.worn

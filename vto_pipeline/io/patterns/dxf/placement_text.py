@@ -11,6 +11,8 @@ from vto_pipeline.io.patterns.dxf.texts import key_and_value
 from vto_pipeline.model.pattern import Placement
 
 KEY = "PLACED"
+WORN = f"{KEY}: AS WORN"
+"""Text beside the blocks: the panels stand where they were worn, not where they are laid out."""
 _NUMBER = r"(-?\d+(?:\.\d+)?(?:e-?\d+)?)"
 _VALUE = re.compile(rf"{_NUMBER} {_NUMBER} {_NUMBER} mm, {_NUMBER} {_NUMBER} {_NUMBER} deg")
 

@@ -13,6 +13,7 @@ from vto_pipeline.io.arrays import Arrays
 from vto_pipeline.io.patterns.dxf.entities import Piece, piece_of
 from vto_pipeline.io.patterns.dxf.layers import BOUNDARY, layer_of
 from vto_pipeline.io.patterns.dxf.piece import panel_of
+from vto_pipeline.io.patterns.dxf.placement_text import WORN
 from vto_pipeline.io.patterns.dxf.stitch_texts import stitches_of
 from vto_pipeline.io.patterns.dxf.texts import find_unit, key_and_value
 from vto_pipeline.io.patterns.record import answer
@@ -63,7 +64,8 @@ def _pattern(path: Path, unit: str, notes: list[str]) -> Pattern:
     panels = _with_unique_names(panels, list(pieces), notes)
     styles = [value for key, value in map(key_and_value, texts) if key == "STYLE NAME"]
     name = styles[0] if styles and styles[0] else path.stem
-    return Pattern(name, tuple(panels), stitches_of(texts), f"{unit}, {source}")
+    worn = key_and_value(WORN) in map(key_and_value, texts)
+    return Pattern(name, tuple(panels), stitches_of(texts), f"{unit}, {source}", worn)
 
 
 def piece_of_modelspace(document: Any) -> Piece:

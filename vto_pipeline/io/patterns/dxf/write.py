@@ -49,6 +49,7 @@ def write_dxf(path: Path, pattern: Pattern) -> None:
     space = document.modelspace()
     sizes = [size for size in pattern.sizes if size]
     heads = [f"STYLE NAME: {pattern.name}", "UNITS: METRIC", *(f"SAMPLE SIZE: {size}" for size in sizes[:1])]
+    heads += [placement_text.WORN] if pattern.worn else []
     for number, text in enumerate((*heads, *map(text_of, pattern.stitches))):
         _text(space, text, layers.BOUNDARY, (0.0, -2.0 * _TEXT_MM * (number + 1)))
     for number, panel in enumerate(pattern.panels):
