@@ -30,10 +30,10 @@ demo: $(READY)  ## Dress a customer in a shirt from photos (about 10 minutes on 
 	@echo "Look at it: $(CURDIR)/runs/demo/out/page.html"
 
 test: check  ## Check, and run every test that is not slow
-	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
 
 test-all: check  ## Check, and run all tests
-	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder -m ""
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m ""
 
 test-processors: $(READY)  ## Run the tests as other processors compute (an hour; NAMES="generic x86-64-v3" for some)
 	.ci/processors $(NAMES)
