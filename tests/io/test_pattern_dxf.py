@@ -303,6 +303,7 @@ WORDS = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=1
 @settings(max_examples=30, deadline=None)
 @given(WORDS, WORDS, WORDS)
 @example("a\nb", "\U0001f600 x", "\\U+0041 \\M+1 %%d ^J")
+@example("^", "^ ^", "a^")
 def test_any_words_come_back(tmp_path_factory, name, label, note):
     path = tmp_path_factory.mktemp("words") / "a.dxf"
     (first, *rest) = half_disc(0.3, name).edges

@@ -29,6 +29,7 @@ _LAYER_OF_LINE = {kind: layer for layer, kind in layers.LINE_KINDS.items()} | {
     "mirror": layers.MIRROR,
 }
 _ESCAPED = re.compile(r"\\(?=[UM]\+)")  # a backslash that a reader would take for the start of an escape
+_CARET = ord("^")  # readers drop it at the end of a text, or take the next letter for a control character
 
 
 def write_dxf(path: Path, pattern: Pattern) -> None:
@@ -123,5 +124,5 @@ def _text(block: Any, text: str, layer: int, place: tuple[float, float]) -> None
 
 def _ascii(text: str) -> str:
     """Return a text in seven bits and one line, other letters as DXF escapes them: by two where UTF-16 takes two."""
-    units = np.frombuffer(_ESCAPED.sub("\\\\U+005C", text).encode("utf-16-le", "surrogatepass"), "<u2")
-    return "".join(chr(unit) if 0x20 <= unit < 0x7F else f"\\U+{unit:04X}" for unit in units.tolist())
+    units = np.frombuffer(_ESCAPED.sub("\\\\U+005C", text).encode("utf-16-le", "surrogatepass"), "<u2").tolist()
+    return "".join(chr(unit) if 0x20 <= unit < 0x7F and unit != _CARET else f"\\U+{unit:04X}" for unit in units)
