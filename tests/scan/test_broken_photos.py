@@ -240,3 +240,14 @@ def test_messages_of_libraries_lose_their_decoration():
     assert library_message(RuntimeError(text)) == "keys should > 0."
     assert library_message(ValueError("[mvs.cc:51] Dense stereo")) == "Dense stereo"
     assert library_message(IndexError()) == "IndexError"
+
+
+def test_what_opencv_says_is_of_that_error_and_not_of_the_last_one():
+    said = []
+    for call in (lambda: cv2.resize(np.zeros((0, 0), np.uint8), (3, 3)), lambda: cv2.cvtColor(1, cv2.COLOR_BGR2RGB)):
+        with pytest.raises(cv2.error) as caught:
+            call()
+        said.append(caught.value)
+    assert library_message(said[0]) == "!ssize.empty()"
+    assert library_message(said[1]).startswith("Unsupported depth of input image: 'VDepth::contains(depth)'")
+    assert library_message(cv2.error("Insufficient memory")) == "Insufficient memory"
