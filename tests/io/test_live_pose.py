@@ -49,14 +49,17 @@ def astride(moves: Moves) -> Moves:
 
 
 def test_measuring_the_person_hardly_slows_the_first_frames():
-    """A stream would fall behind in its first second."""
-    joints, pose = LiveJoints("camera"), LivePose(template(0.0), NO_LEAD)
-    took = []
-    for number, line in enumerate(tracked_text(astride(random_moves(60))).splitlines()):
-        places, began = joints.read(line.encode()).places, time.process_time()
-        pose.at(places, number / 25)
-        took.append(time.process_time() - began)
-    assert np.median(took[:30]) < 2.0 * np.median(took[30:])  # posing twice, 2.5 times as long
+    """A stream would fall behind in its first second. The least of three tries is what a frame takes by itself."""
+    lines = tracked_text(astride(random_moves(60))).splitlines()
+    took = np.full((3, len(lines)), np.inf)
+    for tried in took:
+        joints, pose = LiveJoints("camera"), LivePose(template(0.0), NO_LEAD)
+        for number, line in enumerate(lines):
+            places, began = joints.read(line.encode()).places, time.process_time()
+            pose.at(places, number / 25)
+            tried[number] = time.process_time() - began
+    least = took.min(axis=0)
+    assert np.median(least[:30]) < 2.0 * np.median(least[30:])  # posing twice, 2.5 times as long
 
 
 def test_once_measured_a_frame_is_as_the_whole_motion_has_it(tmp_path: Path):
