@@ -135,3 +135,19 @@ def test_wrong_sightings_farther_off_do_not_spoil_an_adjustment(monkeypatch):
     job = Job()
     assert adjust_module.adjust(Placed(*[0.3] * 98, 1.0, 3.0), None, job) is better
     assert not job.notes
+
+
+@pytest.mark.parametrize(("from_straight", "kept"), [(0.5, 0.0), (2.0, -0.5), (None, -0.5)])
+def test_a_much_bent_lens_is_adjusted_from_a_straight_one_too(monkeypatch, from_straight, kept):
+    """The lower of two minima is kept; where there is no way from the straight one, what was found."""
+    camera = SimpleNamespace(width=480, height=360, params=np.array([528.0, 240.0, 180.0, -0.5]))
+
+    def solve(model, *rest, **options):
+        straight = model.cameras[1].params[3] == 0.0
+        if straight and from_straight is None:
+            raise ValueError("no convergence")
+        return from_straight if straight else 1.0
+
+    monkeypatch.setattr(adjust_module, "solve", solve)
+    found = adjust_module._from_both_sides(SimpleNamespace(cameras={1: camera}))
+    assert found.cameras[1].params[3] == kept

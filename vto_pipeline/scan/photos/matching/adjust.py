@@ -116,7 +116,10 @@ def _from_both_sides(model: Any) -> Any:
     for camera in straight.cameras.values():
         focal, cx, cy, _ = camera.params
         camera.params = [focal, cx, cy, 0.0]
-    return straight if solve(straight, SOFT_PX, bent=True) < cost else model
+    try:
+        return straight if solve(straight, SOFT_PX, bent=True) < cost else model
+    except ValueError:  # no way from there
+        return model
 
 
 def _own_error(model: Any) -> float:
