@@ -5,6 +5,7 @@ from cloth_scenes import sheet
 
 from vto_pipeline.cloth.constraints.bending.bend_friction import bend_friction
 from vto_pipeline.cloth.constraints.bending.hinge import bend, solid_hinges
+from vto_pipeline.cloth.constraints.bending.hinge_moments import hinge_moments
 from vto_pipeline.cloth.constraints.bending.isometric import isometric_bend
 from vto_pipeline.cloth.constraints.bending.shape_operator import shape_operator
 from vto_pipeline.cloth.constraints.mass_spring import bending_springs, membrane_springs
@@ -62,6 +63,7 @@ def examples(mesh=MESH):
         "chain": springs(pairs, x, 1e-3),
         "curve": curve(faces, rest, WOVEN, KNIT, 100.0),
         "green": green(faces, rest, FABRIC),
+        "hinge_moments": hinge_moments(shape_operator(mesh, rest, SOFT_FABRIC)),
         "isometric": isometric_bend(mesh, rest, FABRIC),
         "membrane springs": membrane_springs(mesh, rest, FABRIC),
         "shape_operator": shape_operator(mesh, rest, SOFT_FABRIC),

@@ -13,7 +13,7 @@ from scipy.sparse.linalg import splu
 
 from vto_pipeline.cloth.judge.audit import JUST
 from vto_pipeline.cloth.judge.gap import gaps_within
-from vto_pipeline.cloth.judge.residual import ElasticEnergies
+from vto_pipeline.cloth.judge.residual import ElasticEnergies, _angles
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.units import GRAVITY
 
@@ -74,34 +74,42 @@ class Cloth:
         return self.spread.T @ pull.ravel()
 
     def stiffness(self, q):
-        """Second derivatives, by differences of the energy of each triangle and hinge."""
-        x, h, parts = self.at(q), 1e3 * self.weave._step, []
-        for stencils, energies in (
-            (self.weave._faces, self.weave._membrane),
-            (self.weave._hinges, self.weave._folds),
-        ):
-            corners = x[stencils]
-            ends = 3 * stencils[:, :, None] + np.arange(3)
-            ends = ends.reshape(len(stencils), -1)
-
-            def moved(*steps, corners=corners, energies=energies):
-                there = corners.copy()
-                for place, way in steps:
-                    there[:, place // 3, place % 3] += way * h
-                return energies(there)
-
-            still = energies(corners)
-            for i, j in combinations_with_replacement(range(3 * stencils.shape[1]), 2):
-                if i == j:
-                    second = (moved((i, 1)) - 2.0 * still + moved((i, -1))) / h**2
-                    parts.append((ends[:, i], ends[:, i], second))
-                    continue
-                second = (moved((i, 1), (j, 1)) - moved((i, 1), (j, -1))) / (4.0 * h**2)
-                second += (moved((i, -1), (j, -1)) - moved((i, -1), (j, 1))) / (4.0 * h**2)
-                parts += [(ends[:, i], ends[:, j], second), (ends[:, j], ends[:, i], second)]
-        rows, columns, values = (np.concatenate(each) for each in zip(*parts, strict=True))
-        whole = coo_matrix((values, (rows, columns)), shape=(x.size, x.size)).tocsc()
+        """Second derivatives, by differences of the energy of each triangle and of the angle of each hinge."""
+        x, weave = self.at(q), self.weave
+        turned, _ = self._differences(x, weave._faces, weave._membrane, 1.0)
+        moments = weave.moments(x)
+        bent, slopes = self._differences(x, weave.hinges, _angles, moments)
+        rows = np.repeat(np.arange(len(moments)), slopes.shape[1])
+        columns = (3 * weave.hinges[:, :, None] + np.arange(3)).reshape(len(moments), -1)
+        slope = coo_matrix((slopes.ravel(), (rows, columns.ravel())), shape=(len(moments), x.size)).tocsr()
+        whole = (turned + bent + slope.T @ weave.coupling @ slope).tocsc()
         return (self.spread.T @ whole @ self.spread).tocsc()
+
+    def _differences(self, x, stencils, value, factor):
+        """A factor times the second derivatives of a value of stencils, and the first ones, shape (N, 3 S)."""
+        h, parts, corners = 1e3 * self.weave._step, [], x[stencils]
+        ends = (3 * stencils[:, :, None] + np.arange(3)).reshape(len(stencils), -1)
+        slopes = np.empty(ends.shape)
+
+        def moved(*steps):
+            there = corners.copy()
+            for place, way in steps:
+                there[:, place // 3, place % 3] += way * h
+            return value(there)
+
+        still = value(corners)
+        for i, j in combinations_with_replacement(range(3 * stencils.shape[1]), 2):
+            if i == j:
+                ahead, behind = moved((i, 1)), moved((i, -1))
+                slopes[:, i] = (ahead - behind) / (2.0 * h)
+                parts.append((ends[:, i], ends[:, i], factor * (ahead - 2.0 * still + behind) / h**2))
+                continue
+            second = (moved((i, 1), (j, 1)) - moved((i, 1), (j, -1))) / (4.0 * h**2)
+            second += (moved((i, -1), (j, -1)) - moved((i, -1), (j, 1))) / (4.0 * h**2)
+            second = factor * second
+            parts += [(ends[:, i], ends[:, j], second), (ends[:, j], ends[:, i], second)]
+        rows, columns, values = (np.concatenate(each) for each in zip(*parts, strict=True))
+        return coo_matrix((values, (rows, columns)), shape=(x.size, x.size)).tocsc(), slopes
 
 
 def minimum(cloth, seed=0):

@@ -257,7 +257,7 @@ def test_losses_of_a_fabric_become_sliders():
     cloth = Fabric("f", 0.2, 3e-4, 900, 500, 100, 0.3, 1e-5, 1e-5, 1e-3, 0.3, shear_hysteresis=4.0, damping=0.01)
     model = build_cloth(mesh, RestShape(mesh.vertices), cloth, materials=Materials(hysteresis=True))
     kinds = {type(data).__name__: data for data in model.constraints}
-    assert set(kinds) == {"Bend", "BendFriction", "Stretch", "StrainFriction"}
+    assert set(kinds) == {"ShapeOperator", "BendFriction", "Stretch", "StrainFriction"}
     assert kinds["Stretch"].damping == 0.01
     assert_allclose(kinds["StrainFriction"].limit, [0.0, 0.0, 2.0])  # to either side
 

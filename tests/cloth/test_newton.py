@@ -22,10 +22,10 @@ FRAME = 1.0 / 60.0
 RAISED, THROWN = np.array([0.0, 0.01, 0.0]), np.array([1.0, -1.0, 0.0])
 
 
-def cloth(side, pinned=(), *, upright=True, gravity=(0.0, -G, 0.0), stretch=500.0, rayleigh=0.0, width=0.3):
+def cloth(side, pinned=(), *, upright=True, gravity=(0.0, -G, 0.0), stretch=500.0, width=0.3, **modelled):
     mesh = sheet(side, side, width, width, upright)
     stuff = fabric(stretch=stretch, shear=0.3 * stretch, poisson=0.2, bending=1e-5, density=0.15)
-    materials = Materials(rayleigh=rayleigh)
+    materials = Materials(**{"rayleigh": 0.0} | modelled)
     model = build_cloth(mesh, RestShape(mesh.vertices), stuff, pinned=pinned, gravity=gravity, materials=materials)
     return model, mesh.vertices
 
@@ -106,11 +106,12 @@ def test_one_iteration_is_near_it():
     assert np.linalg.norm((one - expected)[free]) < 0.5 * np.linalg.norm((flight - expected)[free])
 
 
-def test_damped_steps_solve_their_equation():
+@pytest.mark.parametrize(("bending", "share"), [("hinge", 1e-6), ("shape_operator", 1e-3)])
+def test_damped_steps_solve_their_equation(bending, share):
     """M (y - x̃) / h² = f(y) - β K(y) (y - x) / h, by forces alone."""
     h = 1.0 / 240.0
-    model, state = stirred(rayleigh=0.01)
-    plain = Newton(stirred()[0], sweeps=20).advance(state, empty_contacts(16), h, 1).positions
+    model, state = stirred(rayleigh=0.01, bending=bending)
+    plain = Newton(stirred(bending=bending)[0], sweeps=20).advance(state, empty_contacts(16), h, 1).positions
     found = Newton(model, sweeps=20).advance(state, empty_contacts(16), h, 1).positions
     target = state.positions + h * state.velocities + h * h * model.gravity
 
@@ -121,7 +122,8 @@ def test_damped_steps_solve_their_equation():
         return np.linalg.norm(forces[model.inverse_mass > 0.0])
 
     assert left(plain) > 0.3 * left(state.positions)
-    assert left(found) < 1e-6 * left(state.positions)  # 19 iterations that leave a third each, at least
+    # 19 iterations that leave a third each, at least; seven tenths where a stiffness stands for the exact one
+    assert left(found) < share * left(state.positions)
 
 
 @pytest.mark.parametrize("h", [5e-4, 2e-3, FRAME])

@@ -192,11 +192,13 @@ def test_gaps_are_those_of_brute_force():
     assert 5 < checked < 25
 
 
-def test_energy_and_forces_of_judge_and_solver_agree():
+@pytest.mark.parametrize("bending", ["shape_operator", "hinge"])
+@pytest.mark.parametrize("rigidity", [1e-4, 1e2])  # stretch rules, bending rules
+def test_energy_and_forces_of_judge_and_solver_agree(bending, rigidity):
     rest, x = crumpled()
-    weave = fabric(stretch=1500, weft=900, shear=60, poisson=0.2, bending=1e-4)
-    model = build_cloth(rest, RestShape(rest.vertices), weave)
-    mine = ElasticEnergies(rest, RestShape(rest.vertices), weave)
+    weave = fabric(stretch=1500, weft=900, shear=60, poisson=0.2, bending=rigidity)
+    model = build_cloth(rest, RestShape(rest.vertices), weave, materials=Materials(bending=bending))
+    mine = ElasticEnergies(rest, RestShape(rest.vertices), weave, bending)
     wanted = np.zeros_like(x)
     add_forces(x, model.constraints, wanted)
     assert_allclose(mine.energy(x), elastic_energy(model, x), rtol=1e-9)

@@ -99,6 +99,7 @@ def drape(
             energy=elastic_energy(model, state.positions),
             residual=stepper.residual(state),
             fabric=fabric if covers_all_energies(config) else None,
+            bending=config.bending,
             friction=config.friction,
             skin=stepper.skin,
         ),

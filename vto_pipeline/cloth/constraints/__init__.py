@@ -8,7 +8,7 @@ rigid: constraints without compliance
 
 from __future__ import annotations
 
-from vto_pipeline.cloth.constraints.bending import bend_friction, shape_operator
+from vto_pipeline.cloth.constraints.bending import bend_friction, hinge_moments, shape_operator
 from vto_pipeline.cloth.constraints.bending import hinge as bend
 from vto_pipeline.cloth.constraints.membrane import curve, green, strain_friction, strain_limit, stretch
 from vto_pipeline.cloth.constraints.points import combination, spring
@@ -19,6 +19,7 @@ KINDS = (
     combination.KIND,
     curve.KIND,
     green.KIND,
+    hinge_moments.KIND,
     shape_operator.KIND,
     spring.KIND,
     strain_friction.KIND,

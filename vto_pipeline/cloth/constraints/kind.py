@@ -19,6 +19,13 @@ For the stiffness with all that stress adds, a sixth; where there is none, it is
 
 * `exact(i, x, data, material, blocks)`: write -∂f/∂x + (material - 1) ∇Cᵀ α⁻¹ ∇C into blocks.
 
+For kinds whose stencils share what is found for all of them at once, in arrays of their data that are overwritten:
+
+* `prepare(x, data)`: find it at positions x. Called once before `force`, `linearise` or `stiffness` are for each, and
+  before each sweep of `project`.
+* `prepare_rates(x, v, data, lacking)`: find it such that `force` gives -S v, with the slope S of unstressed
+  forces and velocities v; or what ∇Cᵀ α⁻¹ ∇C, which stands for S in matrices, lacks of it.
+
 And for kinds that remember, whose data have a `slider`, shape (N, ...):
 
 * `slip(i, x, data)`: at the end of a step, let the slider of stencil i give way; see `cloth.model.internal_friction`.
@@ -41,7 +48,7 @@ class Kind:
         data: Its NamedTuple of arrays, with at least `vertices` (N, S), `damping` [s], `starts` and `colours` (see
             `numerics.blocks.Blocks`).
         rows: Scalar constraints per stencil, B.
-        project, force, linearise, geometric, stiffness, slip, exact: See above.
+        project, force, linearise, geometric, stiffness, slip, exact, prepare, prepare_rates: See above.
     """
 
     data: type
@@ -53,3 +60,5 @@ class Kind:
     stiffness: Callable[..., None] | None = None
     slip: Callable[..., None] | None = None
     exact: Callable[..., None] | None = None
+    prepare: Callable[..., None] | None = None
+    prepare_rates: Callable[..., None] | None = None

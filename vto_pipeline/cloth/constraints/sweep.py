@@ -25,6 +25,39 @@ def kind_of(data: object) -> Kind:
     return _BY_DATA[type(data)]
 
 
+def _prepare_one(x, data):
+    raise NotImplementedError
+
+
+@overload(_prepare_one)
+def _prepare_one_compiled(x, data):
+    shared = _BY_DATA[data.instance_class].prepare
+    return (lambda x, data: None) if shared is None else lambda x, data: shared(x, data)
+
+
+@njit(cache=True, error_model="numpy")
+def prepare(x, data):
+    """Find what the stencils of one kind share at positions x [m], shape (V, 3); see `kind`."""
+    _prepare_one(x, data)
+
+
+def prepare_all(x, constraints):
+    """Find what the stencils of each kind share, as `prepare`. From compiled code only."""
+    raise NotImplementedError
+
+
+@overload(prepare_all)
+def _prepare_all_compiled(x, constraints):
+    if len(constraints) == 0:
+        return lambda x, constraints: None
+
+    def unrolled(x, constraints):
+        _prepare_one(x, constraints[0])
+        prepare_all(x, constraints[1:])
+
+    return unrolled
+
+
 def multipliers(constraints: tuple[Any, ...]) -> tuple[NDArray[np.float64], ...]:
     """Return λ = 0 for each constraint, shape (N, B) for each kind."""
     return tuple(np.zeros((len(data.vertices), kind_of(data).rows)) for data in constraints)
@@ -171,6 +204,7 @@ def add_forces(x, constraints, forces):  # type: ignore[no-untyped-def]
     """Add the internal forces [N] at positions x [m], both (V, 3), and return the elastic energy [J]."""
     energy = 0.0
     for data in constraints:
+        prepare(x, data)
         energy += _force_kind(x, data, forces)
     return energy
 
@@ -223,13 +257,49 @@ def add_damping_forces(x, v, constraints, forces):  # type: ignore[no-untyped-de
         forces: [N], shape (V, 3), changed in place.
     """
     for data in constraints:
-        if data.damping > 0.0:
+        rates = kind_of(data).prepare_rates
+        if data.damping > 0.0 and rates is not None:
+            rates(x, v, data, False)
+            drag = np.zeros_like(forces)
+            _force_kind(x, data, drag)
+            forces += data.damping * drag
+        elif data.damping > 0.0:
             _damp_kind(x, v, data, forces)
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
-def linearised(x, data):
+def has_lacking(constraints: tuple[Any, ...]) -> bool:
+    """Return whether the matrices of some kinds stand for what joins more vertices than a stencil has."""
+    return any(kind_of(data).prepare_rates is not None for data in constraints)
+
+
+def add_lacking(x, v, constraints, h, out):  # type: ignore[no-untyped-def]
+    """Add what the matrix of a step of h [s] at positions x lacks of the slope of its forces, times v, to out [N].
+
+    Args:
+        x: Positions [m], shape (V, 3).
+        v: Moves [m], shape (V, 3).
+        constraints: The data of each kind.
+        h: Step [s], for damping.
+        out: Shape (V, 3), changed in place.
+    """
+    for data in constraints:
+        rates = kind_of(data).prepare_rates
+        if rates is not None:
+            rates(x, v, data, True)
+            found = np.zeros_like(out)
+            _force_kind(x, data, found)
+            out -= (1.0 + data.damping / h) * found
+
+
+def linearised(x: NDArray[np.float64], data: Any) -> tuple[NDArray[np.float64], ...]:
     """Return C, ∇C and α of one kind at positions x, shapes (N, B), (N, B, S, 3) and (N, B, B); see `kind`."""
+    prepare(x, data)
+    found: tuple[NDArray[np.float64], ...] = _linearised(x, data)
+    return found
+
+
+@njit(cache=True, error_model="numpy", parallel=True)
+def _linearised(x, data):
     count, rows, corners = len(data.vertices), rows_of(data), data.vertices.shape[1]
     values, gradients = np.empty((count, rows)), np.empty((count, rows, corners, 3))
     compliance = np.empty((count, rows, rows))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 from typing import Protocol
 
 import numpy as np
 
 from vto_pipeline.cloth.collision.contacts import Contacts
+from vto_pipeline.cloth.constraints.bending.hinge_moments import by_hinges
 from vto_pipeline.cloth.constraints.rigid import rigid_kind
 from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
 from vto_pipeline.cloth.integrators import INTEGRATORS
@@ -99,7 +100,7 @@ def _by_scene(model: ClothModel, positions: FloatArray) -> tuple[str, str]:
     rigid = rigid_kind(model.constraints, positions)
     if rigid is not None:
         return "xpbd", f"{rigid} constraints are rigid, and only multipliers can hold them"
-    highest = highest_frequency(model, positions)
+    highest = highest_frequency(replace(model, constraints=by_hinges(model.constraints)), positions)  # to be told only
     explicit = ceil(FRAME * highest / _SAFE)
     return "newton", (
         f"large implicit steps: {len(positions)} vertices, and the stiffest of their motions would cost an explicit "

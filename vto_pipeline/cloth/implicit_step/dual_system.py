@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit, prange
 
-from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM, kind_of, linearise_one, rows_of
+from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM, kind_of, linearise_one, prepare, rows_of
 from vto_pipeline.cloth.model.build import ClothModel
 from vto_pipeline.model.arrays import FloatArray, IntArray
 
@@ -81,6 +81,7 @@ class Linearised:
         """
         for data, rows in zip(self._model.constraints, self.kinds, strict=True):
             rows.viscous[0] = data.damping / h
+            prepare(x, data)
             _linearise(x, start, self._model.inverse_mass, h, data, rows)
         return tuple(rows.residual for rows in self.kinds)
 

@@ -65,10 +65,10 @@ class FrozenStep:
         )
         return rms(moved - x, self.model)
 
-    def residuals(self, x: FloatArray, multipliers: Sequence[FloatArray]) -> tuple[float, float]:
-        """Return the `constraint` and `energy` of `IterationResiduals` [m] at positions [m], shape (V, 3), and λ."""
-        linear = Linearised(self.model)
-        for one, given in zip(linear.multipliers, multipliers, strict=True):
+    def residuals(self, x: FloatArray, method: DualMethod) -> tuple[float, float]:
+        """Return the `constraint` and `energy` of `IterationResiduals` [m] at a method's end [m], shape (V, 3)."""
+        linear = Linearised(method.model)
+        for one, given in zip(linear.multipliers, method.multipliers, strict=True):
             one[:] = given
         residual = linear.at(x, self.state.positions, self.h)
         along, product = ([np.empty_like(one) for one in residual] for _ in range(2))
@@ -90,6 +90,8 @@ class IterativeMethod(Protocol):
 @runtime_checkable
 class DualMethod(Protocol):
     """A method that works on λ."""
+
+    model: ClothModel
 
     @property
     def multipliers(self) -> tuple[FloatArray, ...]:
@@ -154,7 +156,7 @@ def residual_history(
         began = time.perf_counter()
         x = solver.advance(step.state, step.contacts, step.h, 1).positions
         seconds = time.perf_counter() - began
-        residuals = step.residuals(x, solver.multipliers) if isinstance(solver, DualMethod) else (None, None)
+        residuals = step.residuals(x, solver) if isinstance(solver, DualMethod) else (None, None)
         yield IterationResiduals(count, seconds, rms(x - solution, step.model), step.imbalance(x), *residuals)
 
 

@@ -110,6 +110,12 @@ class LinearSystem:
         solve(plan, self._room, right, x)
         return True
 
+    def substitute(self, right: FloatArray) -> FloatArray:
+        """Return the solution for another right side, shape (N, 3), with the factor that `eliminated` left."""
+        x = np.empty_like(right)
+        solve(self._plan, self._room, right, x)
+        return x
+
     def _up_to_date(self) -> Elimination:
         """Return the plan for the links of now."""
         vertices, weights = self._linked

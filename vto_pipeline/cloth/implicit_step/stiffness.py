@@ -15,6 +15,7 @@ from vto_pipeline.cloth.constraints.sweep import (
     exact_one,
     force_one,
     kind_of,
+    prepare,
     stiffness_one,
     stiffness_scratch,
 )
@@ -65,15 +66,17 @@ class Stiffness:
 
         The matrix is overwritten by the next call.
         """
-        matrix = self._matrix
-        _clear(matrix, self._held, mass_factor * self._model.mass)
+        _clear(self._matrix, self._held, mass_factor * self._model.mass)
         for data, places in zip(self._model.constraints, self._places, strict=True):
+            prepare(x, data)
             material = stiffness_factor + damping_factor * data.damping
-            _assemble(x, data, places, self._held, material, stiffness_factor, False, matrix.blocks)
-        return matrix
+            _assemble(x, data, places, self._held, material, stiffness_factor, False, self._matrix.blocks)
+        return self._matrix
 
     def assemble_exact(self, x: FloatArray, mass_factor: float = 0.0, damping_factor: float = 0.0) -> BlockMatrix:
         """Return m M - ∂f/∂x + d Σ β ∇Cᵀ α⁻¹ ∇C at positions x [m], shape (V, 3); symmetric but for rounding.
+
+        Of a kind whose stencils share something, ∇Cᵀ α⁻¹ ∇C stands for what changes with that.
 
         The matrix is overwritten by the next call.
         """
@@ -81,6 +84,7 @@ class Stiffness:
         _clear(matrix, self._held, mass_factor * self._model.mass)
         here, forces = x.copy(), np.empty_like(x)
         for data, places in zip(self._model.constraints, self._places, strict=True):
+            prepare(x, data)
             known, damped = kind_of(data).exact is not None, damping_factor * data.damping
             _assemble(x, data, places, self._held, damped + known, 0.0, known, matrix.blocks)
             if not known:

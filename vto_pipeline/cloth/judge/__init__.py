@@ -2,6 +2,7 @@
 
 audit: finite, crossings, penetration, strain, energy, residual
 residual: energy and residual force, computed a second time
+curvature: stiffness of bending, likewise
 flanks, bearing: where a body may carry a point, and what force it can carry there
 gap: how near a cloth comes to itself
 order: whether what is worn beneath lies beneath

@@ -39,6 +39,7 @@ def audit(
     energy: float,
     residual: float,
     fabric: Fabric | None = None,
+    bending: str = "shape_operator",
     friction: float | None = None,
     skin: float | FloatArray = _SKIN,
     pinned: Sequence[int] = (),
@@ -54,6 +55,7 @@ def audit(
         residual: Residual force as a share of weight, rms over the mass, says the solver.
         fabric: What it is made of, where the judge knows its model (`judge.residual.covers_all_energies`); energy and
             force are then judged.
+        bending: Its model of bending.
         friction: Against the body; the fabric's own when None.
         skin: Distance that vertices keep from the body, shape (V,) or one for all [m]. A little more may still be
             borne by it; by the cloth itself, within as little more than its thickness.
@@ -91,7 +93,7 @@ def audit(
         "residual": residual,
     }
     if fabric is not None:
-        weave = ElasticEnergies(mesh, rest, fabric)
+        weave = ElasticEnergies(mesh, rest, fabric, bending)
         free = np.ones(len(mesh.vertices), np.bool_)
         free[list(pinned)] = False
         free[mesh.faces[near[gaps < thick]]] = False

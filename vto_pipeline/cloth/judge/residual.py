@@ -6,10 +6,14 @@ the solver's is trusted. What a body can bear is taken from distances to its sur
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import diags_array
 
 from vto_pipeline.cloth.judge.bearing import residual_after_all_surfaces, residual_after_one_surface
+from vto_pipeline.cloth.judge.curvature import curvature_stiffness
 from vto_pipeline.cloth.judge.flanks import flanks
 from vto_pipeline.cloth.judge.strain import RestTriangles, gradients, rest_triangles, warp_weft_strains
 from vto_pipeline.cloth.model.materials import Materials
@@ -31,26 +35,36 @@ def covers_all_energies(materials: Materials) -> bool:
     """Return whether the energies of `ElasticEnergies` are all that this model of cloth has."""
     extra = (materials.strain_limit, materials.yield_curvature)
     plain = extra == (None, None) and not materials.hysteresis
-    return plain and (materials.membrane, materials.bending) == ("threads", "hinge")
+    return plain and materials.membrane == "threads" and materials.bending in ("shape_operator", "hinge")
 
 
 class ElasticEnergies:
-    """A cloth of the model "threads" with "hinge" bending, and its energies.
+    """A cloth of the model "threads", and its energies.
 
     Args:
         mesh: Its triangles.
         rest: Its shape without forces.
         fabric: Its stiffnesses and mass.
+        bending: "shape_operator" or "hinge".
+
+    Attributes:
+        hinges: Ends and wings of those that bend, shape (H, 4).
+        coupling: M [N·m] of the energy of bending ½ θᵀ M θ, θ being their angles less those at rest, shape (H, H).
     """
 
-    def __init__(self, mesh: TriangleMesh, rest: RestShape, fabric: Fabric) -> None:
+    def __init__(self, mesh: TriangleMesh, rest: RestShape, fabric: Fabric, bending: str = "shape_operator") -> None:
         laid = rest.corners(mesh.faces)
         self._rest: RestTriangles = rest_triangles(laid)
         self._faces = mesh.faces[self._rest.solid]
         self._weight = self._rest.area * np.minimum(1.0, _slenderness(laid[self._rest.solid]) / _SLIVER)
         self._stiffness = _plane_stiffness(fabric)
-        self._hinges, self._rigidity = _bending(mesh, laid, fabric)
-        self._angles = _angles(rest.positions[self._hinges]) if rest.rest_angles else np.zeros(len(self._hinges))
+        if bending == "hinge":
+            self.hinges, rigidity = _bending(mesh, laid, fabric)
+            self.coupling = diags_array(rigidity).tocsr()
+        else:
+            self.hinges = hinges(mesh)
+            self.coupling = curvature_stiffness(mesh, laid, _slenderness(laid) > _SLIVER, fabric)
+        self._angles = _angles(rest.positions[self.hinges]) if rest.rest_angles else np.zeros(len(self.hinges))
         area = np.zeros(len(mesh.faces))
         area[self._rest.solid] = self._rest.area
         self.mass = np.bincount(mesh.faces.ravel(), np.repeat(fabric.areal_density * area / 3.0, 3), len(mesh.vertices))
@@ -58,32 +72,43 @@ class ElasticEnergies:
 
     def energy(self, positions: FloatArray) -> float:
         """Return the energy stored at these positions [m], shape (V, 3) [J]."""
-        stretched = self._membrane(positions[self._faces]).sum()
-        return float(stretched + self._folds(positions[self._hinges]).sum())
+        bent = _angles(positions[self.hinges]) - self._angles
+        return float(self._membrane(positions[self._faces]).sum() + 0.5 * bent @ (self.coupling @ bent))
+
+    def moments(self, positions: FloatArray) -> FloatArray:
+        """Return the moment that closes each hinge at these positions [m], shape (V, 3) [N·m], shape (H,)."""
+        return np.asarray(self.coupling @ (_angles(positions[self.hinges]) - self._angles))
 
     def forces(self, positions: FloatArray) -> FloatArray:
         """Return the elastic forces on the vertices [N], shape (V, 3)."""
         found = np.zeros_like(positions)
-        for stencils, energies in ((self._faces, self._membrane), (self._hinges, self._folds)):
-            corners = positions[stencils]
-            for k in range(stencils.shape[1]):
-                for d in range(3):
-                    moved = corners.copy()
-                    moved[:, k, d] += self._step
-                    ahead = energies(moved)
-                    moved[:, k, d] -= 2.0 * self._step
-                    pull = (energies(moved) - ahead) / (2.0 * self._step)
-                    found[:, d] += np.bincount(stencils[:, k], pull, len(found))
+        self._pull(positions[self._faces], self._faces, self._membrane, np.ones(1), found)
+        self._pull(positions[self.hinges], self.hinges, _angles, self.moments(positions), found)
         return found
+
+    def _pull(
+        self,
+        corners: FloatArray,
+        stencils: NDArray[np.int32],
+        value: Callable[[FloatArray], FloatArray],
+        factor: FloatArray,
+        forces: FloatArray,
+    ) -> None:
+        """Subtract from the forces what a factor times the slope of a value makes."""
+        for k in range(stencils.shape[1]):
+            for d in range(3):
+                moved = corners.copy()
+                moved[:, k, d] += self._step
+                ahead = value(moved)
+                moved[:, k, d] -= 2.0 * self._step
+                pull = factor * (value(moved) - ahead) / (2.0 * self._step)
+                forces[:, d] += np.bincount(stencils[:, k], pull, len(forces))
 
     def _membrane(self, corners: FloatArray) -> FloatArray:
         local = np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3)
         laid = RestTriangles(np.ones(len(corners), np.bool_), self._rest.area, self._rest.inverse)
         strain = warp_weft_strains(gradients(corners.reshape(-1, 3), local, laid))
         return 0.5 * self._weight * np.einsum("ta,ab,tb->t", strain, self._stiffness, strain)
-
-    def _folds(self, corners: FloatArray) -> FloatArray:
-        return 0.5 * self._rigidity * (_angles(corners) - self._angles) ** 2
 
 
 def judged_residual(

@@ -20,7 +20,7 @@ def vertex_maps(mesh: TriangleMesh, rest: RestShape, body: TriangleMesh, fabric:
     """Return figures per vertex of a draped garment.
 
     Pressure is the force with which the body holds a vertex up, along the body's normal, over the vertex's area: what
-    elastic forces and weight leave, forces being differences of energies (`judge.residual`, threads with hinges).
+    elastic forces and weight leave, forces being differences of energies (`judge.residual`, in the default models).
 
     Args:
         mesh: The garment at rest on the body [m].

@@ -37,9 +37,9 @@ class Materials(Config):
         description="In-plane model: threads (stretch of warp and weft, and their angle), green (Green-Lagrange "
         "strain), springs (mass-spring net), curve (measured stretch curves)",
     )
-    bending: Literal["hinge", "shape_operator", "isometric", "springs", "none"] = Field(
-        "hinge",
-        description="Bending model: hinge (edge angles), shape_operator (triangle curvatures; converges on any mesh), "
+    bending: Literal["shape_operator", "hinge", "isometric", "springs", "none"] = Field(
+        "shape_operator",
+        description="Bending model: shape_operator (triangle curvatures; converges on any mesh), hinge (edge angles), "
         "isometric (quadratic; flat rest shapes only), springs (second neighbours), none",
     )
     strain_limit: float | None = Field(

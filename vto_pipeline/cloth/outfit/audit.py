@@ -75,6 +75,7 @@ def audit_outfit(
                 energy=elastic_energy(model, x),
                 residual=residual,
                 fabric=layer.fabric if covers_all_energies(config) else None,
+                bending=config.bending,
                 friction=config.friction,
                 skin=skin[span],
                 pinned=borne[(borne >= span.start) & (borne < span.stop)] - span.start,

@@ -9,6 +9,8 @@ of them. Near rest, where what is left out to keep it so is what cloth waits for
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from math import exp
 from typing import NamedTuple
 
@@ -29,8 +31,10 @@ from vto_pipeline.cloth.collision.response.contact_springs import (
 from vto_pipeline.cloth.collision.response.step_response import resolve_plane_contacts
 from vto_pipeline.cloth.collision.self_collision.pairs import no_pairs
 from vto_pipeline.cloth.collision.self_collision.self_contact import SelfContact
+from vto_pipeline.cloth.constraints.bending.hinge_moments import by_hinges
 from vto_pipeline.cloth.constraints.rigid import refuse_rigid
-from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM, add_damping_forces, add_forces
+from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM, add_damping_forces, add_forces, add_lacking, has_lacking
+from vto_pipeline.cloth.implicit_step.lacking import complete
 from vto_pipeline.cloth.implicit_step.linear_system import LinearSystem
 from vto_pipeline.cloth.implicit_step.momentum import free_components, keep_momentum
 from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
@@ -106,7 +110,8 @@ class Newton:
     """
 
     def __init__(self, model: ClothModel, *, sweeps: int = 1, damping: float = 0.0, max_speed: float = np.inf) -> None:
-        self._model = model = with_own_sliders(model)
+        model = with_own_sliders(model)
+        self._model = model = replace(model, constraints=by_hinges(model.constraints))
         self._sweeps = sweeps
         self._damping = damping
         self._max_speed = max_speed
@@ -115,6 +120,7 @@ class Newton:
         self.exact = self.definite = False
         self._checked = False
         self._held = model.inverse_mass == 0.0
+        self._lacks = has_lacking(model.constraints)
         self._stiffness = Stiffness(model)
         self._system = LinearSystem(self._stiffness.matrix, self._held)
         self._stiffness.write_to(self._system.blocks)
@@ -280,6 +286,8 @@ class Newton:
                 project_to_contacts(self.active, model.inverse_mass, x, y, move)
             if self.definite:
                 self.definite = system.eliminated(right, move)
+                if self.definite and self._lacks:
+                    self.definite = complete(move, right, system.substitute, partial(self._lacking, y, h))
                 if not self.definite:
                     return _Iteration(y, 0.0, 0.0, 0.0, np.inf)
             else:
@@ -297,9 +305,18 @@ class Newton:
             extensions -= 1
             rounds = max(rounds, 1)
         foreseen = -_quadratic(system.levels, right, move)
+        if self._lacks:
+            foreseen -= 0.5 * float(np.vdot(move, self._lacking(y, h, move)))
         lost = self._dissipated(y, move, h, drag)
         parabola = tuple(push + loss for push, loss in zip(pushes, lost, strict=True))
         return self._shortened(y, target, move, h, energy, parabola, foreseen)
+
+    def _lacking(self, y: FloatArray, h: float, move: FloatArray) -> FloatArray:
+        """Return what the matrix at positions y of a step of h [s] lacks, times a move [N], shape (V, 3)."""
+        found = np.zeros_like(move)
+        add_lacking(y, move, self._model.constraints, h, found)
+        found[self._held] = 0.0
+        return found
 
     def _dissipated(self, y: FloatArray, move: FloatArray, h: float, drag: FloatArray) -> tuple[float, float, float]:
         """Return what dampers add to the objective after a share of 0, ½ and 1 of a move: a parabola [J].

@@ -6,6 +6,7 @@ with one Gauss-Seidel sweep each beat few steps with many sweeps. All substeps o
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import exp
 
 import numpy as np
@@ -14,7 +15,8 @@ from numba.extending import overload
 
 from vto_pipeline.cloth.collision.contacts import Contacts
 from vto_pipeline.cloth.collision.response.step_response import resolve_plane_contacts
-from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM, multipliers, project
+from vto_pipeline.cloth.constraints.bending.hinge_moments import by_hinges
+from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM, multipliers, prepare_all, project
 from vto_pipeline.cloth.implicit_step.plane_multiplier import solve_plane_contacts
 from vto_pipeline.cloth.implicit_step.prediction import predict
 from vto_pipeline.cloth.model.build import ClothModel, ClothState
@@ -32,6 +34,7 @@ class Xpbd:
         max_speed: No vertex moves faster [m/s].
 
     Attributes:
+        model: The cloth as it is solved: curvatures by hinges, with the moments of the others as each sweep finds them.
         forgets: Whether λ is forgotten before each sweep; see `pbd_soft`.
     """
 
@@ -40,7 +43,8 @@ class Xpbd:
     has_exact_rest = False  # one sweep a step leaves a share of h² of each constraint's error
 
     def __init__(self, model: ClothModel, *, sweeps: int = 1, damping: float = 0.0, max_speed: float = np.inf) -> None:
-        self._model = with_own_sliders(model)
+        model = with_own_sliders(model)
+        self.model = model = replace(model, constraints=by_hinges(model.constraints))
         self._sweeps = sweeps
         self._damping = damping
         self._max_speed = max_speed
@@ -53,16 +57,16 @@ class Xpbd:
 
     def advance(self, state: ClothState, contacts: Contacts, h: float, substeps: int) -> ClothState:
         """Return the state after `substeps` steps of h [s]. The contacts hold for their whole span."""
-        restore_sliders(self._model, state.sliders)
+        restore_sliders(self.model, state.sliders)
         x, v = state.positions.copy(), state.velocities.copy()
         _advance(
             x,
             v,
-            self._model.inverse_mass,
-            self._model.constraints,
+            self.model.inverse_mass,
+            self.model.constraints,
             self._lambdas,
             contacts,
-            self._model.gravity,
+            self.model.gravity,
             h,
             substeps,
             self._sweeps,
@@ -71,7 +75,7 @@ class Xpbd:
             self.forgets,
             len(x) >= PARALLEL_FROM,
         )
-        return ClothState(x, v, state.time + substeps * h, copy_sliders(self._model))
+        return ClothState(x, v, state.time + substeps * h, copy_sliders(self.model))
 
 
 @njit(cache=True, error_model="numpy")
@@ -88,6 +92,7 @@ def _advance(
         for _ in range(sweeps):
             if forgets:
                 _reset(lambdas)
+            prepare_all(x, constraints)
             sweep_once(x, start, inverse_mass, constraints, lambdas, contacts, pressed, t0, t1, h, threaded)
         resolve_plane_contacts(x, v, start, inverse_mass, contacts, t0, t1, h, longest, True, threaded)
         slip(x, constraints)

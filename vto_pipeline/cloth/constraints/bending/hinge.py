@@ -196,17 +196,23 @@ def _linearise(i, x, data, values, gradients, compliance):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _exact(i, x, data, material, blocks):
-    angle, slopes = hinge_angle_gradients(i, x, data)
-    stiffness = 1.0 / data.compliance[i]
+def write_hinge_stiffness(i, x, data, slopes, stiffness, moment, blocks):
+    """Write stiffness ∇θ ∇θᵀ + moment ∇²θ of hinge i [N/m] into blocks, shape (4, 4, 3, 3)."""
     for a in range(4):
         for b in range(4):
             for k in range(3):
                 for m in range(3):
-                    blocks[a, b, k, m] = material * stiffness * slopes[a][k] * slopes[b][m]
+                    blocks[a, b, k, m] = stiffness * slopes[a][k] * slopes[b][m]
     a, b, c, d = data.vertices[i, 0], data.vertices[i, 1], data.vertices[i, 2], data.vertices[i, 3]
-    moment = stiffness * (angle - data.rest[i])
     add_dihedral_hessian(moment, load(x, a), load(x, b), load(x, c), load(x, d), blocks)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _exact(i, x, data, material, blocks):
+    angle, slopes = hinge_angle_gradients(i, x, data)
+    stiffness = 1.0 / data.compliance[i]
+    moment = stiffness * (angle - data.rest[i])
+    write_hinge_stiffness(i, x, data, slopes, material * stiffness, moment, blocks)
 
 
 # None for what stress adds as a rule: the second derivative of the angle is indefinite.

@@ -15,8 +15,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from vto_pipeline.cloth.constraints.bending.hinge import hinge_angles
 from vto_pipeline.cloth.constraints.bending.mid_edge import slope_shares
 from vto_pipeline.cloth.constraints.kind import Kind
+from vto_pipeline.cloth.constraints.membrane.slivers import SLIVER, slenderness
 from vto_pipeline.cloth.constraints.membrane.yarns import thread_axes
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.topology import corners_from, opposite_half_edges
@@ -31,7 +33,7 @@ from vto_pipeline.numerics.vector import axpy, dot, load, store, sub
 _SOFTEST = 1e-3  # of the stiffer direction: a fabric without any stiffness in one has no compliance
 
 # corners 0 1 2; across edge k (corner k to k + 1) vertex 3 + k; across that neighbour's other edges 6 + 2k and 7 + 2k
-_HINGES = np.array(
+HINGES = np.array(
     [[k, (k + 1) % 3, (k + 2) % 3, 3 + k] for k in range(3)]
     + [hinge for k in range(3) for hinge in ([k, 3 + k, (k + 1) % 3, 6 + 2 * k], [3 + k, (k + 1) % 3, k, 7 + 2 * k])],
     np.int32,
@@ -43,9 +45,9 @@ class ShapeOperator(NamedTuple):
     """Curvature constraints, in the order in which they are solved.
 
     Args:
-        vertices: See `_HINGES`, shape (T, 12); where the cloth ends, a corner of the triangle, without weight.
+        vertices: See `HINGES`, shape (T, 12); where the cloth ends, a corner of the triangle, without weight.
         weights: Curvature (warp, weft, twice the twist) per angle of each hinge [1/m], shape (T, 3, 9).
-        rest: Curvature at rest [1/m], shape (T, 3).
+        rest: Angles at rest [rad], shape (T, 9).
         area: At rest [m²], shape (T,).
         compliance: D⁻¹ as (warp, weft, twist, warp-weft) [1/(N·m)].
         damping: Rayleigh's β, loss in proportion to stiffness [s].
@@ -92,17 +94,25 @@ def shape_operator(
     corners = rest.corners(faces)
     warp, weft, double_area = thread_axes(corners)
     clamped = np.asarray(np.isin(faces, np.asarray(held, dtype=np.int64)).all(axis=1))
-    flat = np.asarray(double_area <= 1e-12 * double_area.max(initial=0.0))
-    opposite = _bending_edges(mesh, flat)
+    sliver = np.asarray(slenderness(corners) <= SLIVER)
+    opposite = _bending_edges(mesh, sliver)
     vertices = _stencils(faces, opposite)
     compliance = _compliance(fabric, poisson)
     weights = _weights(corners, opposite, warp, weft, 0.5 * double_area, clamped, compliance)
-    kept = ~(flat | clamped) & (weights != 0.0).any(axis=(1, 2))
+    kept = ~(sliver | clamped) & (weights != 0.0).any(axis=(1, 2))
     vertices, weights, area = vertices[kept], weights[kept], 0.5 * double_area[kept]
     order, starts, colours = blocks(vertices, rest.positions)
     vertices, weights = np.ascontiguousarray(vertices[order]), np.ascontiguousarray(weights[order])
-    curvature = _curvatures(rest.positions, vertices, weights) if rest.rest_angles else np.zeros((len(vertices), 3))
-    return ShapeOperator(vertices, weights, curvature, area[order], compliance, damping, starts, colours)
+    area, angles = area[order], np.zeros((len(vertices), 9))
+    if rest.rest_angles:
+        angles = hinge_angles(rest.positions, vertices[:, HINGES].reshape(-1, 4)).reshape(-1, 9)
+    return ShapeOperator(vertices, weights, angles, area, compliance, damping, starts, colours)
+
+
+def rigidity(compliance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return D [N·m], shape (3, 3)."""
+    warp, weft, twist, cross = compliance
+    return np.linalg.inv(np.array([[warp, cross, 0.0], [cross, weft, 0.0], [0.0, 0.0, twist]]))
 
 
 def _compliance(fabric: Fabric, poisson: float) -> NDArray[np.float64]:
@@ -113,11 +123,11 @@ def _compliance(fabric: Fabric, poisson: float) -> NDArray[np.float64]:
     return np.array([1.0 / warp, 1.0 / weft, 2.0 * (1.0 + poisson) / mean, -poisson / mean])
 
 
-def _bending_edges(mesh: TriangleMesh, flat: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """Return the opposite of each half-edge, shape (F, 3); -1 at a border or beside a triangle without area."""
+def _bending_edges(mesh: TriangleMesh, sliver: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """Return the opposite of each half-edge, shape (F, 3); -1 at a border or beside a sliver."""
     opposite = opposite_half_edges(mesh)
     across = np.where(opposite >= 0, opposite // 3, 0)
-    void = flat[across] | np.repeat(flat, 3)
+    void = sliver[across] | np.repeat(sliver, 3)
     return np.where(void, -1, opposite).reshape(-1, 3).astype(np.int32)
 
 
@@ -200,9 +210,7 @@ def _free_edges(
     compliance: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Return the weights with the slope at free edges such that the triangle's energy is least: no moment there."""
-    warp, weft, twist, cross = compliance
-    rigidity = np.linalg.inv(np.array([[warp, cross, 0.0], [cross, weft, 0.0], [0.0, 0.0, twist]]))
-    factor = np.linalg.cholesky(rigidity)
+    factor = np.linalg.cholesky(rigidity(compliance))
     for face in np.flatnonzero(free.any(axis=1) & (weights != 0.0).any(axis=(1, 2))):
         spanned, _ = np.linalg.qr(factor.T @ normals[face, free[face]].T)
         stressed = factor.T @ weights[face]
@@ -211,27 +219,20 @@ def _free_edges(
 
 
 @njit(cache=True, error_model="numpy")
-def _curvatures(x, vertices, weights):
-    found = np.zeros((len(vertices), 3))
-    gradients = np.empty((3, 12, 3))
-    for i in range(len(vertices)):
-        found[i] = _curvature(i, x, vertices, weights, gradients)
-    return found
-
-
-@njit(cache=True, error_model="numpy")
-def _curvature(i, x, vertices, weights, gradients):
-    """Return the curvature of a stencil and fill its gradients, shape (3, 12, 3)."""
+def _curvature(i, x, data, gradients):
+    """Return by how much a stencil is curved beyond rest and fill the gradients, shape (3, 12, 3)."""
+    vertices, weights = data.vertices, data.weights
     warp = weft = twist = 0.0
     gradients[:] = 0.0
     for hinge in range(9):
         w0, w1, w2 = weights[i, 0, hinge], weights[i, 1, hinge], weights[i, 2, hinge]
         if w0 == 0.0 and w1 == 0.0 and w2 == 0.0:
             continue
-        a, b, c, d = _HINGES[hinge, 0], _HINGES[hinge, 1], _HINGES[hinge, 2], _HINGES[hinge, 3]
+        a, b, c, d = HINGES[hinge, 0], HINGES[hinge, 1], HINGES[hinge, 2], HINGES[hinge, 3]
         angle, ga, gb, gc, gd = dihedral(
             load(x, vertices[i, a]), load(x, vertices[i, b]), load(x, vertices[i, c]), load(x, vertices[i, d])
         )
+        angle -= data.rest[i, hinge]
         warp, weft, twist = warp + w0 * angle, weft + w1 * angle, twist + w2 * angle
         for row in range(3):
             weight = weights[i, row, hinge]
@@ -245,7 +246,7 @@ def _curvature(i, x, vertices, weights, gradients):
 @njit(cache=True, error_model="numpy")
 def _project(i, x, start, inverse_mass, data, multipliers, h):
     gradients = np.empty((3, 12, 3))
-    bent = sub(_curvature(i, x, data.vertices, data.weights, gradients), load(data.rest, i))
+    bent = _curvature(i, x, data, gradients)
     gram, change = np.zeros((3, 3)), np.zeros(3)
     viscous = data.damping / h
     for s in range(12):
@@ -282,7 +283,7 @@ def _project(i, x, start, inverse_mass, data, multipliers, h):
 @njit(cache=True, error_model="numpy")
 def _force(i, x, data, forces):
     gradients = np.empty((3, 12, 3))
-    bent = sub(_curvature(i, x, data.vertices, data.weights, gradients), load(data.rest, i))
+    bent = _curvature(i, x, data, gradients)
     moment = _moment(bent, data.compliance)
     for s in range(12):
         v = data.vertices[i, s]
@@ -301,7 +302,7 @@ def _moment(bent, compliance):
 
 @njit(cache=True, error_model="numpy")
 def _linearise(i, x, data, values, gradients, compliance):
-    values[0], values[1], values[2] = sub(_curvature(i, x, data.vertices, data.weights, gradients), load(data.rest, i))
+    values[0], values[1], values[2] = _curvature(i, x, data, gradients)
     soft = 1.0 / data.area[i]
     compliance[:] = 0.0
     compliance[0, 0], compliance[1, 1] = soft * data.compliance[0], soft * data.compliance[1]
