@@ -17,6 +17,7 @@ from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.scan.photos import sfm as sfm_module
 from vto_pipeline.scan.photos.board import board_corners, detect_board
+from vto_pipeline.scan.photos.matching import from_board as from_board_module
 from vto_pipeline.scan.photos.matching.board_poses import Placed, line_distance, place_photos
 from vto_pipeline.scan.photos.matching.features import SURE, FeatureConfig, detect, match
 from vto_pipeline.scan.photos.matching.from_board import map_from_board
@@ -155,6 +156,27 @@ def test_the_board_alone_places_photos(plain):
     assert error.max() < 0.02  # at 1 m: one flat board, all from one height, tells focal length to 2 %, and so depth
     assert_allclose(next(iter(model.cameras.values())).focal_length, 528.0, rtol=0.02, atol=0)
     assert job.metrics["board_placed"] == 10
+
+
+def test_points_are_as_far_off_as_the_placed_cameras_show_them(plain, tmp_path, monkeypatch):
+    """COLMAP goes nowhere from the board: the errors of points are those of the last adjustment, not of the start."""
+    shot, _, database, found = plain
+    copied = tmp_path / database.name
+    copied.write_bytes(database.read_bytes())
+    monkeypatch.setattr(from_board_module, "incremental", lambda *given, **named: [])
+    model = map_from_board(copied, shot.paths[0].parent, BOARD, found, Job())
+    off = []
+    for point in model.points3D.values():
+        shown = []
+        for element in point.track.elements:
+            image = model.images[element.image_id]
+            pose = np.vstack([image.cam_from_world().inverse().matrix(), [0.0, 0.0, 0.0, 1.0]])
+            focal, cx, cy, k1 = image.camera.params
+            lens = replace(LENS, fx=focal, fy=focal, cx=cx, cy=cy, k1=k1)
+            shown.append(project(point.xyz[None], pose, lens)[0] - image.point2D(element.point2D_idx).xy)
+        off.append(np.linalg.norm(shown, axis=1).mean())
+    assert len(off) > 40
+    assert_allclose([point.error for point in model.points3D.values()], off, rtol=0, atol=1e-9)
 
 
 def test_fewer_corners_than_features_would_be_asked_for_place_photos(plain, tmp_path):
