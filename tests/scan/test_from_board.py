@@ -266,6 +266,27 @@ def test_photos_that_features_do_not_place_are_placed_by_the_board(plain, monkey
     assert cloud.points.tobytes() == runs[1][1].points.tobytes()
 
 
+@pytest.mark.parametrize("hidden", [2, 8])
+def test_photos_that_hardly_show_the_board_are_told_so(plain, monkeypatch, hidden):
+    """The advice for photos with too little texture is of no use where the board is what places them."""
+    shot, _, _, found = plain
+    monkeypatch.setattr(sfm_module, "map_photos", lambda *args: None)
+    every = [(ids[:3], pixels[:3]) if k < hidden else (ids, pixels) for k, (ids, pixels) in enumerate(found.values())]
+    monkeypatch.setattr(sfm_module, "detect_board", lambda *args: every)
+    job = Job()
+    if hidden == 8:
+        with pytest.raises(ScanError) as refused:
+            estimate_cameras(shot, SfmConfig(), job)
+        said = refused.value.hint
+    else:
+        cameras, _ = estimate_cameras(shot, SfmConfig(), job)
+        assert set(cameras.unregistered) <= {path.name for path in shot.paths[:hidden]}  # features may tie one of them
+        assert cameras.unregistered
+        assert all("3 corners of the board" in why for why in job.metrics["left_out_photos"].values())
+        said = job.warnings[0]
+    assert f"{10 - hidden} of 10 photos show 6 or more corners of the board" in said
+
+
 def test_without_a_board_or_with_another_nothing_changes(plain, monkeypatch):
     shot = plain[0]
     monkeypatch.setattr(sfm_module, "map_photos", lambda *args: None)
