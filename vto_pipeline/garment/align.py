@@ -248,11 +248,11 @@ def _accept(
 
 
 def _of_unplaced(cameras: CameraSet) -> str:
-    """Return what to mend first where most photos have no pose: what they show of the mannequin is not in the scan."""
+    """Return what to repair first where most photos have no pose: what they show of the mannequin is not in the scan."""
     lost, placed = len(cameras.unregistered), len(cameras.names)
     if lost <= placed:
         return ""
-    return f"{lost} of {lost + placed} photos could not be placed, as the warning says: mend that first. Else: "
+    return f"{lost} of {lost + placed} photos could not be placed, as the warning says: repair that first. Else: "
 
 
 def _check_inside(share: float, config: AlignConfig) -> None:
