@@ -248,7 +248,7 @@ def _accept(
 
 
 def _of_unplaced(cameras: CameraSet) -> str:
-    """Return what to repair first where most photos have no pose: what they show of the mannequin is not in the scan."""
+    """Return what to repair first where most photos have no pose, for the scan then lacks what they show."""
     lost, placed = len(cameras.unregistered), len(cameras.names)
     if lost <= placed:
         return ""
