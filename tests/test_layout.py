@@ -8,7 +8,8 @@ import pickle
 import re
 import statistics
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Set
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -19,6 +20,14 @@ from vto_pipeline.stages.entry.planning import catalogue, planned
 
 ROOT = Path(__file__).parents[1]
 MODULES = sorted((ROOT / "vto_pipeline").rglob("*.py"))
+
+
+def dotted(path: Path) -> str:
+    """Name of a module as it is imported."""
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+
+
+NAMES = frozenset(map(dotted, MODULES))
 FOLDERS = sorted({path.parent for path in MODULES})
 CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
 FAMILY = [kind for _, kind in inspect.getmembers(errors, inspect.isclass) if kind.__module__ == errors.__name__]
@@ -49,7 +58,7 @@ def test_test_files_have_names_of_their_own():
 
 
 def test_no_circle_of_imports():
-    imports = {dotted(path): set(imported(path)) for path in MODULES}
+    imports = {dotted(path): imported(path) for path in MODULES}
     assert circle(imports) is None
 
 
@@ -69,22 +78,19 @@ def test_a_circle_would_be_seen():
     assert set(circle({"a": {"b"}, "b": {"c"}, "c": {"a"}})) == {"a", "b", "c"}
 
 
-def dotted(path: Path) -> str:
-    """Name of a module as it is imported."""
-    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
-
-
-def imported(path: Path) -> Iterator[str]:
-    """Yield the modules of the package that a file imports, at its top or inside a function."""
-    known = {dotted(other) for other in MODULES}
+@cache
+def imported(path: Path) -> frozenset[str]:
+    """Return the modules of the package that a file imports, at its top or inside a function."""
+    found: set[str] = set()
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.ImportFrom) and node.module:
             for alias in node.names:
                 full = f"{node.module}.{alias.name}"
-                yield from {full if full in known else node.module} & known - {dotted(path)}
+                found.add(full if full in NAMES else node.module)
+    return frozenset(found & NAMES - {dotted(path)})
 
 
-def circle(imports: Mapping[str, set[str]]) -> list[str] | None:
+def circle(imports: Mapping[str, Set[str]]) -> list[str] | None:
     """Return a circle of a graph, or None."""
     try:
         TopologicalSorter(imports).prepare()

@@ -121,6 +121,7 @@ def test_leaving_nothing_out_changes_nothing():
     assert_allclose(whole.mesh.vertices, plain.mesh.vertices, rtol=0, atol=1e-4)  # the promise: 0.1 mm
 
 
+@pytest.mark.slow
 def test_what_the_search_for_self_contacts_saved_is_told_and_nothing_when_all_is_forced(monkeypatch):
     monkeypatch.setattr(time, "perf_counter", partial(next, itertools.count()))  # no clock is too coarse to tell
     quick, plain, whole = {**QUICK, "settle_seconds": 0.3}, Job(), Job(force_all=True)

@@ -108,6 +108,7 @@ def test_a_thin_body_stays_within_the_full_one():
     assert outside.max() < 1e-9
 
 
+@pytest.mark.slow
 def test_what_is_too_small_for_arms_to_find_its_sleeves_starts_larger():
     """Three quarters of its size: arms go through the cloth wherever it is led, and do not once it is 20 % larger."""
     body, made = figure(0.9), tunic(0.3)

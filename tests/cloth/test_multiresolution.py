@@ -99,7 +99,7 @@ def test_a_garment_that_cannot_be_made_coarser_is_draped_as_it_is(monkeypatch):
     assert "remeshing broke the surface" in dict(job.left_out)["coming to rest on a coarser mesh first"]
 
 
-@pytest.mark.parametrize("garment", [vest(), double_vest()])
+@pytest.mark.parametrize("garment", [vest(), pytest.param(double_vest(), marks=pytest.mark.slow)])
 def test_what_edges_cut_on_a_coarse_mesh_is_cleared_there_or_on_a_finer_one(garment):
     """How many meshes are given up is a matter of rounding."""
     job = Job()

@@ -27,6 +27,7 @@ FINE = PlaceConfig(cube_mm=10)
 Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 DOWN = np.diag([-1.0, -1.0, 1.0])
 AROUND = np.diag([-1.0, 1.0, -1.0])
+SLOW = pytest.mark.slow  # the same on more garments and bodies
 
 
 def spool():
@@ -154,7 +155,11 @@ def test_quarter_turns_are_the_rotations_of_a_cube_and_cubes_turn_like_meshes():
 @pytest.mark.skipif(not DATA.exists(), reason="the data folder is absent")
 @pytest.mark.parametrize(
     ("name", "sex"),
-    [("blouse-short", "female"), ("blouse-short", "male"), ("vest", "male"), ("skirt", "male"), ("pants", "female")],
+    [
+        ("blouse-short", "female"),
+        ("pants", "female"),
+        *(pytest.param(name, "male", marks=SLOW) for name in ("blouse-short", "vest", "skirt")),
+    ],
 )
 def test_a_garment_that_fits_better_upside_down_is_not_put_on_so(name, sex):
     """Tight in the chest, a blouse is filled better by the hips, its sleeves beside them. z is up in the files."""
@@ -205,7 +210,7 @@ def test_a_loose_skirt_is_not_put_on_upside_down_though_the_body_fills_it_better
 @pytest.mark.real_data
 @pytest.mark.skipif(not DATA.exists(), reason="the data folder is absent")
 @pytest.mark.parametrize("name", ["tshirt", "blouse-short", "tank-male", "vest", "skirt", "pants"])
-@pytest.mark.parametrize("sex", ["female", "male"])
+@pytest.mark.parametrize("sex", ["female", pytest.param("male", marks=SLOW)])
 def test_necklines_are_deeper_in_front(name, sex):
     """The files have z up, and the front at -y: there the necks of their tops are lower."""
     garment = read_mesh(DATA / "garments" / "berkeley" / name / f"{name}-iso.obj")
@@ -239,8 +244,10 @@ def test_a_tunic_back_to_front_is_turned_for_its_neckline():
 
 @pytest.mark.real_data
 @pytest.mark.skipif(not DATA.exists(), reason="the data folder is absent")
-@pytest.mark.parametrize("sex", ["female", "male"])
-@pytest.mark.parametrize("name", ["tshirt", "blouse-short", "tank-male", "dress3"])
+@pytest.mark.parametrize("sex", ["female", pytest.param("male", marks=SLOW)])
+@pytest.mark.parametrize(
+    "name", ["tshirt", *(pytest.param(one, marks=SLOW) for one in ("blouse-short", "tank-male", "dress3"))]
+)
 def test_real_garments_back_to_front_are_turned_for_their_necklines(name, sex):
     garment = read_mesh(DATA / "garments" / "berkeley" / name / f"{name}-iso.obj")
     person = read_mesh(DATA / "bodies" / f"mh_{sex}_averageweight.ply")
@@ -253,8 +260,11 @@ def test_real_garments_back_to_front_are_turned_for_their_necklines(name, sex):
 
 @pytest.mark.real_data
 @pytest.mark.skipif(not DATA.exists(), reason="the data folder is absent")
-@pytest.mark.parametrize("body", ["female_averageweight", "female_maxweight", "male_averageweight"])
-@pytest.mark.parametrize("name", ["tshirt.ply", "berkeley/dress2/dress2-iso.obj"])
+@pytest.mark.parametrize(
+    "body",
+    ["female_averageweight", *(pytest.param(one, marks=SLOW) for one in ("female_maxweight", "male_averageweight"))],
+)
+@pytest.mark.parametrize("name", ["tshirt.ply", pytest.param("berkeley/dress2/dress2-iso.obj", marks=SLOW)])
 def test_hips_fill_a_real_garment_on_its_head_as_well_but_its_sleeves_tell(name, body):
     person, garment = read_mesh(DATA / "bodies" / f"mh_{body}.ply"), read_mesh(DATA / "garments" / name)
     worn = find_placement(garment, person, PlaceConfig(), Job()).start_positions(garment.vertices)
@@ -264,7 +274,9 @@ def test_hips_fill_a_real_garment_on_its_head_as_well_but_its_sleeves_tell(name,
 
 @pytest.mark.real_data
 @pytest.mark.skipif(not DATA.exists(), reason="the data folder is absent")
-@pytest.mark.parametrize("name", ["tshirt", "blouse-short", "vest", "tank-male", "dress3"])
+@pytest.mark.parametrize(
+    "name", ["blouse-short", *(pytest.param(one, marks=SLOW) for one in ("tshirt", "vest", "tank-male", "dress3"))]
+)
 def test_necklines_go_about_the_nape(name):
     """Which is at 0.865 of the stature (ANSUR II). Hips fill a tight blouse better than the chest, its neck at the
     waist."""
@@ -282,7 +294,8 @@ def test_necklines_go_about_the_nape(name):
 @pytest.mark.real_data
 @pytest.mark.skipif(not DATA.exists(), reason="the data folder is absent")
 @pytest.mark.parametrize(
-    ("sex", "stature", "chest", "hip"), [("male", 1.82, 1.18, 1.16), ("female", 1.642, 0.929, 1.099)]
+    ("sex", "stature", "chest", "hip"),
+    [pytest.param("male", 1.82, 1.18, 1.16, marks=SLOW), ("female", 1.642, 0.929, 1.099)],
 )
 def test_a_skirt_too_small_for_the_hips_is_not_put_about_the_neck(sex, stature, chest, hip):
     """Heads fill it better. Waists are at 0.6 of the stature (ANSUR II: omphalion)."""

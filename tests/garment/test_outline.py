@@ -150,8 +150,13 @@ def test_photos_of_another_form_are_refused(scene, worn, tmp_path):
     larger = np.array([1.1, 1.25, 1.5])
     other, shirt, scan = (replace(mesh, vertices=mesh.vertices * larger) for mesh in (scene.form, scene.shirt, worn))
     surface, photos = in_scan_frame(scan, photographs(tmp_path, other, shirt), tmp_path)
-    with pytest.raises(GarmentError, match="outline"):
-        align_to_mannequin(surface, scene.form, QUICK, Job(), photos)
+    placed, names = photos.cameras, [f"lost{k}.png" for k in range(len(photos.paths) + 1)]
+    for lost, told in ((names[1:], False), (names, True)):
+        some = replace(photos, cameras=replace(placed, unregistered=tuple(lost)))
+        with pytest.raises(GarmentError, match="outline") as caught:
+            align_to_mannequin(surface, scene.form, QUICK, Job(), some)
+        first = f"{len(names)} of {2 * len(names) - 1} photos could not be placed"
+        assert caught.value.hint.startswith(first) is told
 
 
 def test_a_form_that_is_round_is_refused(tmp_path):

@@ -25,9 +25,7 @@ from vto_pipeline.garment.unsewn.trace import trace
 from vto_pipeline.geometry.topology import boundary_loops, face_area_vectors, half_edges
 from vto_pipeline.io.meshes import read_mesh
 from vto_pipeline.io.patterns.panels_obj import write_panels_obj
-from vto_pipeline.io.patterns.read import read_pattern
 from vto_pipeline.io.patterns.seam_lines import read_seam_lines
-from vto_pipeline.io.patterns.write import write_pattern
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.numerics.plane_curves import at_shares
@@ -383,19 +381,3 @@ def test_garments_of_others_come_apart_into_their_panels(name):
     for one in errors:
         assert abs(one.area - one.worn) < 5e-3
         assert one.outline_mean < 3e-3
-
-
-def test_what_is_found_was_worn_and_files_keep_that(tmp_path):
-    """The middle of a cone stays where it was worn: corners of its flat panels stand higher than its rim."""
-    mesh = frustum(0.3, 0.17, 0.5)
-    found = recover(mesh, "auto", POPLIN, "cone", Job()).pattern
-    for suffix in (".json", ".svg", ".dxf"):
-        write_pattern(tmp_path / f"cone{suffix}", found)
-        read = read_pattern(tmp_path / f"cone{suffix}", job=Job())
-        assert read.worn
-        assert read.of_size(read.sizes[0]).worn
-    sewn = sew(found, SewConfig(edge_mm=20.0), Job())
-    heights = [np.ptp(m.vertices[:, 1]) for m in (mesh, in_shape(sewn, Job(), worn=True))]
-    tops = [in_shape(sewn, Job(), worn).vertices[:, 1].max() - mesh.vertices[:, 1].max() for worn in (True, False)]
-    assert abs(tops[0]) < 0.01 < tops[1]
-    assert heights[0] == pytest.approx(heights[1], rel=0.05)

@@ -206,7 +206,7 @@ def test_a_loop_that_allows_no_chord_is_refused():
         triangulate_loop(square, np.zeros((4, 3)), np.ones((4, 4), dtype=bool))
 
 
-@pytest.mark.parametrize("teeth", [3.0, 60.0])
+@pytest.mark.parametrize("teeth", [3.0, pytest.param(60.0, marks=pytest.mark.slow)])
 def test_a_ragged_flat_loop_of_thousands_of_points_is_covered_just_once(teeth):
     count, rng = 4000, np.random.default_rng(3)
     turn = np.linspace(0, 2 * np.pi, count, endpoint=False)

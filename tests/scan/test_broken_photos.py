@@ -152,7 +152,17 @@ def outcome(folder: Path) -> VtoError | None:
     return None
 
 
-@pytest.mark.parametrize("fault", [black, unrelated, truncated, smaller, sideways, duplicate], ids=lambda f: f.__name__)
+@pytest.mark.parametrize(
+    "fault",
+    [
+        black,
+        unrelated,
+        truncated,
+        smaller,
+        *(pytest.param(one, marks=pytest.mark.slow) for one in (sideways, duplicate)),
+    ],
+    ids=lambda f: f.__name__,
+)
 def test_every_other_photo_broken_ends_with_a_surface_or_a_reason(good, tmp_path, fault):
     random = np.random.default_rng(0)
     for k, data in enumerate(good):

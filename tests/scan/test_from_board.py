@@ -17,6 +17,7 @@ from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.scan.photos import sfm as sfm_module
 from vto_pipeline.scan.photos.board import board_corners, detect_board
+from vto_pipeline.scan.photos.matching import from_board as from_board_module
 from vto_pipeline.scan.photos.matching.board_poses import Placed, line_distance, place_photos
 from vto_pipeline.scan.photos.matching.features import SURE, FeatureConfig, detect, match
 from vto_pipeline.scan.photos.matching.from_board import map_from_board
@@ -157,6 +158,27 @@ def test_the_board_alone_places_photos(plain):
     assert job.metrics["board_placed"] == 10
 
 
+def test_points_are_as_far_off_as_the_placed_cameras_show_them(plain, tmp_path, monkeypatch):
+    """COLMAP goes nowhere from the board: the errors of points are those of the last adjustment, not of the start."""
+    shot, _, database, found = plain
+    copied = tmp_path / database.name
+    copied.write_bytes(database.read_bytes())
+    monkeypatch.setattr(from_board_module, "incremental", lambda *given, **named: [])
+    model = map_from_board(copied, shot.paths[0].parent, BOARD, found, Job())
+    off = []
+    for point in model.points3D.values():
+        shown = []
+        for element in point.track.elements:
+            image = model.images[element.image_id]
+            pose = np.vstack([image.cam_from_world().inverse().matrix(), [0.0, 0.0, 0.0, 1.0]])
+            focal, cx, cy, k1 = image.camera.params
+            lens = replace(LENS, fx=focal, fy=focal, cx=cx, cy=cy, k1=k1)
+            shown.append(project(point.xyz[None], pose, lens)[0] - image.point2D(element.point2D_idx).xy)
+        off.append(np.linalg.norm(shown, axis=1).mean())
+    assert len(off) > 40
+    assert_allclose([point.error for point in model.points3D.values()], off, rtol=0, atol=1e-9)
+
+
 def test_fewer_corners_than_features_would_be_asked_for_place_photos(plain, tmp_path):
     """Sixteen in each photo: as many features might agree by chance."""
     shot, poses, database, found = plain
@@ -242,6 +264,27 @@ def test_photos_that_features_do_not_place_are_placed_by_the_board(plain, monkey
     assert error.max() < 0.02
     assert cameras.world_from_cam.tobytes() == runs[1][0].world_from_cam.tobytes()
     assert cloud.points.tobytes() == runs[1][1].points.tobytes()
+
+
+@pytest.mark.parametrize("hidden", [2, 8])
+def test_photos_that_hardly_show_the_board_are_told_so(plain, monkeypatch, hidden):
+    """The advice for photos with too little texture is of no use where the board is what places them."""
+    shot, _, _, found = plain
+    monkeypatch.setattr(sfm_module, "map_photos", lambda *args: None)
+    every = [(ids[:3], pixels[:3]) if k < hidden else (ids, pixels) for k, (ids, pixels) in enumerate(found.values())]
+    monkeypatch.setattr(sfm_module, "detect_board", lambda *args: every)
+    job = Job()
+    if hidden == 8:
+        with pytest.raises(ScanError) as refused:
+            estimate_cameras(shot, SfmConfig(), job)
+        said = refused.value.hint
+    else:
+        cameras, _ = estimate_cameras(shot, SfmConfig(), job)
+        assert set(cameras.unregistered) <= {path.name for path in shot.paths[:hidden]}  # features may tie one of them
+        assert cameras.unregistered
+        assert all("3 corners of the board" in why for why in job.metrics["left_out_photos"].values())
+        said = job.warnings[0]
+    assert f"{10 - hidden} of 10 photos show 6 or more corners of the board" in said
 
 
 def test_without_a_board_or_with_another_nothing_changes(plain, monkeypatch):

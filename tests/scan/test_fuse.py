@@ -185,6 +185,7 @@ def test_voxels_grow_until_the_scene_fits_in_memory(true_maps, true_cameras, sho
     assert np.median(error) < 1e-3 * job.metrics["voxel_mm"]
 
 
+@pytest.mark.slow
 def test_what_fits_no_memory_is_refused_with_the_voxel_that_fits(true_maps, true_cameras, shot, monkeypatch):
     """The peak of the process is held against the stated bound; a budget only ever refuses, and changes no bit."""
 

@@ -126,6 +126,7 @@ def test_corners_on_one_line_fix_no_floor(sparse, shot, true_cameras, monkeypatc
     assert "one line" in job.warnings[0]
 
 
+@pytest.mark.slow
 def test_a_faint_print_is_placed_by_fainter_features_where_the_usual_ones_place_few(tmp_path):
     """A moving camera, a plain floor, and a quarter of the usual contrast: some 70 features a photo, and no pair.
 

@@ -133,6 +133,7 @@ def standing(tmp_path_factory: pytest.TempPathFactory) -> tuple[PhotoSet, Camera
     )
 
 
+@pytest.mark.slow
 def test_photos_become_metric_by_a_stature(standing) -> None:
     job = Job()
     cameras, cloud = apply_scale(*standing, ScaleConfig(stature=HEIGHT), job)

@@ -53,6 +53,7 @@ def test_depth_agrees_with_the_ray_cast_truth(maps, shot, scene):
     assert 0.5 < job.metrics["consistent_share"] <= 1
 
 
+@pytest.mark.slow
 def test_photos_that_were_exposed_differently_cover_as_much(maps, shot, true_cameras, sparse, tmp_path):
     for index, path in enumerate(shot[0].paths):
         picture = cv2.imread(str(path))
@@ -75,6 +76,7 @@ def test_same_bits_on_one_core_and_on_all_in_the_stated_memory(maps, shot, true_
     assert 0.3e6 * job.metrics["memory_bound_mb"] < peak < 1e6 * job.metrics["memory_bound_mb"]
 
 
+@pytest.mark.slow
 def test_less_memory_matches_fewer_pairs_at_a_time_with_the_same_bits(maps, shot, true_cameras, sparse, monkeypatch):
     monkeypatch.setattr(os, "cpu_count", lambda: 4)
     pair = PAIR_BYTES * true_cameras.intrinsics[0].width * true_cameras.intrinsics[0].height

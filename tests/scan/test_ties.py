@@ -68,7 +68,7 @@ def test_no_sighting_ties_nothing():
     assert not tied_together(np.zeros(0, int), np.zeros(0, int), 3).any()
 
 
-@pytest.mark.parametrize("contrast", [0.25, 1.0])
+@pytest.mark.parametrize("contrast", [pytest.param(0.25, marks=pytest.mark.slow), 1.0])
 def test_photos_too_far_apart_are_right_or_refused(tmp_path, contrast):
     """Twelve photos 30 degrees apart. By 13 points, or by one photo, cameras were 0.6 m and 9 m off, at 0.3 px."""
     poses, lens = orbit(12, elevations_deg=(15.0,)), Intrinsics(480, 360, 528.0, 528.0, 239.5, 179.5)

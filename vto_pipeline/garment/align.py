@@ -102,7 +102,8 @@ def align_to_mannequin(
     try:
         found = scan.on_bare_parts(config.enough_bare, tilted=True)
     except GarmentError as error:
-        raise GarmentError(f"{error.problem}; and {no_outline.problem}", hint=no_outline.hint) from None
+        problem = f"{error.problem}; and {no_outline.problem}"
+        raise GarmentError(problem, hint=_of_unplaced(photos.cameras) + no_outline.hint) from None
     job.warn(f"bare mannequin alone tells the placement, and photos do not confirm it: {no_outline.problem}")
     return found
 
@@ -244,6 +245,14 @@ def _accept(
             hint="leave more of the mannequin uncovered, on several sides",
         )
     return placed.mannequin_from_surface
+
+
+def _of_unplaced(cameras: CameraSet) -> str:
+    """Return what to repair first where most photos have no pose, for the scan then lacks what they show."""
+    lost, placed = len(cameras.unregistered), len(cameras.names)
+    if lost <= placed:
+        return ""
+    return f"{lost} of {lost + placed} photos could not be placed, as the warning says: repair that first. Else: "
 
 
 def _check_inside(share: float, config: AlignConfig) -> None:

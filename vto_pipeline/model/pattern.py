@@ -99,16 +99,23 @@ class Placement:
     Args:
         rotation: Shape (3, 3).
         translation: [m], shape (3,).
+        worn_at: Points of the panel, x and y, and where each was in space as the garment was worn [m], shape (W, 5);
+            None: unknown, or the panel is flat there.
     """
 
     rotation: FloatArray
     translation: FloatArray
+    worn_at: FloatArray | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rotation", freeze("rotation of a panel", self.rotation, (3, 3), "f8"))
         object.__setattr__(self, "translation", freeze("translation of a panel", self.translation, (3,), "f8"))
         if not np.allclose(self.rotation @ self.rotation.T, np.eye(3), rtol=0, atol=1e-6):
             raise InputError("rotation of a panel: the rows are not orthogonal unit vectors")
+        if self.worn_at is not None:
+            object.__setattr__(self, "worn_at", freeze("worn places of a panel", self.worn_at, (None, 5), "f8"))
+            if len(self.worn_at) == 0:
+                raise InputError("worn places of a panel: there are none")
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,8 @@
 A RUN is the drape of a sewing pattern, or of a garment with panels. It is scanned, taken apart, and put on again:
 
 scan: from where it was scanned, at rest as the panels that were found say
-anew: those panels sewn and put on from the start
+anew: those panels sewn, and put on as their file says that they were worn
+flat: those panels sewn from a DXF file, which says where they stood, but nothing of how they were bent
 truth: the true garment put on from the start in other triangles, which tells what another mesh alone changes
 
 The bar is 3 mm on average between the surfaces. Each drape takes minutes.
@@ -34,7 +35,7 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
 _HEADS = ("garment", "way", "outcome", "at rest", "mean mm", "p95 mm", "area %", "CPU s", "passes", "said")
-_WAYS = ("scan", "anew", "truth")
+_WAYS = ("scan", "anew", "flat", "truth")
 _OTHER = 0.9  # of the edge length, where only the triangles are to differ
 
 
@@ -55,12 +56,14 @@ def rows(runs: list[Path], args: argparse.Namespace) -> Iterator[tuple[str, ...]
             yield (run.name, "", f"refused: {error.problem}", *[""] * 5, "NO", "")
             continue
         args.out.mkdir(parents=True, exist_ok=True)
-        write_pattern(args.out / f"{run.name}.json", found.pattern)
+        for suffix in (".json", ".dxf"):
+            write_pattern(args.out / f"{run.name}{suffix}", found.pattern)
         write_panels_obj(args.out / f"{run.name}_panels.obj", found.mesh)
         on = ["--body", given["body"], "--fabric", given["fabric"]]
         ways = {
             "scan": ["--garment", str(args.out / f"{run.name}_panels.obj"), "--source-body", given["body"]],
             "anew": ["--garment", str(args.out / f"{run.name}.json")],
+            "flat": ["--garment", str(args.out / f"{run.name}.dxf")],
             "truth": ["--garment", given["garment"]],
         }
         for way in args.ways:

@@ -39,16 +39,19 @@ def in_shape(sewn: Sewn, job: Job, worn: bool = False) -> TriangleMesh:
     """Return a sewn mesh bent so that hardly an edge is stretched.
 
     Args:
-        sewn: As it comes from the welding.
+        sewn: As it comes from the welding. What is where it was worn is bent as it was there, and stays.
         job: Measures what stretch is left.
         worn: Whether the panels stand where they were worn: then their middle stays where it is, and not their top.
     """
     placed = sewn.mesh.vertices
-    mesh = replace(sewn.mesh, vertices=_as_placed(embed(sewn.mesh, sewn.frames), placed, worn))
+    mesh = sewn.mesh
+    if not sewn.in_shape:
+        mesh = replace(mesh, vertices=_as_placed(embed(mesh, sewn.frames), placed, worn))
     assert mesh.texture is not None
     stretch = laid_edge_lengths(mesh, mesh.vertices[mesh.faces]) / laid_edge_lengths(mesh, mesh.texture) - 1.0
     low, high = np.percentile(stretch, [1, 99])
-    job.note(f"sewn and bent in space; at most places edges are stretched by {low:+.1%} to {high:+.1%}")
+    how = "sewn where it was worn" if sewn.in_shape else "sewn and bent in space"
+    job.note(f"{how}; at most places edges are stretched by {low:+.1%} to {high:+.1%}")
     job.measure(stretch_p01_share=float(low), stretch_p99_share=float(high))
     return mesh
 

@@ -14,6 +14,7 @@ from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.pattern.figures import seam_figures
 from vto_pipeline.garment.pattern.sampling import Samples, sample_edges
 from vto_pipeline.garment.pattern.triangulate import FlatPanel, triangulate_panel
+from vto_pipeline.garment.pattern.where import as_it_stands, as_worn
 from vto_pipeline.geometry.topology import edge_face_counts, face_components
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.job import Job
@@ -43,6 +44,7 @@ class Sewn:
         panel: Which each face belongs to, shape (F,).
         frames: Where the axes of each face's panel point as it is placed, orthonormal columns, shape (F, 3, 2).
         angle: The smallest of all triangles [rad].
+        in_shape: Whether it is where its cloth was worn; else its panels stand flat.
     """
 
     mesh: TriangleMesh
@@ -50,6 +52,7 @@ class Sewn:
     panel: IntArray
     frames: FloatArray
     angle: float
+    in_shape: bool = False
 
 
 def sew(pattern: Pattern, config: SewConfig, job: Job) -> Sewn:
@@ -98,7 +101,10 @@ def _welded(panels: Sequence[Panel], flat: Sequence[FlatPanel], samples: Samples
     links = np.array([[vertex(a), vertex(b)] for a, b in samples.links], dtype=np.int64).reshape(-1, 2)
     graph = coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(start[-1], start[-1]))
     count, welded = connected_components(graph, directed=False)
-    placed = np.concatenate([_in_space(panel, one) for panel, one in zip(panels, flat, strict=True)])
+    places = [panel.placement for panel in panels if panel.placement is not None]
+    worn = all(place.worn_at is not None for place in places)
+    where = as_worn if worn else as_it_stands
+    placed = np.concatenate([where(place, one.points) for place, one in zip(places, flat, strict=True)])
     sums = np.stack([np.bincount(welded, placed[:, k], count) for k in range(3)], axis=1)
     vertices = np.asarray(sums / np.bincount(welded, minlength=count)[:, None], dtype=np.float64)
     faces = welded[np.concatenate([one.faces + k for one, k in zip(flat, start, strict=False)])].astype(np.int32)
@@ -109,8 +115,8 @@ def _welded(panels: Sequence[Panel], flat: Sequence[FlatPanel], samples: Samples
     mesh = TriangleMesh(vertices, faces, texture=laid)
     if (edge_face_counts(mesh)[1] > 2).any():
         raise GarmentError("the seams join more than two panels along one line", hint="sew layers one by one")
-    frames = np.stack([panel.placement.rotation[:, :2] for panel in panels if panel.placement is not None])
-    return Sewn(mesh, names, owner, frames[owner], float(min(one.angles.min() for one in flat)))
+    frames = np.stack([place.rotation[:, :2] for place in places])
+    return Sewn(mesh, names, owner, frames[owner], float(min(one.angles.min() for one in flat)), worn)
 
 
 def _side_by_side(panels: Sequence[Panel], flat: Sequence[FlatPanel]) -> list[FloatArray]:
@@ -140,8 +146,3 @@ def _check_surface(faces: IntArray, owner: IntArray, names: tuple[str, ...]) -> 
         name = names[owner[first[np.flatnonzero(counts > 1)[0]] // 3]]
         problem = f"panel {name!r} is sewn with its right side to a wrong side, or to two others"
         raise GarmentError(problem, hint="such seams cannot be sewn yet")
-
-
-def _in_space(panel: Panel, flat: FlatPanel) -> FloatArray:
-    assert panel.placement is not None
-    return np.asarray(flat.points @ panel.placement.rotation[:, :2].T + panel.placement.translation)

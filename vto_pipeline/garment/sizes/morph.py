@@ -52,6 +52,7 @@ def moved_panel(panel: Panel, moves: FloatArray, size: str) -> Panel:
         lines=tuple(InnerLine(one.kind, tuple(inside.moved(e) for e in one.curves)) for one in panel.lines),
         drills=None if panel.drills is None else panel.drills + inside.moves(panel.drills),
         cut=tuple(inside.moved_beside(e) for e in panel.cut),
+        placement=panel.placement and replace(panel.placement, worn_at=None),  # that size was not worn
     )
 
 

@@ -21,6 +21,8 @@ from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.pattern import Edge, Panel, Pattern, Placement, Side, Stitch
 
 _APART_M = 0.05  # between panels laid side by side
+_KEPT_M = 0.015  # of a panel, inside its outline: squares of which one point is kept with where it was worn
+_ROUNDED = 4  # digits after the point of those, a tenth of a millimetre
 _MUCH = 0.05  # stretch left in a twentieth of a panel that a dart or another seam would take out
 
 
@@ -119,15 +121,19 @@ def _panel(name: str, piece: Piece, flat: FloatArray, own: Sequence[Run], noise:
         for run in own
     ]
     grain = flat.mean(axis=0) + 0.25 * np.ptp(flat[:, 1]) * np.array([[0.0, -1.0], [0.0, 1.0]])
-    return Panel(name, tuple(outline), grain=grain, placement=_placement(piece.mesh.vertices, flat))
+    return Panel(name, tuple(outline), grain=grain, placement=_placement(piece, flat))
 
 
-def _placement(space: FloatArray, flat: FloatArray) -> Placement:
-    """Return where a panel is nearest to the piece it came from."""
+def _placement(piece: Piece, flat: FloatArray) -> Placement:
+    """Return where a panel is nearest to the piece it came from, and where points of it were: its folds in short."""
+    space = piece.mesh.vertices
     upright = np.column_stack([flat, np.zeros(len(flat))])
     turn, _ = Rotation.align_vectors(space - space.mean(axis=0), upright - upright.mean(axis=0))
     rotation = turn.as_matrix()
-    return Placement(rotation, space.mean(axis=0) - rotation @ upright.mean(axis=0))
+    inside = np.unique(np.floor(flat / _KEPT_M), axis=0, return_index=True)[1]
+    kept = np.union1d(piece.start, inside)
+    worn_at = np.round(np.column_stack([flat, space])[kept], _ROUNDED)
+    return Placement(rotation, space.mean(axis=0) - rotation @ upright.mean(axis=0), worn_at)
 
 
 def _stitches(found: Sequence[Run], names: Sequence[str]) -> tuple[Stitch, ...]:

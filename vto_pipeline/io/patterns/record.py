@@ -55,6 +55,7 @@ class _LineRecord(_Record):
 class _PlacementRecord(_Record):
     rotation: tuple[Vector, Vector, Vector]
     translation: Vector
+    worn_at: list[tuple[float, float, float, float, float]] | None = None
 
 
 class _PanelRecord(_Record):
@@ -163,7 +164,11 @@ def _panel_record(panel: Panel) -> dict[str, Any]:
         "drills": _list(panel.drills) or [],
         "placement": None
         if placement is None
-        else {"rotation": placement.rotation.tolist(), "translation": placement.translation.tolist()},
+        else {
+            "rotation": placement.rotation.tolist(),
+            "translation": placement.translation.tolist(),
+            "worn_at": _list(placement.worn_at),
+        },
         "notes": list(panel.notes),
     }
 
@@ -191,6 +196,11 @@ def _panel(record: _PanelRecord) -> Panel:
         tuple(InnerLine(line.kind, _edges(line.curves)) for line in record.lines),
         np.asarray(record.drills) if record.drills else None,
         _edges(record.cut),
-        None if placed is None else Placement(np.asarray(placed.rotation), np.asarray(placed.translation)),
+        None if placed is None else _placement(placed),
         tuple(record.notes),
     )
+
+
+def _placement(record: _PlacementRecord) -> Placement:
+    worn_at = None if record.worn_at is None else np.asarray(record.worn_at).reshape(-1, 5)
+    return Placement(np.asarray(record.rotation), np.asarray(record.translation), worn_at)

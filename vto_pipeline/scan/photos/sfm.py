@@ -20,6 +20,7 @@ from vto_pipeline.model.mesh import PointCloud
 from vto_pipeline.model.settings import Config
 from vto_pipeline.scan.photos.board import detect_board
 from vto_pipeline.scan.photos.matching.adjust import adjust
+from vto_pipeline.scan.photos.matching.board_poses import LEAST_CORNERS
 from vto_pipeline.scan.photos.matching.certainty import uncertainty_px
 from vto_pipeline.scan.photos.matching.features import FAINT, SURE, FeatureConfig, detect, match
 from vto_pipeline.scan.photos.matching.from_board import map_from_board
@@ -100,7 +101,7 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
         each = ", ".join(f"{name} {count}" for name, count in zip(names, counts, strict=True))
         few = f"fewer than {MIN_PHOTOS} of {len(names)} photos could be placed and tied together by {LEAST_TIES} points"
         problem = f"{few} ({pairs} pairs match); features per photo: {each}"
-        raise ScanError(problem, where=str(photos.paths[0].parent), hint=ADVICE)
+        raise ScanError(problem, where=str(photos.paths[0].parent), hint=f"{ADVICE}{_of_board(tried)}")
     if config.refined:
         model = adjust(model, photos, job)
     else:
@@ -110,10 +111,11 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
     cloud = _without_surroundings(cameras, cloud, job)
     if cameras.unregistered:
         why = f"could not be placed, or fewer than {LEAST_TIES} points tie it to the others"
-        reasons = {name: f"{why} ({counts[names.index(name)]} features)" for name in cameras.unregistered}
+        reasons = {name: f"{why} ({_shown(tried, names.index(name))})" for name in cameras.unregistered}
         job.measure(left_out_photos=reasons)
-        lost = ", ".join(f"{name} ({counts[names.index(name)]} features)" for name in cameras.unregistered)
-        job.warn(f"{len(cameras.unregistered)} of {len(names)} photos could not be placed: {lost}. {ADVICE}")
+        lost = ", ".join(f"{name} ({_shown(tried, names.index(name))})" for name in cameras.unregistered)
+        unplaced = f"{len(cameras.unregistered)} of {len(names)} photos could not be placed: {lost}"
+        job.warn(f"{unplaced}. {ADVICE}{_of_board(tried)}")
     job.measure(
         registered=len(cameras.names),
         photos=len(names),
@@ -133,12 +135,14 @@ class _Tried(NamedTuple):
         features: Per photo.
         pairs: That match.
         by_board: Whether the board placed them.
+        corners: Of the board, per photo; empty where it was not looked for.
     """
 
     model: Any | None
     features: list[int]
     pairs: int
     by_board: bool
+    corners: list[int]
 
     @property
     def placed(self) -> int:
@@ -149,13 +153,29 @@ class _Tried(NamedTuple):
 def _placed(photos: PhotoSet, database: Path, features: list[int], pairs: int, job: Job) -> _Tried:
     """Place photos by their features, or by the board if these place few and it places more."""
     folder, names = photos.paths[0].parent, tuple(path.name for path in photos.paths)
-    tried = _Tried(map_photos(database, folder, len(names), job), features, pairs, by_board=False)
+    tried = _Tried(map_photos(database, folder, len(names), job), features, pairs, False, [])
     if tried.placed >= FEW * len(names) or photos.board is None:
         return tried
     job.note(f"only {tried.placed} of {len(names)} photos could be placed by features: looking for the board")
     found = dict(zip(names, detect_board(photos, names, job), strict=True))
-    by_board = _Tried(map_from_board(database, folder, photos.board, found, job), features, pairs, by_board=True)
-    return by_board if by_board.placed > tried.placed else tried
+    corners = [len(found[name][0]) for name in names]
+    by_board = _Tried(map_from_board(database, folder, photos.board, found, job), features, pairs, True, corners)
+    return by_board if by_board.placed > tried.placed else tried._replace(corners=corners)
+
+
+def _shown(tried: _Tried, index: int) -> str:
+    """Return what a photo showed that could have placed it."""
+    shown = f"{tried.features[index]} features"
+    return f"{shown}, {tried.corners[index]} corners of the board" if tried.corners else shown
+
+
+def _of_board(tried: _Tried) -> str:
+    """Return how many photos show enough of the board, and what to do; nothing where all do or it was not sought."""
+    enough = sum(corners >= LEAST_CORNERS for corners in tried.corners)
+    if enough == len(tried.corners):
+        return ""
+    shown = f"{enough} of {len(tried.corners)} photos show {LEAST_CORNERS} or more corners of the board"
+    return f" {shown}: look down on it from higher up, lay it where nothing hides it, or print it as board.yaml says."
 
 
 def _beside_background(photos: PhotoSet, scratch: Path, config: SfmConfig, job: Job) -> _Tried | None:

@@ -73,7 +73,7 @@ def adjust(model: Any, photos: PhotoSet, job: Job) -> Any:
 
 
 def solve(model: Any, soft_px: float, bent: bool) -> float:
-    """Adjust a model's cameras and points to its sightings, in place, and return what is left of their errors.
+    """Adjust a model's cameras, points and their errors to its sightings, in place, and return what is left.
 
     Args:
         model: A pycolmap Reconstruction.
@@ -101,6 +101,7 @@ def solve(model: Any, soft_px: float, bent: bool) -> float:
     solved: Any = pycolmap.create_default_bundle_adjuster(options, gauge, model).solve()
     if not solved.is_solution_usable():
         raise ValueError(solved.brief_report())
+    model.update_point_3d_errors()  # COLMAP leaves those from before
     return float(solved.ceres_summary.final_cost)
 
 
@@ -159,7 +160,6 @@ def _adjust(model: Any, photos: PhotoSet, job: Job) -> tuple[Any, int]:
         solve(model, SOFT_PX, bent=False)
     for number in fresh:
         model.delete_point3D(number)
-    model.update_point_3d_errors()
     return model, len(fresh)
 
 
