@@ -8,15 +8,16 @@ that takes hundreds of cycles. A sparse Cholesky factorisation takes as long as 
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from vto_pipeline.model.arrays import FloatArray
-from vto_pipeline.numerics.linear.block_matrix import BlockMatrix
+from vto_pipeline.numerics.linear.block_matrix import BlockMatrix, row_times
 from vto_pipeline.numerics.linear.cholesky import Factor, allocate_factor, factorise
 from vto_pipeline.numerics.linear.conjugate_gradients import pcg
 from vto_pipeline.numerics.linear.elimination import Elimination, plan_elimination
 from vto_pipeline.numerics.linear.elimination_tree import dissection, with_links
-from vto_pipeline.numerics.linear.links import make_links
+from vto_pipeline.numerics.linear.links import apply_links, apply_links_transposed, make_links
 from vto_pipeline.numerics.linear.multigrid import Hierarchy, hierarchy, update_hierarchy
 from vto_pipeline.numerics.linear.substitution import solve
 
@@ -69,6 +70,10 @@ class LinearSystem:
         if len(vertices) > 0:
             self.levels = self._bare._replace(links=make_links(vertices, weights, self._bare.up, self._bare.rows[:2]))
         return self.levels.links.blocks
+
+    def parabola(self, right: FloatArray, x: FloatArray) -> float:
+        """Return ½ xᵀ A x - xᵀ right, shapes (N, 3)."""
+        return float(_parabola(self.levels.matrix, self.levels.links, right, x))
 
     @property
     def eliminates(self) -> bool:
@@ -136,3 +141,16 @@ class LinearSystem:
             self._foreseen = plan.flops
         self._plan, self._planned = plan, (vertices.copy(), used)
         return plan
+
+
+@njit(cache=True, error_model="numpy")
+def _parabola(matrix, links, right, x):
+    total = 0.0
+    apply_links(links, 0, x)
+    for i in range(len(x)):
+        a, b, c = row_times(matrix, i, x)
+        d, e, f = apply_links_transposed(links, i)
+        total += x[i, 0] * (0.5 * (a + d) - right[i, 0])
+        total += x[i, 1] * (0.5 * (b + e) - right[i, 1])
+        total += x[i, 2] * (0.5 * (c + f) - right[i, 2])
+    return total

@@ -15,7 +15,6 @@ from math import exp
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from vto_pipeline.cloth.collision.contacts import Contacts
 from vto_pipeline.cloth.collision.response.active_set import ActiveSet, active_set, add_pairs, no_contacts
@@ -42,9 +41,7 @@ from vto_pipeline.cloth.model.build import ClothModel, ClothState
 from vto_pipeline.cloth.model.internal_friction import copy_sliders, restore_sliders, slip, with_own_sliders
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.numerics.line_search import backtracking_shares
-from vto_pipeline.numerics.linear.block_matrix import BlockMatrix, row_times
-from vto_pipeline.numerics.linear.links import apply_links, apply_links_transposed
-from vto_pipeline.numerics.linear.multigrid import Hierarchy
+from vto_pipeline.numerics.linear.block_matrix import BlockMatrix
 
 _LEFT = 6.0  # 1/s: share of the forces at the begin of a step left by a linear solve, times h, so errors fall with h
 _OF_WEIGHT = 0.3  # share of the weight that counts as force where cloth is in balance
@@ -267,9 +264,8 @@ class Newton:
         if y is x:
             if not measured:  # in the cloth's own frame: speed is no force
                 self._whole = self._unbalanced(forces - (model.mass / (h * h))[:, None] * guess)
-            guess = _lower_of_two(
-                system.levels, forces, guess, guess + (~self._held)[:, None] * (h * h * model.gravity)
-            )
+            fallen = guess + (~self._held)[:, None] * (h * h * model.gravity)
+            guess = min(guess, fallen, key=lambda move: system.parabola(forces, move))
         elif self._sweeps > 1:  # who asks for more wants to get to the end
             self._whole = forces
         bare = matrix.blocks[matrix.diagonal]
@@ -304,7 +300,7 @@ class Newton:
                 break
             extensions -= 1
             rounds = max(rounds, 1)
-        foreseen = -_quadratic(system.levels, right, move)
+        foreseen = -system.parabola(right, move)
         if self._lacks:
             foreseen -= 0.5 * float(np.vdot(move, self._lacking(y, h, move)))
         lost = self._dissipated(y, move, h, drag)
@@ -388,23 +384,3 @@ class Newton:
     def _inertia(self, y: FloatArray, target: FloatArray, h: float) -> float:
         off = y - target
         return float(0.5 / (h * h) * np.einsum("i,ij,ij->", self._model.mass, off, off))
-
-
-def _lower_of_two(levels: Hierarchy, right: FloatArray, one: FloatArray, other: FloatArray) -> FloatArray:
-    """Return that of two guesses at A d = right, shape (V, 3), with the smaller ½ dᵀ A d - dᵀ right."""
-    return one if _quadratic(levels, right, one) <= _quadratic(levels, right, other) else other
-
-
-@njit(cache=True, error_model="numpy")
-def _quadratic(levels, right, d):
-    """Return ½ dᵀ A d - dᵀ right."""
-    total = 0.0
-    apply_links(levels.links, 0, d)
-    for i in range(len(d)):
-        a, b, c = row_times(levels.matrix, i, d)
-        e, f, g = apply_links_transposed(levels.links, i)
-        a, b, c = a + e, b + f, c + g
-        total += d[i, 0] * (0.5 * a - right[i, 0])
-        total += d[i, 1] * (0.5 * b - right[i, 1])
-        total += d[i, 2] * (0.5 * c - right[i, 2])
-    return total
