@@ -12,6 +12,7 @@ from vto_pipeline.cloth.constraints import KINDS
 from vto_pipeline.cloth.constraints.sweep import (
     add_damping_forces,
     add_forces,
+    add_lacking,
     linearised,
     multipliers,
     prepare_all,
@@ -125,6 +126,10 @@ def test_exact_stiffness_is_the_slope_of_the_force(name, damped):
     x = crumpled(amount=0.02, seed=5)
     stiffness = Stiffness(model_of((data,), np.ones(len(x))))
     found = to_scipy(stiffness.assemble_exact(x, damping_factor=1.0)).toarray()
+    for column, way in enumerate(np.eye(x.size)):
+        lacking = np.zeros_like(x)
+        add_lacking(x, way.reshape(x.shape), (plain,), np.inf, lacking)
+        found[:, column] += lacking.ravel()
     expected = -slope(x, lambda y: forces(y, plain).ravel(), step=1e-7)
     expected += to_scipy(stiffness.assemble(x, stiffness_factor=0.0, damping_factor=1.0)).toarray()
     assert_allclose(found, expected, rtol=0, atol=2e-6 * np.abs(expected).max())  # step², rounding

@@ -115,10 +115,10 @@ def needles():
 
 @pytest.mark.parametrize(
     ("points", "faces", "least"),
-    [(*strip("grid", 0.0, 0.4, 0.3, 0.03), 0.2), (*strip("irregular", 0.0, 0.4, 0.3, 0.03), 0.3), (*needles(), 0.0)],
+    [(*strip("grid", 0.0, 0.4, 0.3, 0.03), 0.12), (*strip("irregular", 0.0, 0.4, 0.3, 0.03), 0.17), (*needles(), 0.0)],
     ids=["grid", "irregular", "needles"],
 )
-def test_no_direction_is_twice_as_stiff_as_what_stands_for_it(points, faces, least):
+def test_no_direction_is_stiffer_than_what_stands_for_it(points, faces, least):
     """Of a flat sheet, so that the stiffness is that out of plane: differences of the forces."""
     flat = np.column_stack([points, np.zeros(len(points))])
     data = hinge_moments(shape_operator(TriangleMesh(flat, faces), RestShape(flat), fabric(bending=1e-3)))
@@ -136,7 +136,7 @@ def test_no_direction_is_twice_as_stiff_as_what_stands_for_it(points, faces, lea
     rigid = np.column_stack([np.ones(count), points])
     bending = np.linalg.qr(rigid, mode="complete")[0][:, 3:]
     shares = eigh(bending.T @ exact @ bending, bending.T @ stand_in @ bending, eigvals_only=True)
-    assert least < shares.min() < shares.max() < 1.0 / 0.6 + 1e-3
+    assert least < shares.min() < shares.max() < 1.0 + 1e-3
 
 
 @pytest.mark.parametrize("edge", [0.05, 0.0055])  # the second has so many hinges that threads share them

@@ -22,6 +22,8 @@ from vto_pipeline.bench.timing import Timing, timed
 from vto_pipeline.cloth.constraints.sweep import add_forces, kind_of, multipliers, project
 from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
 from vto_pipeline.cloth.model.build import ClothModel, build_cloth
+from vto_pipeline.cloth.model.materials import Materials
+from vto_pipeline.cloth.model.settings import checked
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.mesh import TriangleMesh
@@ -29,6 +31,7 @@ from vto_pipeline.numerics.cpu_threads import limited_threads
 from vto_pipeline.numerics.linear.block_matrix import BlockMatrix, multiply
 
 _BENDING = 1e-5  # N·m, so that hinges take part
+_HINGES = checked(Materials, {"bending": "hinge"})
 _H = 1e-3  # s
 _CALL = 0.05  # s: shorter calls are repeated until they last this long
 _ARITHMETIC = re.compile(r"= f(?:add|sub|mul|div)\b|call [^\n]*@(?:llvm\.)?(?:sqrt|asin|acos|atan2|fma)")
@@ -141,11 +144,11 @@ def sheet_system(count: int, h: float) -> BlockMatrix:
 
 
 def sheet_cloth(count: int) -> tuple[ClothModel, FloatArray]:
-    """Return a sheet, and positions at which it is a little strained and bent."""
+    """Return a sheet, and positions at which it is a little strained and bent. Its hinges are those of every matrix."""
     across, along, faces = grid(count)
     flat = np.column_stack([across, along, np.zeros(len(along))])
     fabric = isotropic_sheet(STIFFNESS, bending=_BENDING)
-    model = build_cloth(TriangleMesh(flat, faces), RestShape(flat), fabric, pinned=(0,))
+    model = build_cloth(TriangleMesh(flat, faces), RestShape(flat), fabric, pinned=(0,), materials=_HINGES)
     wave = 0.02 * np.sin(9.0 * across) * np.cos(7.0 * along)
     return model, np.column_stack([1.001 * across, along, wave])
 

@@ -99,7 +99,8 @@ def shape_operator(
     vertices = _stencils(faces, opposite)
     compliance = _compliance(fabric, poisson)
     weights = _weights(corners, opposite, warp, weft, 0.5 * double_area, clamped, compliance)
-    kept = ~(sliver | clamped) & (weights != 0.0).any(axis=(1, 2))
+    resists = max(fabric.bending_warp, fabric.bending_weft) > 0.0
+    kept = ~(sliver | clamped) & (weights != 0.0).any(axis=(1, 2)) & resists
     vertices, weights, area = vertices[kept], weights[kept], 0.5 * double_area[kept]
     order, starts, colours = blocks(vertices, rest.positions)
     vertices, weights = np.ascontiguousarray(vertices[order]), np.ascontiguousarray(weights[order])
@@ -118,7 +119,8 @@ def rigidity(compliance: NDArray[np.float64]) -> NDArray[np.float64]:
 def _compliance(fabric: Fabric, poisson: float) -> NDArray[np.float64]:
     """Return D⁻¹ as (warp, weft, twist, warp-weft), so that a strip with free edges has the fabric's rigidity."""
     largest = max(fabric.bending_warp, fabric.bending_weft)
-    warp, weft = max(fabric.bending_warp, _SOFTEST * largest), max(fabric.bending_weft, _SOFTEST * largest)
+    least = _SOFTEST * largest if largest > 0.0 else 1.0  # of what does not resist, no triangle is kept
+    warp, weft = max(fabric.bending_warp, least), max(fabric.bending_weft, least)
     mean = np.sqrt(warp * weft)
     return np.array([1.0 / warp, 1.0 / weft, 2.0 * (1.0 + poisson) / mean, -poisson / mean])
 
