@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import tempfile
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -142,7 +143,7 @@ class _Tried(NamedTuple):
     features: list[int]
     pairs: int
     by_board: bool
-    corners: list[int]
+    corners: Sequence[int] = ()
 
     @property
     def placed(self) -> int:
@@ -153,7 +154,7 @@ class _Tried(NamedTuple):
 def _placed(photos: PhotoSet, database: Path, features: list[int], pairs: int, job: Job) -> _Tried:
     """Place photos by their features, or by the board if these place few and it places more."""
     folder, names = photos.paths[0].parent, tuple(path.name for path in photos.paths)
-    tried = _Tried(map_photos(database, folder, len(names), job), features, pairs, False, [])
+    tried = _Tried(map_photos(database, folder, len(names), job), features, pairs, by_board=False)
     if tried.placed >= FEW * len(names) or photos.board is None:
         return tried
     job.note(f"only {tried.placed} of {len(names)} photos could be placed by features: looking for the board")
