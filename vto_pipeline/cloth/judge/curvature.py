@@ -86,12 +86,12 @@ def _shares(laid: FloatArray, across: _Halves, around: _Halves, turning: _Halves
     tail = -head
 
     def apex(start: _Points, end: _Points, half: _Halves) -> _Points:
-        """Return the third corner of these faces, left of their edges, which run from start to end."""
+        """Return the third corner of these faces, left of their edges, which run from start to end, sewn to length."""
         first = 3 * (half // 3)
         edge, right, left = length[half], length[first + (half + 1) % 3], length[first + (half + 2) % 3]
         along = (edge**2 + left**2 - right**2) / (2.0 * edge)
         height = np.sqrt(np.maximum(left**2 - along**2, 0.0))
-        return np.asarray(start + (end - start) / abs(end - start) * (along + 1j * height))
+        return np.asarray(start + (end - start) * (along / edge + 1j * height / abs(end - start)))
 
     own, other = apex(tail, head, turning), apex(head, tail, across[turning])
     sides = [(tail, head, own), (head, own, tail), (own, tail, head), (tail, other, head), (other, head, tail)]

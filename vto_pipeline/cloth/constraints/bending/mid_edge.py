@@ -61,18 +61,20 @@ def slope_shares(triangles: NDArray[np.float64], beyond: NDArray[np.float64]) ->
 def _unfold(p: _Points, q: _Points, rest: _Points) -> _Points:
     """Return where the last corner of a triangle lies in the plane when its first edge runs from p to q, shape (N, 2).
 
+    Where the two sides of a seam differ in length, as where one is gathered, the corner keeps its height over the edge
+    and its share of the way along it.
+
     Args:
         p, q: Ends of the edge in the plane, the triangle to its left [m], shape (N, 2).
         rest: The triangle at rest [m], shape (N, 3, 3).
     """
     along = q - p
-    length = np.linalg.norm(along, axis=1)
     to_r, edge = rest[:, 2] - rest[:, 0], rest[:, 1] - rest[:, 0]
-    foot = np.einsum("ij,ij->i", to_r, edge) / length
-    height = np.linalg.norm(np.cross(edge, to_r), axis=1) / length
-    unit = along / length[:, None]
-    left = np.column_stack([-unit[:, 1], unit[:, 0]])
-    return p + foot[:, None] * unit + height[:, None] * left
+    squared = np.einsum("ij,ij->i", edge, edge)
+    foot = np.einsum("ij,ij->i", to_r, edge) / squared
+    height = np.linalg.norm(np.cross(edge, to_r), axis=1) / np.sqrt(squared)
+    left = np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
+    return p + foot[:, None] * along + height[:, None] * left
 
 
 def _values(point: _Points) -> _Points:
