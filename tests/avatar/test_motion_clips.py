@@ -9,6 +9,7 @@ import ipctk
 import numpy as np
 import pytest
 import trimesh
+from slow_cases import every
 
 from vto_pipeline.avatar.model.pose import pose_avatar
 from vto_pipeline.avatar.motion.align import carry_over
@@ -119,7 +120,7 @@ def test_limbs_point_where_the_file_puts_them(clip, man):
             np.testing.assert_allclose(unit[0], unit[1], rtol=0, atol=1e-4 if clip == "makehuman_tpose" else 1e-9)
 
 
-@pytest.mark.parametrize("clip", CLIPS)
+@pytest.mark.parametrize("clip", every(3, CLIPS))
 def test_the_way_into_a_recording_turns_no_joint_further_than_its_first_frame(clip):
     avatar, read = template(0.0), read_motion(REAL / f"{clip}.bvh")
     config = RetargetConfig(frames_per_second=30.0, lead_in_s=1.0)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 from numpy.typing import NDArray
+from slow_cases import every
 
 from vto_pipeline.avatar.from_measurements import fit_measurements
 from vto_pipeline.avatar.open_mesh import refuse_open_mesh
@@ -71,7 +72,7 @@ def test_a_garment_by_others_is_refused(name: str, openings: int) -> None:
 
 @pytest.mark.real_data
 @pytest.mark.skipif(not DATA.exists(), reason="the shared data are absent")
-@pytest.mark.parametrize("name", ["female_averageweight", "female_maxweight", "male_averageweight"])
+@pytest.mark.parametrize("name", every(3, ["female_averageweight", "female_maxweight", "male_averageweight"]))
 def test_a_body_by_others_with_holes_is_not(name: str) -> None:
     body = with_holes(read_mesh(DATA / "bodies" / f"mh_{name}.ply"), 12)
     assert wide_openings(body) >= CUFFS

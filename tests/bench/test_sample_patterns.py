@@ -10,6 +10,7 @@ import ipctk
 import numpy as np
 import pytest
 from ezdxf import recover
+from slow_cases import every
 
 from vto_pipeline.bench.drape.ipc_crossings import crossings
 from vto_pipeline.bench.drape.seam_gaps import seam_gaps
@@ -37,7 +38,7 @@ GATHERED = {"skirt": 0.06, "trousers": 0.06, "shirt": 0.2}  # shares that are ea
 
 
 @pytest.mark.parametrize("name", PATTERNS)
-@pytest.mark.parametrize("size", BODIES)
+@pytest.mark.parametrize("size", every(3, BODIES))
 def test_each_is_sewn_closed_and_starts_without_crossings(name, size):
     pattern = PATTERNS[name](BODIES[size])
     sewn = sew(pattern, SewConfig(edge_mm=30.0), Job())
@@ -53,7 +54,7 @@ def test_each_is_sewn_closed_and_starts_without_crossings(name, size):
     assert max(one.share for one in seam_figures(pattern)) == pytest.approx(GATHERED.get(name, 0.0), abs=0.02)
 
 
-@pytest.mark.parametrize("name", PATTERNS)
+@pytest.mark.parametrize("name", every(3, PATTERNS))
 def test_each_comes_back_from_its_files(name, tmp_path):
     pattern = PATTERNS[name](BODIES["tall"])
     for suffix in SUFFIXES:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from cloth_scenes import sheet
 from numpy.testing import assert_allclose
+from slow_cases import every
 
 from vto_pipeline.cloth.constraints.sweep import add_forces
 from vto_pipeline.cloth.dynamics.residual import elastic_energy
@@ -171,7 +172,7 @@ GARMENTS = sorted(DATA.glob("berkeley/*/*-iso.obj"))
 
 @pytest.mark.real_data
 @pytest.mark.skipif(not GARMENTS, reason="the garments are not part of the repository")
-@pytest.mark.parametrize("path", GARMENTS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", every(4, GARMENTS), ids=lambda path: path.stem)
 def test_real_panels(path):
     """The library has the panels as a second file; the worn mesh tells them by its texture coordinates alone."""
     given = read_mesh(path)

@@ -53,6 +53,7 @@ _ROUNDING = 1e-9  # relative change of the objective that is no change
 _CHANGED = 0.05  # of the contact forces: amiss by less, their set is good enough
 _FEW = 4.0  # contacts' mean force, amiss: with more, what lies on a fine mesh breaks loose in the next step
 _HARDLY = 0.4  # the same with the exact stiffness: a tight garment's contacts bear a hundred times its weight
+_IN_CIRCLES = 8  # rounds: with the exact stiffness, contacts that take more push and let go in turn
 _CROSSED = 0.01  # of an edge: how far a plane may be crossed without solving again
 
 
@@ -100,8 +101,8 @@ class Newton:
     Attributes:
         self_contact: What keeps the cloth from itself, if anything; may be set between runs.
         exact: Whether steps use the exact stiffness, and are only taken where their systems are positive definite with
-            it; may be set.
-        definite: Whether all systems of the last step were, with the exact stiffness.
+            it and their contacts come to an end; may be set.
+        definite: Whether all systems of the last step were and did, with the exact stiffness.
         active: The contacts of the last step, and the forces they bore.
         limits: Of a step; may be lowered where its time is short.
     """
@@ -135,7 +136,7 @@ class Newton:
         """Return the state after `substeps` steps of h [s]. The contacts hold for their whole span.
 
         Held vertices go on with the velocity they have. A step that would need the exact stiffness and has no system
-        that is positive definite is not taken, nor are those after it.
+        that is positive definite, or no end of its contacts, is not taken, nor are those after it.
 
         Raises:
             ConfigError: a constraint is rigid.
@@ -272,6 +273,7 @@ class Newton:
         good = _CHANGED
         move, pushes, changed = guess.copy(), (0.0, 0.0, 0.0), 0.0
         _, rounds, extensions = self.limits
+        rounds = min(rounds, _IN_CIRCLES) if self.definite else rounds
         while True:
             right = forces.copy()
             touches = len(self.active.key) > 0
@@ -300,6 +302,9 @@ class Newton:
                 break
             extensions -= 1
             rounds = max(rounds, 1)
+        if self.definite and changed >= good:
+            self.definite = False
+            return _Iteration(y, 0.0, 0.0, 0.0, np.inf)
         foreseen = -system.parabola(right, move)
         if self._lacks:
             foreseen -= 0.5 * float(np.vdot(move, self._lacking(y, h, move)))
