@@ -108,6 +108,15 @@ def test_within_a_percent_at_80_edges(kind, gamma, along):
     assert abs(tip_error(kind, 80, gamma, along)) < 0.01
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["grid", "irregular", "remeshed"])
+@pytest.mark.parametrize("gamma", [2.0, 20.0, 200.0])
+def test_errors_fall_at_least_with_the_edge(kind, gamma):
+    edges = [10, 20, 40, 80]
+    errors = [abs(tip_error(kind, count, gamma, "weft")) for count in edges]
+    assert -np.polyfit(np.log(edges), np.log(errors), 1)[0] > 1.0
+
+
 def needles():
     points, faces = strip("irregular", 0.0, 0.4, 0.3, 0.03)
     return points * [1.0, 0.2], faces
