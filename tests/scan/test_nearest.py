@@ -58,6 +58,36 @@ def test_one_of_two_alike_is_no_match():
     assert_array_equal(nearest_matches(second, first), [(k, k) for k in range(20, 50)])
 
 
+@pytest.mark.parametrize("order", [[0, 1], [1, 0]])
+def test_one_that_is_hardly_nearer_than_another_is_no_match_in_whatever_order(order):
+    first = descriptors(30, 7)
+    almost = np.rint(first + np.random.default_rng(8).normal(0, 3.0, first.shape)).clip(0, 255).astype(np.float32)
+    nearer = np.rint(first + np.random.default_rng(9).normal(0, 2.9, first.shape)).clip(0, 255).astype(np.float32)
+    second = np.stack([almost, nearer])[order].transpose(1, 0, 2).reshape(-1, 128)
+    assert len(nearest_matches(first, nearer)) == 30
+    every = np.ones((len(first), len(second)), bool)
+    assert_array_equal(nearest_matches(first, second), by_sorting(first, second, every))
+    assert_array_equal(nearest_matches(second, first), by_sorting(second, first, every.T))
+    assert len(nearest_matches(first, second)) < 25
+
+
+def test_only_what_is_near_by_sampson_is_compared():
+    """Lines of any slope and length, in both photos, so that about half of all are near."""
+    first, random = descriptors(300, 10), np.random.default_rng(11)
+    second, _ = seen_again(first, 0.9, 12)
+    line, back, ray = (random.normal(0, 1, (n, 3)) for n in (len(first), len(second), len(second)))
+    slope = (line[:, :2] ** 2).sum(axis=1)[:, None] + (back[:, :2] ** 2).sum(axis=1)
+    near = (line @ ray.T) ** 2 <= 0.4 * slope
+    assert 0.3 < near.mean() < 0.7
+    lines = Lines(line, back, ray, np.sqrt(0.4))
+    found = nearest_matches(first, second, lines)
+    assert_array_equal(found, by_sorting(first, second, near))
+    assert lines.hold(found).all()
+    every = nearest_matches(first, second)
+    assert_array_equal(lines.hold(every), near[every[:, 0], every[:, 1]])
+    assert 0.2 < lines.hold(every).mean() < 0.8
+
+
 def test_nothing_matches_nothing():
     some = descriptors(5, 4)
     assert nearest_matches(some[:0], some).shape == nearest_matches(some, some[:0]).shape == (0, 2)
