@@ -86,6 +86,30 @@ def place_photos(camera: Any, board: CharucoBoard, found: Sightings) -> dict[str
     return placed
 
 
+def beside_corners(camera: Any, pose: Placed, corners: FloatArray, margin: float, pixels: FloatArray) -> IntArray:
+    """Return which pixels (K, 2), COLMAP's way, a photo does not show among the board's corners, shape (M,).
+
+    Features of squares and markers are alike, and known several times worse than the corners.
+
+    Args:
+        camera: A pycolmap Camera.
+        pose: Where the photo was taken.
+        corners: That it shows, in the board's world [m], shape (N, 3).
+        margin: About the rectangle of these [m].
+        pixels: Of features.
+    """
+    if len(pixels) == 0:
+        return np.empty(0, np.int32)
+    way = np.column_stack([camera.cam_from_img(pixels), np.ones(len(pixels))]) @ pose.rotation
+    center = -pose.rotation.T @ pose.shift
+    down = way[:, 1] * np.sign(-center[1])
+    reach = np.abs(center[1]) / np.where(down > 0, down, np.inf)  # to the plane that the board lies in
+    there = center + reach[:, None] * way
+    low, high = corners.min(axis=0) - margin, corners.max(axis=0) + margin
+    inside = (down > 0) & ((there > low) & (there < high)).all(axis=1)
+    return np.flatnonzero(~inside).astype(np.int32)
+
+
 def epipolar_lines(
     one: Any, other: Any, first: Placed, second: Placed, here: FloatArray, there: FloatArray, most_px: float
 ) -> Lines:

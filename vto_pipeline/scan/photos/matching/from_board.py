@@ -20,11 +20,13 @@ from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.frames import CharucoBoard
 from vto_pipeline.model.job import Job
 from vto_pipeline.scan.library_message import COLMAP_ERRORS, library_message
+from vto_pipeline.scan.photos.board import board_corners
 from vto_pipeline.scan.photos.matching.adjust import solve
 from vto_pipeline.scan.photos.matching.board_poses import (
     LEAST_CORNERS,
     Placed,
     Sightings,
+    beside_corners,
     place_photos,
 )
 from vto_pipeline.scan.photos.matching.features import descriptors
@@ -94,7 +96,7 @@ def map_from_board(database: Path, folder: Path, board: CharucoBoard, found: Sig
                 return None
             described = descriptors(opened)
             entered = _enter(opened, images, found, placed)
-            _match_again(opened, described, entered, placed, job.seed)
+            _match_again(opened, described, board, found, entered, placed, job.seed)
             cache = pycolmap.DatabaseCache.create(opened, pycolmap.DatabaseCacheOptions())
         return _mapped(copied, folder, cache, entered, placed, job)
     except COLMAP_ERRORS as error:
@@ -122,7 +124,13 @@ def _enter(opened: Any, images: Mapping[str, Any], found: Sightings, placed: Map
 
 
 def _match_again(
-    opened: Any, described: Mapping[str, NDArray[np.uint8]], entered: _Entered, placed: Mapping[str, Placed], seed: int
+    opened: Any,
+    described: Mapping[str, NDArray[np.uint8]],
+    board: CharucoBoard,
+    found: Sightings,
+    entered: _Entered,
+    placed: Mapping[str, Placed],
+    seed: int,
 ) -> None:
     """Match by what is known of two photos: where both were, or else one geometry for most of their matches so far."""
     import pycolmap
@@ -131,7 +139,13 @@ def _match_again(
     options.ransac.random_seed, options.ransac.min_inlier_ratio = seed, MOST
     cameras = {image.name: opened.read_camera(image.camera_id) for image in opened.read_all_images()}
     pairs = list(combinations(sorted(entered.number, key=lambda name: entered.number[name]), 2))
-    guided = match_placed(pairs, cameras, described, entered.places, placed, AGREES_PX)
+    own = {name: entered.places[name][: len(described[name])] for name in placed}
+    world, margin = board_corners(board), 1.5 * board.square_m  # past the edge of the board, which is one square on
+    chosen = {
+        name: beside_corners(cameras[name], pose, world[found[name][0][pose.corners]], margin, own[name])
+        for name, pose in placed.items()
+    }
+    guided = match_placed(pairs, cameras, described, own, chosen, placed, AGREES_PX)
     opened.clear_two_view_geometries()
     for one, other in pairs:
         first, second = entered.number[one], entered.number[other]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.numerics.cpu_threads import in_order
 from vto_pipeline.scan.photos.matching.board_poses import Placed, epipolar_lines
 from vto_pipeline.scan.photos.matching.fixed_camera import Pair
@@ -30,6 +30,7 @@ def match_placed(
     cameras: Mapping[str, Any],
     described: Mapping[str, NDArray[np.uint8]],
     places: Mapping[str, FloatArray],
+    chosen: Mapping[str, IntArray],
     placed: Mapping[str, Placed],
     most_px: float,
 ) -> Matches:
@@ -39,7 +40,8 @@ def match_placed(
         pairs: Of photos; those that were not both placed, or look elsewhere, are left out.
         cameras: Photo -> pycolmap Camera.
         described: Photo -> its features' descriptors, shape (K, 128).
-        places: Photo -> their pixels, COLMAP's way, shape (K, 2); more may follow.
+        places: Photo -> their pixels, COLMAP's way, shape (K, 2).
+        chosen: Photo -> those to match, shape (N,).
         placed: Photo -> where it was taken.
         most_px: Sampson's distance (1982) that a match may have [px].
 
@@ -52,8 +54,8 @@ def match_placed(
 
     def look(index: int) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
         one, other = both[index]
-        here, there = (described[name].astype(np.float32) for name in (one, other))
-        pixels = places[one][: len(here)], places[other][: len(there)]
+        here, there = (described[name][chosen[name]].astype(np.float32) for name in (one, other))
+        pixels = places[one][chosen[one]], places[other][chosen[other]]
         lines = epipolar_lines(cameras[one], cameras[other], placed[one], placed[other], *pixels, most_px)
         nearest = nearest_matches(here, there)
         alike = ahead[one] @ ahead[other] > least
@@ -62,10 +64,14 @@ def match_placed(
 
     sure: Matches = {}
     along: Matches = {}
-    for pair, found in zip(both, in_order(look, len(both)), strict=True):
-        sure[pair], along[pair] = found
-    seconds = confirmed(along, {name: len(described[name]) for name in placed})
-    return {pair: np.unique(np.vstack([sure[pair], along[pair][seconds[pair]]]), axis=0) for pair in both}
+    for pair, (nearest, on_line) in zip(both, in_order(look, len(both)), strict=True):
+        sure[pair], along[pair] = nearest, on_line
+    seconds = confirmed(along, {name: len(chosen[name]) for name in placed})
+    found = {pair: np.unique(np.vstack([sure[pair], along[pair][seconds[pair]]]), axis=0) for pair in both}
+    return {
+        (one, other): np.column_stack([chosen[one][rows[:, 0]], chosen[other][rows[:, 1]]]).astype(np.uint32)
+        for (one, other), rows in found.items()
+    }
 
 
 def confirmed(matches: Mapping[Pair, NDArray[np.uint32]], count: Mapping[str, int]) -> dict[Pair, NDArray[np.bool_]]:
