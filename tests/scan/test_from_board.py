@@ -15,6 +15,7 @@ from vto_pipeline.errors import ScanError
 from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
+from vto_pipeline.numerics.srgb import encode_srgb
 from vto_pipeline.scan.photos import sfm as sfm_module
 from vto_pipeline.scan.photos.board import board_corners, detect_board
 from vto_pipeline.scan.photos.matching import from_board as from_board_module
@@ -363,3 +364,26 @@ def test_cameras_that_so_few_corners_leave_uncertain_are_refused(plain, monkeypa
     cameras, _ = estimate_cameras(shot, SfmConfig(max_camera_px=100.0), Job())
     placed = [k for k, path in enumerate(shot.paths) if path.name in cameras.names]
     assert centers_off(cameras.world_from_cam[:, :3, 3], poses[placed, :3, 3]).max() > 0.04
+
+
+@pytest.mark.parametrize("gain", [1.0, 2.0])
+def test_a_small_board_that_a_lens_blurs_and_light_outshines_is_found_where_it_is(tmp_path, gain):
+    """Blurred as light is, then encoded; at twice the exposure white is cut off. In levels, none of it can be read."""
+    fine, square = 12, 13.0
+    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, BOARD.dictionary))
+    pattern = cv2.aruco.CharucoBoard((BOARD.columns, BOARD.rows), BOARD.square_m, BOARD.marker_m, dictionary)
+    printed = pattern.generateImage((BOARD.columns * 100, BOARD.rows * 100))
+    turn, share = np.radians(10.0), square * fine / 100
+    along, across = share * np.cos(turn), share * np.sin(turn)
+    way = np.array([[along, -across, 900.0], [across, along, 500.0]])
+    shown = cv2.warpAffine(printed, way, (400 * fine, 300 * fine), flags=cv2.INTER_AREA, borderValue=255)
+    blurred = cv2.GaussianBlur(0.03 + 0.6 * shown / 255, (0, 0), 0.8 * fine)
+    taken = blurred.reshape(300, fine, 400, fine).mean(axis=(1, 3))
+    path = tmp_path / "a.png"
+    cv2.imwrite(str(path), encode_srgb(np.clip(gain * taken, 0, 1)))
+    ids, pixels = detect_board(PhotoSet((path, path), (LENS, LENS), BOARD), ("a.png",), Job())[0]
+    column, row = ids % (BOARD.columns - 1) + 1, ids // (BOARD.columns - 1) + 1
+    true = np.column_stack([100.0 * column, 100.0 * row]) @ way[:, :2].T + way[:, 2]
+    error = np.linalg.norm(pixels - ((true + 0.5) / fine - 0.5), axis=1)
+    assert len(ids) > 20  # of 48
+    assert np.median(error) < 0.3
