@@ -83,7 +83,9 @@ def _corners(detector: Any, gray: Any) -> tuple[IntArray, FloatArray]:
     scale = max(1.0, LONGER_SIDE / max(gray.shape))
     if scale > 1.0:
         gray = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
-    pixels, ids, _, _ = detector.detectBoard(np.rint(gray).clip(0, 255).astype(np.uint8))
+    if gray.dtype != np.uint8:
+        gray = np.rint(gray).clip(0, 255).astype(np.uint8)
+    pixels, ids, _, _ = detector.detectBoard(gray)
     if ids is None or pixels is None:
         return np.empty(0, np.int32), np.empty((0, 2))
     places = np.asarray(pixels, float).reshape(-1, 2)
