@@ -15,10 +15,11 @@ from vto_pipeline.errors import ScanError
 from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
+from vto_pipeline.numerics.srgb import encode_srgb
 from vto_pipeline.scan.photos import sfm as sfm_module
 from vto_pipeline.scan.photos.board import board_corners, detect_board
 from vto_pipeline.scan.photos.matching import from_board as from_board_module
-from vto_pipeline.scan.photos.matching.board_poses import Placed, line_distance, place_photos
+from vto_pipeline.scan.photos.matching.board_poses import Placed, epipolar_lines, place_photos
 from vto_pipeline.scan.photos.matching.features import SURE, FeatureConfig, detect, match
 from vto_pipeline.scan.photos.matching.from_board import map_from_board
 from vto_pipeline.scan.photos.sfm import SfmConfig, estimate_cameras, load_colmap
@@ -127,11 +128,17 @@ def test_distance_from_the_line_of_exact_matches_is_zero_and_of_shifted_ones_the
     first, second = (Placed(pose[:3, :3].T, -pose[:3, :3].T @ pose[:3, 3], np.ones(6, dtype=bool)) for pose in poses)
     here, there = (project(points, pose, lens) + 0.5 for pose in poses)
     camera = colmap_camera(lens)
-    assert line_distance(camera, camera, first, second, here, there).max() < 1e-6
+
+    def off(here, there):
+        lines = epipolar_lines(camera, camera, first, second, here, there, 5.28)
+        assert_allclose(lines.most, 0.01, rtol=1e-12, atol=0)
+        slope = np.sqrt((lines.line[:, :2] ** 2).sum(axis=1) + (lines.line_back[:, :2] ** 2).sum(axis=1))
+        return 528.0 * np.abs((lines.line * lines.ray).sum(axis=1)) / slope
+
+    assert off(here, there).max() < 1e-6
     up = there + np.array([0.0, 4.0])  # the cameras are beside each other: lines are all but level
-    shifted = line_distance(camera, camera, first, second, here, up)
-    assert_allclose(shifted, 4.0 / np.sqrt(2.0), rtol=0.1, atol=0)  # either point may give way
-    assert len(line_distance(camera, camera, first, second, here[:0], there[:0])) == 0
+    assert_allclose(off(here, up), 4.0 / np.sqrt(2.0), rtol=0.1, atol=0)  # either point may give way
+    assert len(off(here[:0], there[:0])) == 0
 
 
 @pytest.fixture(scope="module")
@@ -266,6 +273,37 @@ def test_photos_that_features_do_not_place_are_placed_by_the_board(plain, monkey
     assert cloud.points.tobytes() == runs[1][1].points.tobytes()
 
 
+def test_where_the_board_places_all_photos_features_are_sought_along_its_lines_only(shot, monkeypatch):
+    """They tie the photos on the print, too: 48 corners alone would leave them further off."""
+    taken, poses = shot
+    monkeypatch.setattr(sfm_module, "match", lambda *args, **named: pytest.fail("all features were matched"))
+    job = Job()
+    cameras, cloud = estimate_cameras(taken, SfmConfig(enough_features=20_000), job)
+    assert not cameras.unregistered
+    assert [what for what, _ in job.left_out] == ["matching the features of all photos"]
+    assert centers_off(cameras.world_from_cam[:, :3, 3], poses[:, :3, 3]).max() < 2e-3  # at 1 m
+    assert len(cloud.points) > 10 * len(board_corners(BOARD))
+
+
+@pytest.mark.parametrize(("least", "refused"), [(0.5, True), (0.3, False)])
+def test_where_most_photos_have_no_place_the_scan_ends_with_their_names(plain, monkeypatch, least, refused):
+    shot, _, _, found = plain
+    monkeypatch.setattr(sfm_module, "map_photos", lambda *args: None)
+    every = [(ids[:3], pixels[:3]) if k < 6 else (ids, pixels) for k, (ids, pixels) in enumerate(found.values())]
+    monkeypatch.setattr(sfm_module, "detect_board", lambda *args: every)
+    monkeypatch.setattr(sfm_module, "adjust", lambda model, *args: None if refused else model)
+    config = SfmConfig(min_placed=least, max_camera_px=100.0)
+    if not refused:
+        assert len(estimate_cameras(shot, config, Job())[0].names) == 4
+        return
+    with pytest.raises(ScanError, match="only 4 of 10 photos could be placed") as ended:
+        estimate_cameras(shot, config, Job())
+    named = [path.name for path in shot.paths if f"{path.name} (" in ended.value.problem]
+    assert named == [path.name for path in shot.paths[:6]]
+    assert "3 corners of the board" in ended.value.problem
+    assert "4 of 10 photos show 6 or more corners of the board" in ended.value.hint
+
+
 @pytest.mark.parametrize("hidden", [2, 8])
 def test_photos_that_hardly_show_the_board_are_told_so(plain, monkeypatch, hidden):
     """The advice for photos with too little texture is of no use where the board is what places them."""
@@ -308,7 +346,7 @@ def test_a_board_seen_at_a_slant_is_found_where_it_is(tmp_path):
 
 @pytest.mark.parametrize(("corners", "enough"), [(range(16), True), ([0, 1, 2, 8, 9, 10], False)])
 def test_cameras_that_so_few_corners_leave_uncertain_are_refused(plain, monkeypatch, corners, enough):
-    """Six corners of a far board's edge: photos then lie 70 mm from the truth, at 1 m."""
+    """Six corners of a far board's edge alone: photos then lie 70 mm from the truth, at 1 m."""
     shot, poses, _, found = plain
     monkeypatch.setattr(sfm_module, "map_photos", lambda *args: None)
     few = [(ids[np.isin(ids, corners)], pixels[np.isin(ids, corners)]) for ids, pixels in found.values()]
@@ -319,9 +357,33 @@ def test_cameras_that_so_few_corners_leave_uncertain_are_refused(plain, monkeypa
         assert centers_off(cameras.world_from_cam[:, :3, 3], poses[:, :3, 3]).max() < 0.02
         assert 0.5 < job.metrics["camera_uncertainty_px"] < 2.0
         return
+    monkeypatch.setattr(from_board_module, "match_placed", lambda *args: {})
     with pytest.raises(ScanError, match="the cameras are uncertain") as refused:
         estimate_cameras(shot, SfmConfig(), job)
     assert refused.value.hint == sfm_module.ADVICE
     cameras, _ = estimate_cameras(shot, SfmConfig(max_camera_px=100.0), Job())
     placed = [k for k, path in enumerate(shot.paths) if path.name in cameras.names]
     assert centers_off(cameras.world_from_cam[:, :3, 3], poses[placed, :3, 3]).max() > 0.04
+
+
+@pytest.mark.parametrize("gain", [1.0, 2.0])
+def test_a_small_board_that_a_lens_blurs_and_light_outshines_is_found_where_it_is(tmp_path, gain):
+    """Blurred as light is, then encoded; at twice the exposure white is cut off. In levels, none of it can be read."""
+    fine, square = 12, 13.0
+    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, BOARD.dictionary))
+    pattern = cv2.aruco.CharucoBoard((BOARD.columns, BOARD.rows), BOARD.square_m, BOARD.marker_m, dictionary)
+    printed = pattern.generateImage((BOARD.columns * 100, BOARD.rows * 100))
+    turn, share = np.radians(10.0), square * fine / 100
+    along, across = share * np.cos(turn), share * np.sin(turn)
+    way = np.array([[along, -across, 900.0], [across, along, 500.0]])
+    shown = cv2.warpAffine(printed, way, (400 * fine, 300 * fine), flags=cv2.INTER_AREA, borderValue=255)
+    blurred = cv2.GaussianBlur(0.03 + 0.6 * shown / 255, (0, 0), 0.8 * fine)
+    taken = blurred.reshape(300, fine, 400, fine).mean(axis=(1, 3))
+    path = tmp_path / "a.png"
+    cv2.imwrite(str(path), encode_srgb(np.clip(gain * taken, 0, 1)))
+    ids, pixels = detect_board(PhotoSet((path, path), (LENS, LENS), BOARD), ("a.png",), Job())[0]
+    column, row = ids % (BOARD.columns - 1) + 1, ids // (BOARD.columns - 1) + 1
+    true = np.column_stack([100.0 * column, 100.0 * row]) @ way[:, :2].T + way[:, 2]
+    error = np.linalg.norm(pixels - ((true + 0.5) / fine - 0.5), axis=1)
+    assert len(ids) > 20  # of 48
+    assert np.median(error) < 0.3

@@ -11,6 +11,7 @@ from vto_pipeline.io.captures.images import read_image
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.frames import CharucoBoard, PhotoSet
 from vto_pipeline.model.job import Job
+from vto_pipeline.numerics.srgb import decode_srgb
 from vto_pipeline.scan.library_message import library_message
 
 LONGER_SIDE = 2400
@@ -34,8 +35,9 @@ def board_corners(board: CharucoBoard) -> FloatArray:
 def detect_board(photos: PhotoSet, names: tuple[str, ...], job: Job) -> list[tuple[IntArray, FloatArray]]:
     """Detect the board's corners in the named photos.
 
-    One marker that is read tells where the others are (`tryRefineMarkers`), and beside one alone a corner counts: of a
-    board far off or at a slant, few can be read.
+    Looked for in light and in the levels that encode it; what shows more corners is kept. A lens blurs light: in
+    levels, bright cells outgrow dark ones. One marker that is read tells where the others are (`tryRefineMarkers`), and
+    beside one alone a corner counts: of a board far off or at a slant, few can be read.
 
     Args:
         photos: The photos and the board.
@@ -59,21 +61,32 @@ def detect_board(photos: PhotoSet, names: tuple[str, ...], job: Job) -> list[tup
     reading = cv2.aruco.CharucoParameters()
     reading.tryRefineMarkers, reading.minMarkers = True, 1
     detector = cv2.aruco.CharucoDetector(pattern, reading)
+    light = (255.0 * decode_srgb(np.arange(256, dtype=np.uint8))).astype(np.float32)
     paths = {path.name: path for path in photos.paths}
     found = []
     for name in names:
         try:
-            gray: Any = cv2.cvtColor(read_image(paths[name]), cv2.COLOR_RGB2GRAY)
-            scale = max(1.0, LONGER_SIDE / max(gray.shape))
-            if scale > 1.0:
-                gray = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
-            pixels, ids, _, _ = detector.detectBoard(gray)
+            levels = cv2.cvtColor(read_image(paths[name]), cv2.COLOR_RGB2GRAY)
+            shown = [_corners(detector, of) for of in (light[levels], levels)]
         except cv2.error as error:
             job.note(f"no board in {name}: {library_message(error)}")
             found.append((np.empty(0, np.int32), np.empty((0, 2))))
             continue
-        none = ids is None or pixels is None
-        identity = np.empty(0, np.int32) if none else np.asarray(ids, np.int32).ravel()
-        places = np.empty((0, 2)) if none else np.asarray(pixels, float).reshape(-1, 2)
-        found.append((identity, (places + 0.5) / scale - 0.5))
+        found.append(max(shown, key=lambda one: len(one[0])))
     return found
+
+
+def _corners(detector: Any, gray: Any) -> tuple[IntArray, FloatArray]:
+    """Return ids (K,) and pixels (K, 2) of the corners that a grey picture shows."""
+    import cv2
+
+    scale = max(1.0, LONGER_SIDE / max(gray.shape))
+    if scale > 1.0:
+        gray = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
+    if gray.dtype != np.uint8:
+        gray = np.rint(gray).clip(0, 255).astype(np.uint8)
+    pixels, ids, _, _ = detector.detectBoard(gray)
+    if ids is None or pixels is None:
+        return np.empty(0, np.int32), np.empty((0, 2))
+    places = np.asarray(pixels, float).reshape(-1, 2)
+    return np.asarray(ids, np.int32).ravel(), (places + 0.5) / scale - 0.5

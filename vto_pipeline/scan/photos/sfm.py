@@ -21,7 +21,7 @@ from vto_pipeline.model.mesh import PointCloud
 from vto_pipeline.model.settings import Config
 from vto_pipeline.scan.photos.board import detect_board
 from vto_pipeline.scan.photos.matching.adjust import adjust
-from vto_pipeline.scan.photos.matching.board_poses import LEAST_CORNERS
+from vto_pipeline.scan.photos.matching.board_poses import LEAST_CORNERS, Sightings
 from vto_pipeline.scan.photos.matching.certainty import uncertainty_px
 from vto_pipeline.scan.photos.matching.features import FAINT, SURE, FeatureConfig, detect, match
 from vto_pipeline.scan.photos.matching.from_board import map_from_board
@@ -53,6 +53,9 @@ class SfmConfig(Config):
     refined: bool = Field(
         True, description="Cameras are adjusted to far more points than features, in neighbouring photos"
     )
+    min_placed: float = Field(
+        0.5, ge=0, le=1, description="Share of the photos that must be placed; with fewer, the scan is refused"
+    )
     max_error_px: float = Field(2.0, gt=0.1, le=10, description="Largest mean error of a sparse point [px]")
     min_views: int = Field(3, ge=2, le=10, description="Photos that must have seen a sparse point")
     max_camera_px: float = Field(
@@ -73,29 +76,21 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
         direction towards the photos that saw them.
 
     Raises:
-        ScanError: fewer than 3 photos could be placed, or most of them too uncertainly.
+        ScanError: fewer than 3 photos could be placed, or than `min_placed`, or most of them too uncertainly.
     """
     load_colmap(job.seed)
     with tempfile.TemporaryDirectory(dir=job.scratch) as scratch:
         job.progress(0.0, "features")
         counts = detect(photos, Path(scratch) / "sure.db", SURE, config.features)
-        database = Path(scratch) / "sure.db"
+        database, found, tried = Path(scratch) / "sure.db", None, None
         if np.median(counts) < config.enough_features:
             job.note(f"only {int(np.median(counts))} features in the median photo: looking for fainter ones")
             database = Path(scratch) / "faint.db"
             counts = detect(photos, database, FAINT, config.features)
-        job.progress(0.3, f"matching {len(photos.paths)} photos")
-        pairs, fixed_camera = match(photos, database, config.features, job)
-        job.progress(0.7, f"placing cameras, {pairs} matched pairs")
-        tried = _placed(photos, database, counts, pairs, job)
-        again = None
-        if fixed_camera and tried.placed < len(photos.paths):
-            again = _beside_background(photos, Path(scratch), config, job)
-        elif tried.placed < FEW * len(photos.paths) and database.stem == "sure" and not tried.by_board:
-            job.note(f"only {tried.placed} of {len(photos.paths)} photos could be placed: looking for fainter features")
-            again = _faint(photos, photos, Path(scratch) / "faint", config, job)
-        if again is not None and _is_better(again, tried):
-            tried = again
+            found = _board(photos, job)
+            tried = _by_board_alone(photos, database, counts, found, job)
+        if tried is None:
+            tried = _by_features(photos, database, counts, found, config, job)
         model, counts, pairs = tried.model, tried.features, tried.pairs
     names = [path.name for path in photos.paths]
     if model is None or model.num_reg_images() < MIN_PHOTOS:
@@ -103,6 +98,7 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
         few = f"fewer than {MIN_PHOTOS} of {len(names)} photos could be placed and tied together by {LEAST_TIES} points"
         problem = f"{few} ({pairs} pairs match); features per photo: {each}"
         raise ScanError(problem, where=str(photos.paths[0].parent), hint=f"{ADVICE}{_of_board(tried)}")
+    _check_enough(tried, names, photos, config)
     if config.refined:
         model = adjust(model, photos, job)
     else:
@@ -114,9 +110,8 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
         why = f"could not be placed, or fewer than {LEAST_TIES} points tie it to the others"
         reasons = {name: f"{why} ({_shown(tried, names.index(name))})" for name in cameras.unregistered}
         job.measure(left_out_photos=reasons)
-        lost = ", ".join(f"{name} ({_shown(tried, names.index(name))})" for name in cameras.unregistered)
-        unplaced = f"{len(cameras.unregistered)} of {len(names)} photos could not be placed: {lost}"
-        job.warn(f"{unplaced}. {ADVICE}{_of_board(tried)}")
+        unplaced = f"{len(cameras.unregistered)} of {len(names)} photos could not be placed"
+        job.warn(f"{unplaced}: {_lost(tried, names, cameras.unregistered)}. {ADVICE}{_of_board(tried)}")
     job.measure(
         registered=len(cameras.names),
         photos=len(names),
@@ -151,17 +146,84 @@ class _Tried(NamedTuple):
         return 0 if self.model is None else int(self.model.num_reg_images())
 
 
-def _placed(photos: PhotoSet, database: Path, features: list[int], pairs: int, job: Job) -> _Tried:
+def _by_features(
+    photos: PhotoSet, database: Path, features: list[int], found: Sightings | None, config: SfmConfig, job: Job
+) -> _Tried:
+    """Match the features of all photos and place these; where few could be, look for other features or the board."""
+    job.progress(0.3, f"matching {len(photos.paths)} photos")
+    pairs, fixed_camera = match(photos, database, config.features, job)
+    job.progress(0.7, f"placing cameras, {pairs} matched pairs")
+    tried = _placed(photos, database, features, pairs, found, job)
+    again = None
+    if fixed_camera and tried.placed < len(photos.paths):
+        again = _beside_background(photos, database.parent, config, job)
+    elif tried.placed < FEW * len(photos.paths) and database.stem == "sure" and not tried.by_board:
+        job.note(f"only {tried.placed} of {len(photos.paths)} photos could be placed: looking for fainter features")
+        again = _faint(photos, photos, database.parent / "faint", config, job)
+    return again if again is not None and _is_better(again, tried) else tried
+
+
+def _board(photos: PhotoSet, job: Job) -> Sightings | None:
+    """Return what each photo shows of the board; None where there is none."""
+    if photos.board is None:
+        return None
+    names = tuple(path.name for path in photos.paths)
+    return dict(zip(names, detect_board(photos, names, job), strict=True))
+
+
+def _by_board_alone(
+    photos: PhotoSet, database: Path, features: list[int], found: Sightings | None, job: Job
+) -> _Tried | None:
+    """Place photos by the board before any features are matched: then these are sought where the board says only.
+
+    Returns:
+        None where it does not place nearly all.
+    """
+    if found is None or photos.board is None:
+        return None
+    corners, folder = [len(found[path.name][0]) for path in photos.paths], photos.paths[0].parent
+    if np.mean(np.array(corners) >= LEAST_CORNERS) < FEW:
+        return None
+    tried = _Tried(map_from_board(database, folder, photos.board, found, job), features, 0, True, corners)
+    if tried.placed < FEW * len(corners):
+        return None
+    job.leave_out("matching the features of all photos", f"the board places {tried.placed} of {len(corners)} photos")
+    return tried
+
+
+def _placed(
+    photos: PhotoSet, database: Path, features: list[int], pairs: int, found: Sightings | None, job: Job
+) -> _Tried:
     """Place photos by their features, or by the board if these place few and it places more."""
     folder, names = photos.paths[0].parent, tuple(path.name for path in photos.paths)
     tried = _Tried(map_photos(database, folder, len(names), job), features, pairs, by_board=False)
     if tried.placed >= FEW * len(names) or photos.board is None:
         return tried
     job.note(f"only {tried.placed} of {len(names)} photos could be placed by features: looking for the board")
-    found = dict(zip(names, detect_board(photos, names, job), strict=True))
+    found = found or _board(photos, job) or {}
     corners = [len(found[name][0]) for name in names]
     by_board = _Tried(map_from_board(database, folder, photos.board, found, job), features, pairs, True, corners)
     return by_board if by_board.placed > tried.placed else tried._replace(corners=corners)
+
+
+def _check_enough(tried: _Tried, names: list[str], photos: PhotoSet, config: SfmConfig) -> None:
+    """Refuse photos of which too few could be placed: what the others show would be missing from the surface.
+
+    Raises:
+        ScanError: fewer than `min_placed` of them could be.
+    """
+    if tried.placed >= config.min_placed * len(names):
+        return
+    placed = {image.name for image in tried.model.images.values() if image.has_pose} if tried.model else set()
+    lost = _lost(tried, names, [name for name in names if name not in placed])
+    problem = f"only {tried.placed} of {len(names)} photos could be placed; not {lost}"
+    least = f"sfm.min_placed is {config.min_placed:g}; with a lower one, the surface ends where those photos looked."
+    raise ScanError(problem, where=str(photos.paths[0].parent), hint=f"{_of_board(tried)} {ADVICE} {least}".strip())
+
+
+def _lost(tried: _Tried, names: Sequence[str], unplaced: Sequence[str]) -> str:
+    """Return the photos that could not be placed, and what each showed."""
+    return ", ".join(f"{name} ({_shown(tried, names.index(name))})" for name in unplaced)
 
 
 def _shown(tried: _Tried, index: int) -> str:
@@ -205,7 +267,7 @@ def _faint(
     database = folder / "faint.db"
     counts = detect(shown, database, FAINT, config.features)
     pairs, _ = match(shown, database, config.features, Job(seed=job.seed), camera_stays=camera_stays)
-    return _placed(photos, database, counts, pairs, job)
+    return _placed(photos, database, counts, pairs, None, job)
 
 
 def _is_better(again: _Tried, before: _Tried) -> bool:

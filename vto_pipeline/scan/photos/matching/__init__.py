@@ -5,6 +5,7 @@ still_background: which pixels show it, so that it can be painted over
 features: features, and pairs of photos that share them
 mapping: cameras and points from the pairs
 board_poses, from_board: the same where features are too few, and photos show the board
+nearest, guided: features matched where the places of two photos say, exactly
 ties: photos that too few points tie to the others
 tracks, adjust: many more points followed from photo to photo, and the cameras adjusted to them
 certainty: how far off photos may show what they look at, by what their sightings leave open

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.frames import CharucoBoard
 from vto_pipeline.scan.photos.board import board_corners
+from vto_pipeline.scan.photos.matching.nearest import Lines
 
 LEAST_CORNERS = 6
 """Corners that a photo must show to be placed by them; four fix it, and two more tell whether they are right."""
@@ -85,28 +86,50 @@ def place_photos(camera: Any, board: CharucoBoard, found: Sightings) -> dict[str
     return placed
 
 
-def line_distance(
-    one: Any, other: Any, first: Placed, second: Placed, here: FloatArray, there: FloatArray
-) -> FloatArray:
-    """Return how far matches are from each other's epipolar lines (Sampson 1982) [px], shape (M,).
+def beside_corners(camera: Any, pose: Placed, corners: FloatArray, margin: float, pixels: FloatArray) -> IntArray:
+    """Return which pixels (K, 2), COLMAP's way, a photo does not show among the board's corners, shape (M,).
+
+    Features of squares and markers are alike, and known several times worse than the corners.
+
+    Args:
+        camera: A pycolmap Camera.
+        pose: Where the photo was taken.
+        corners: That it shows, in the board's world [m], shape (N, 3).
+        margin: About the rectangle of these [m].
+        pixels: Of features.
+    """
+    if len(pixels) == 0:
+        return np.empty(0, np.int32)
+    way = np.column_stack([camera.cam_from_img(pixels), np.ones(len(pixels))]) @ pose.rotation
+    center = -pose.rotation.T @ pose.shift
+    down = way[:, 1] * np.sign(-center[1])
+    reach = np.abs(center[1]) / np.where(down > 0, down, np.inf)  # to the plane that the board lies in
+    there = center + reach[:, None] * way
+    low, high = corners.min(axis=0) - margin, corners.max(axis=0) + margin
+    inside = (down > 0) & ((there > low) & (there < high)).all(axis=1)
+    return np.flatnonzero(~inside).astype(np.int32)
+
+
+def epipolar_lines(
+    one: Any, other: Any, first: Placed, second: Placed, here: FloatArray, there: FloatArray, most_px: float
+) -> Lines:
+    """Return where each of two photos sees what features of the other may be.
 
     Args:
         one, other: pycolmap Cameras.
         first, second: Where the two photos were taken.
-        here, there: Pixels, COLMAP's way, shape (M, 2) each.
+        here, there: Pixels of their features, COLMAP's way, shape (N, 2) and (M, 2).
+        most_px: Sampson's distance (1982) that a match may have [px].
     """
-    if len(here) == 0:
-        return np.empty(0)
     turn = second.rotation @ first.rotation.T
     x, y, z = second.shift - turn @ first.shift
     essential = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]) @ turn
-    rays = [
-        np.column_stack([camera.cam_from_img(pixels), np.ones(len(pixels))])
-        for camera, pixels in ((one, here), (other, there))
-    ]
-    lines, back = rays[0] @ essential.T, rays[1] @ essential
-    slope = np.sqrt((lines[:, :2] ** 2).sum(axis=1) + (back[:, :2] ** 2).sum(axis=1))
-    return np.asarray(np.sqrt(one.focal_length * other.focal_length) * np.abs((rays[1] * lines).sum(axis=1)) / slope)
+    ray, ray_back = (
+        np.column_stack([camera.cam_from_img(pixels), np.ones(len(pixels))]) if len(pixels) else np.empty((0, 3))
+        for camera, pixels in ((other, there), (one, here))
+    )
+    most = most_px / np.sqrt(one.focal_length * other.focal_length)
+    return Lines(ray_back @ essential.T, ray @ essential, ray, float(most))
 
 
 def _flat(points: FloatArray) -> NDArray[np.float32]:

@@ -31,6 +31,9 @@ MIN_AGREEMENT = 0.7
 """Share of two photos' matches that one geometry must explain. A match has passed the test of ratios and of both
 directions: where a third of them contradict, a print repeats, or the background did not turn with the object."""
 
+SEARCHED = 0.6
+"""A geometry that fewer of the matches agree with is not searched for long: it would be dropped, with some to spare."""
+
 
 class Matched(NamedTuple):
     """What matching found.
@@ -126,6 +129,7 @@ def match(photos: PhotoSet, database: Path, config: FeatureConfig, job: Job, *, 
     pairs.write_text("".join(f"{a} {b}\n" for a, b in _pairs([path.name for path in photos.paths], config)))
     verification = pycolmap.TwoViewGeometryOptions()
     verification.ransac.random_seed = job.seed
+    verification.ransac.min_inlier_ratio = SEARCHED
     matching = pycolmap.FeatureMatchingOptions(use_gpu=False, num_threads=1, skip_geometric_verification=True)
     listed = pycolmap.ImportedPairingOptions(match_list_path=pairs)
     try:
@@ -146,6 +150,11 @@ def match(photos: PhotoSet, database: Path, config: FeatureConfig, job: Job, *, 
             else:
                 opened.delete_two_view_geometry(first, second)
     return Matched(kept, moving is not None)
+
+
+def descriptors(opened: Any) -> dict[str, NDArray[np.uint8]]:
+    """Return the descriptors of each photo of an open database, shape (K, 128)."""
+    return {image.name: opened.read_descriptors(image.image_id).data for image in opened.read_all_images()}
 
 
 def _drop_background(database: Path, photos: PhotoSet, job: Job, camera_stays: bool) -> list[Pair] | None:

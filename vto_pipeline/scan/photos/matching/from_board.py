@@ -1,8 +1,8 @@
 """Photos placed by the board that they show, where too few of their features match.
 
 The board's corners cannot be mistaken for one another. A photo that shows a few is placed by them alone. Where photos
-were then tells the true matches among their features. From there COLMAP goes on as ever, with the corners as features
-like any other.
+were then tells where to look for a feature's match: along a line. On stripes and plain cloth, that finds several times
+as many as looking everywhere. From there COLMAP goes on as ever, with the corners as features like any other.
 """
 
 from __future__ import annotations
@@ -20,19 +20,24 @@ from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.frames import CharucoBoard
 from vto_pipeline.model.job import Job
 from vto_pipeline.scan.library_message import COLMAP_ERRORS, library_message
+from vto_pipeline.scan.photos.board import board_corners
 from vto_pipeline.scan.photos.matching.adjust import solve
 from vto_pipeline.scan.photos.matching.board_poses import (
     LEAST_CORNERS,
     Placed,
     Sightings,
-    line_distance,
+    beside_corners,
     place_photos,
 )
+from vto_pipeline.scan.photos.matching.features import descriptors
+from vto_pipeline.scan.photos.matching.guided import match_placed
 from vto_pipeline.scan.photos.matching.mapping import MIN_PHOTOS, copy_database, incremental
 from vto_pipeline.scan.photos.matching.ties import untie
 
 AGREES_PX = 6.0
 """Two photos placed by the board alone see what matches within this of each other's lines [px]."""
+MOST = 0.5
+"""Share of the matches that one geometry must explain, or it is not searched for long."""
 SOFT_PX = 1.0
 """Errors beyond this lose their weight [px]."""
 
@@ -89,8 +94,9 @@ def map_from_board(database: Path, folder: Path, board: CharucoBoard, found: Sig
                 shown = sum(len(ids) > 0 for ids, _ in found.values())
                 job.note(f"the board places {len(placed)} photos: {shown} show any of it. Is it as board.yaml says?")
                 return None
+            described = descriptors(opened)
             entered = _enter(opened, images, found, placed)
-            _match_again(opened, images, entered, placed, job.seed)
+            _match_again(opened, described, board, found, entered, placed, job.seed)
             cache = pycolmap.DatabaseCache.create(opened, pycolmap.DatabaseCacheOptions())
         return _mapped(copied, folder, cache, entered, placed, job)
     except COLMAP_ERRORS as error:
@@ -118,25 +124,38 @@ def _enter(opened: Any, images: Mapping[str, Any], found: Sightings, placed: Map
 
 
 def _match_again(
-    opened: Any, images: Mapping[str, Any], entered: _Entered, placed: Mapping[str, Placed], seed: int
+    opened: Any,
+    described: Mapping[str, NDArray[np.uint8]],
+    board: CharucoBoard,
+    found: Sightings,
+    entered: _Entered,
+    placed: Mapping[str, Placed],
+    seed: int,
 ) -> None:
-    """Verify matches by what is known of two photos: where both were, or else one geometry for most of them."""
+    """Match by what is known of two photos: where both were, or else one geometry for most of their matches so far."""
     import pycolmap
 
     options = pycolmap.TwoViewGeometryOptions()
-    options.ransac.random_seed = seed
-    cameras = {name: opened.read_camera(image.camera_id) for name, image in images.items()}
+    options.ransac.random_seed, options.ransac.min_inlier_ratio = seed, MOST
+    cameras = {image.name: opened.read_camera(image.camera_id) for image in opened.read_all_images()}
+    pairs = list(combinations(sorted(entered.number, key=lambda name: entered.number[name]), 2))
+    own = {name: entered.places[name][: len(described[name])] for name in placed}
+    world, margin = board_corners(board), 1.5 * board.square_m  # past the edge of the board, which is one square on
+    chosen = {
+        name: beside_corners(cameras[name], pose, world[found[name][0][pose.corners]], margin, own[name])
+        for name, pose in placed.items()
+    }
+    guided = match_placed(pairs, cameras, described, own, chosen, placed, AGREES_PX)
     opened.clear_two_view_geometries()
-    for one, other in combinations(sorted(images, key=lambda name: entered.number[name]), 2):
+    for one, other in pairs:
         first, second = entered.number[one], entered.number[other]
-        rows = np.array(opened.read_matches(first, second), dtype=np.uint32).reshape(-1, 2)
         if one in placed and other in placed:
             geometry = pycolmap.TwoViewGeometry()
             geometry.config = pycolmap.TwoViewGeometryConfiguration.CALIBRATED
-            pixels = entered.places[one][rows[:, 0]], entered.places[other][rows[:, 1]]
-            off = line_distance(cameras[one], cameras[other], placed[one], placed[other], *pixels)
-            kept, enough = np.vstack([rows[off < AGREES_PX], entered.shared(one, other)]), LEAST_CORNERS
+            rows = guided.get((one, other), np.empty((0, 2), np.uint32))
+            kept, enough = np.vstack([rows, entered.shared(one, other)]), LEAST_CORNERS
         else:
+            rows = np.array(opened.read_matches(first, second), dtype=np.uint32).reshape(-1, 2)
             geometry = pycolmap.estimate_calibrated_two_view_geometry(
                 cameras[one], entered.places[one], cameras[other], entered.places[other], rows, options
             )

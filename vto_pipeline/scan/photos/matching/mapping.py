@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sqlite3
 from contextlib import closing
 from pathlib import Path
@@ -96,8 +97,10 @@ def _merit(model: Any) -> tuple[int, float]:
 def copy_database(database: Path, name: str) -> Path:
     """Return a copy in a folder of that name: each mapper writes to its own, for calibration changes the cameras in it.
 
-    Copied by SQLite: what was committed may still lie in the write-ahead log, which a copy of the file would miss.
+    An earlier one is replaced. Copied by SQLite: what was committed may still lie in the write-ahead log, which a copy
+    of the file would miss.
     """
+    shutil.rmtree(database.parent / name, ignore_errors=True)
     (database.parent / name).mkdir()
     copied = database.parent / name / database.name
     with closing(sqlite3.connect(database)) as source, closing(sqlite3.connect(copied)) as target:
