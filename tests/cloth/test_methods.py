@@ -128,7 +128,10 @@ def test_there_is_an_end_to_the_steps():
 SLOW = {"projective": 1, "vertex_descent": 2}
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow) if name == "fast_projection" else name for name in METHODS],
+)
 def test_the_same_bits_with_one_thread_and_two(name):
     """Over the size from which threads share the work, onto a ball."""
     mesh = sheet(52, 52, 0.5, 0.5, upright=False)
