@@ -8,12 +8,14 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import minimize, root
 
 from vto_pipeline.cloth.collision.contacts import Contacts, ContactSpan, empty_contacts, gather_contacts
+from vto_pipeline.cloth.collision.response.contact_springs import update_active_set
 from vto_pipeline.cloth.collision.shapes.colliders import Plane, Sphere
 from vto_pipeline.cloth.constraints.points.spring import springs
 from vto_pipeline.cloth.constraints.sweep import add_damping_forces, add_forces
 from vto_pipeline.cloth.integrators import INTEGRATORS
 from vto_pipeline.cloth.model.build import ClothState, at_rest, build_cloth, model_of
 from vto_pipeline.cloth.model.materials import Materials
+from vto_pipeline.cloth.solvers import newton
 from vto_pipeline.cloth.solvers.newton import Limits, Newton
 from vto_pipeline.model.garment import RestShape
 
@@ -63,6 +65,29 @@ def test_a_step_with_the_exact_stiffness_is_taken_where_its_system_is_positive_d
             assert_array_equal(after.positions, state.positions)
             assert_array_equal(after.velocities, state.velocities)
             assert method.active is known
+
+
+@pytest.mark.parametrize("circles", [False, True])
+def test_a_step_with_the_exact_stiffness_is_taken_where_its_contacts_come_to_an_end(monkeypatch, circles):
+    """A bead presses on a floor; where contacts would go on changing, it is left where it was, and that soon."""
+    model = model_of((), np.full(1, 0.01))
+    floor = Plane((0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.3)
+    state = ClothState(np.array([[0.0, 2e-3, 0.0]]), np.array([[0.0, -0.1, 0.0]]))
+    contacts = gather_contacts([floor], state.positions, ContactSpan(0.0, FRAME, 0.02, np.full(1, 1e-3), 0.5))
+    asked = []
+
+    def changed(*args):
+        asked.append(update_active_set(*args))
+        return 1.0 if circles else asked[-1]
+
+    monkeypatch.setattr(newton, "update_active_set", changed)
+    method = Newton(model)
+    method.exact = True
+    after = method.advance(state, contacts, FRAME, 1)
+    assert method.definite is not circles
+    assert (after.time == 0.0) is circles
+    assert (after.positions == state.positions).all() == circles
+    assert 0 < len(asked) < 10
 
 
 def by_scipy(model, state, h):
