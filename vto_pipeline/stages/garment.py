@@ -13,6 +13,7 @@ from vto_pipeline.avatar.scan.report import extremity_weights
 from vto_pipeline.cloth.rest_shape.from_hanging import RestShapeConfig, rest_shape
 from vto_pipeline.garment.align import AlignConfig, PosedPhotos, align_to_mannequin
 from vto_pipeline.garment.bare_parts import BareParts
+from vto_pipeline.garment.open_seams import TakeMeshConfig, sew_open_seams
 from vto_pipeline.garment.openings import OpeningsConfig, close_scan_holes, list_openings
 from vto_pipeline.garment.pattern.embed import in_shape
 from vto_pipeline.garment.pattern.sew import SewConfig, sew
@@ -22,7 +23,7 @@ from vto_pipeline.garment.subtraction.estimated import label_over_estimate
 from vto_pipeline.garment.subtraction.subtract import SubtractConfig, extract_garment, label_garment
 from vto_pipeline.garment.wearable import check_wearable
 from vto_pipeline.geometry.metres import need_metres
-from vto_pipeline.geometry.remeshing.repair import RepairConfig, repair
+from vto_pipeline.geometry.remeshing.repair import repair
 from vto_pipeline.geometry.rigid import transform_cameras, transform_mesh
 from vto_pipeline.geometry.topology import concatenate
 from vto_pipeline.model.arrays import FloatArray
@@ -126,8 +127,10 @@ def _sew(inputs: Inputs, settings: SewConfig, job: Job) -> Outputs:
     return {"garment_mesh": in_shape(sewn, job, pattern.worn), "panels": pattern}
 
 
-def _take_mesh(inputs: Inputs, settings: RepairConfig, job: Job) -> Outputs:
+def _take_mesh(inputs: Inputs, settings: TakeMeshConfig, job: Job) -> Outputs:
     garment = repair(need_metres(inputs["garment_mesh"], "a garment"), settings, job)
+    if "garment_pattern" not in inputs:  # a pattern says itself what is sewn
+        garment = sew_open_seams(garment, 1e-3 * settings.sew_mm, job)
     openings = list_openings(garment)
     check_wearable(garment, openings)
     job.measure(openings=len(openings), vertices=len(garment.vertices))
@@ -212,11 +215,12 @@ STAGES: tuple[Stage, ...] = (
     ),
     Stage(
         name="take_mesh",
-        about="a finished garment mesh, repaired",
+        about="a finished garment mesh, repaired, seams that its file leaves open sewn",
         needs=("garment_mesh",),
+        optional=("garment_pattern",),
         makes=("garment", "openings", "observed"),
         run=_take_mesh,
-        settings=RepairConfig,
+        settings=TakeMeshConfig,
         uses=("libigl",),
     ),
     Stage(
