@@ -44,6 +44,7 @@ def test_sleeves_go_on_arms_however_fine_they_are(made_for, worn_by):
     np.testing.assert_allclose(np.median(edge / was), 1.0, rtol=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.real_data
 @pytest.mark.skipif(not SHIRT.is_file(), reason="shared data absent")
 def test_a_long_sleeved_shirt_is_put_on_arms_that_hang():

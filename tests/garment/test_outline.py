@@ -26,7 +26,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 LENS = Intrinsics(400, 300, 560.0, 560.0, 199.5, 149.5)
 PIXEL = 2.3 / 560.0  # on the form, seen from 2.3 m [m]
-QUICK = AlignConfig(samples=4000, yaw_starts=12)
+QUICK = AlignConfig(samples=2500, yaw_starts=8)
 MOTION = dressed_form.rigid([2, 140, -3], [0.3, 0.1, -0.5])  # scan's frame to the form's
 GRAY = 120
 
@@ -169,7 +169,7 @@ def test_a_form_that_is_round_is_refused(tmp_path):
     wide.apply_transform(trimesh.transformations.rotation_matrix(-np.pi / 2, [1, 0, 0]))
     cloth = TriangleMesh(wide.vertices, wide.faces)
     surface, photos = in_scan_frame(cloth, photographs(tmp_path, form, cloth), tmp_path)
-    config = AlignConfig(samples=4000, yaw_starts=12, enough_bare=0.5, upright_bare=0.5)
+    config = AlignConfig(samples=2500, yaw_starts=8, enough_bare=0.5, upright_bare=0.5)
     with pytest.raises(GarmentError, match=r"two places|uncertain"):
         align_to_mannequin(surface, form, config, Job(), photos)
 

@@ -35,6 +35,26 @@ def test_signed_distance_to_a_sphere_even_with_a_hole():
     assert (wanted < 0).sum() > 50
 
 
+@pytest.mark.parametrize("above", [0.5, 0.9])
+@pytest.mark.parametrize("open_by", [0.0, 0.3, 1.0])
+def test_inside_is_what_the_exact_winding_number_says_near_and_far(open_by, above):
+    """Against the sum of all solid angles (Jacobson et al. 2013), where that is not within 0.02 of the bound."""
+    igl = pytest.importorskip("igl")
+    ball = shapes.sphere(4)
+    x, y, z = ball.vertices.T
+    bumpy = TriangleMesh(
+        ball.vertices * (1.0 + 0.3 * np.sin(7 * x) * np.sin(6 * y + 1) * np.sin(5 * z))[:, None], ball.faces
+    )
+    mesh = submesh(bumpy, shapes.centers(ball)[:, 1] < 1.0 - open_by)[0] if open_by else bumpy
+    rng = np.random.default_rng(5)
+    off = 10.0 ** rng.uniform(-3, 0, (4000, 1))  # in radii; the library computes in single precision
+    points = mesh.vertices[rng.integers(0, len(mesh.vertices), 4000)] + off * rng.normal(size=(4000, 3))
+    exact = igl.winding_number(mesh.vertices, mesh.faces.astype(np.int64), points)
+    sure = np.abs(exact - above) > 0.02
+    assert sure.sum() > 3000
+    np.testing.assert_array_equal(SurfaceDistance(mesh).inside(points, above)[sure], exact[sure] > above)
+
+
 def test_only_the_tree_that_is_asked_for_is_built_and_of_the_surface_as_it_was(monkeypatch):
     igl = pytest.importorskip("igl")
     ball, points = shapes.sphere(4), np.array([[0.0, 0.5, 0.0], [0.0, 2.0, 0.0]])

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 
+_ROUGH, _FINE = 1.0, 2.0  # how many of its radii a cluster of triangles is away, to count as one
+_DOUBT = 0.4  # of a turn: rough numbers of bodies and garments, from a tenth of a millimetre off, miss by 0.28 at most
+
 
 @dataclass(frozen=True)
 class SurfacePoints:
@@ -32,7 +35,8 @@ class SurfaceDistance:
     """Distance queries against one mesh, whose trees are built once, when they are first asked for.
 
     Inside is where the generalised winding number is above one half (Barill et al. 2018, "Fast winding numbers for
-    soups and clouds"), so that small holes of the mesh do no harm.
+    soups and clouds"), so that small holes of the mesh do no harm. Most points are far from being in doubt: only those
+    that a rough number does not decide are asked about again.
 
     Args:
         mesh: The surface, oriented outward.
@@ -54,7 +58,12 @@ class SurfaceDistance:
 
     def inside(self, points: FloatArray, above: float = 0.5) -> NDArray[np.bool_]:
         """Return whether points are inside, shape (N,): where the winding number is above this."""
-        return np.asarray(self._winding.winding_number(np.ascontiguousarray(points)) > above)
+        points = np.ascontiguousarray(points)
+        number = np.array(self._winding.winding_number(points, _ROUGH))
+        doubtful = np.flatnonzero(np.abs(number - above) < _DOUBT)
+        if len(doubtful) > 0:
+            number[doubtful] = self._winding.winding_number(np.ascontiguousarray(points[doubtful]), _FINE)
+        return np.asarray(number > above)
 
     @cached_property
     def _tree(self) -> Any:
