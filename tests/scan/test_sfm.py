@@ -36,6 +36,7 @@ def test_every_photo_is_placed_where_it_was_taken(sparse, shot):
     assert cameras.names == tuple(path.name for path in shot[0].paths)
     assert not cameras.unregistered
     assert not cameras.metric
+    assert not cameras.still
     assert job.metrics["registered"] == job.metrics["photos"] == 16
     assert 0.05 < job.metrics["reprojection_px"] < 0.6
     centers, truth = cameras.world_from_cam[:, :3, 3], shot[1][:, :3, 3]

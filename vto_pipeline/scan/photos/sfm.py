@@ -6,6 +6,7 @@ import signal
 import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -111,6 +112,7 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
         job.leave_out("an adjustment to more points than features", "sfm.refined is false")
     _check_certain(model, photos, config, job)
     cameras, cloud = _upright(*_values(model, names, config))
+    cameras = replace(cameras, still=tried.still)
     cloud = _without_surroundings(cameras, cloud, job)
     if cameras.unregistered:
         why = f"could not be placed, or fewer than {LEAST_TIES} points tie it to the others"
@@ -138,6 +140,7 @@ class _Tried(NamedTuple):
         pairs: That match.
         by_board: Whether the board placed them.
         corners: Of the board, per photo; empty where it was not looked for.
+        still: Whether the camera stood still.
     """
 
     model: Any | None
@@ -145,6 +148,7 @@ class _Tried(NamedTuple):
     pairs: int
     by_board: bool
     corners: Sequence[int] = ()
+    still: bool = False
 
     @property
     def placed(self) -> int:
@@ -167,7 +171,8 @@ def _by_features(
         job.note(f"only {tried.placed} of {len(photos.paths)} photos could be placed: looking for fainter features")
         shown = in_best_grey(photos, database.parent / "grey", job)
         again = _faint(shown, photos, database.parent / "faint", seek, config, job)
-    return again if again is not None and _is_better(again, tried) else tried
+    best = again if again is not None and _is_better(again, tried) else tried
+    return best._replace(still=fixed_camera)
 
 
 def _board(photos: PhotoSet, job: Job) -> Sightings | None:
@@ -371,5 +376,5 @@ def transform_reconstruction(
     poses[:, :3, :3] = rotation @ cameras.world_from_cam[:, :3, :3]
     poses[:, :3, 3] = scale * cameras.world_from_cam[:, :3, 3] @ rotation.T + shift
     normals = None if cloud.normals is None else cloud.normals @ rotation.T
-    placed = CameraSet(cameras.names, cameras.intrinsics, poses, metric, cameras.unregistered)
+    placed = replace(cameras, world_from_cam=poses, metric=metric)
     return placed, PointCloud(scale * cloud.points @ rotation.T + shift, normals, cloud.colors)
