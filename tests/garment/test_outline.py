@@ -19,7 +19,7 @@ from vto_pipeline.garment.outline.edges import load_edges
 from vto_pipeline.garment.outline.fit import OutlineProblem
 from vto_pipeline.geometry.rigid import transform_mesh
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import submesh
+from vto_pipeline.geometry.topology import concatenate, submesh
 from vto_pipeline.model.camera import CameraSet, Intrinsics
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -158,6 +158,17 @@ def test_photos_of_another_form_are_refused(scene, worn, tmp_path, most_lost):
         align_to_mannequin(surface, scene.form, QUICK, Job(), some)
     told = f"{count + 1} of {2 * count + 1} photos could not be placed"
     assert caught.value.hint.startswith(told) is most_lost
+
+
+def test_without_scale_or_outline_bare_parts_alone_are_not_believed(scene, shots, tmp_path):
+    """All of the form is in the scan, but photos show nothing: what is bare could be cloth of another size."""
+    for name in shots[1].names:
+        cv2.imwrite(str(tmp_path / name), np.full((LENS.height, LENS.width), GRAY, np.uint8))
+    both = concatenate([scene.form, scene.shirt])
+    surface, photos = in_scan_frame(both, shots[1], tmp_path, unit=0.137)
+    with pytest.raises(GarmentError, match="outline is not in the photos") as caught:
+        align_to_mannequin(surface, scene.form, QUICK, Job(), photos)
+    assert "scale.lengths" in caught.value.hint
 
 
 def test_a_form_that_is_round_is_refused(tmp_path):

@@ -32,7 +32,7 @@ COLORS = RNG.integers(0, 256, (8, 3)).astype(np.uint8)
 MESH = TriangleMesh(POINTS, FACES)
 POSES = np.tile(np.eye(4), (2, 1, 1)) + np.pad(RNG.random((2, 3, 1)), ((0, 0), (0, 1), (3, 0)))
 LENSES = (Intrinsics(80, 60, 88.1, 88.2, 39.5, 29.5, 1 / 3), Intrinsics(60, 80, 1e3 / 7, 90, 29.5, 39.5))
-CAMERAS = CameraSet(("a.jpg", "é.jpg"), LENSES, POSES, metric=False, unregistered=("c.jpg",))
+CAMERAS = CameraSet(("a.jpg", "é.jpg"), LENSES, POSES, metric=False, unregistered=("c.jpg",), still=True)
 CLOUD = PointCloud(POINTS, -POINTS, COLORS)
 DEPTH = RNG.random((2, 6, 8)).astype(np.float32)
 

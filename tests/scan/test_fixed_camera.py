@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import cv2
@@ -11,16 +12,18 @@ import pytest
 from scan_scene import make_scene, orbit, render
 
 from vto_pipeline.model.camera import Intrinsics
-from vto_pipeline.model.frames import PhotoSet
+from vto_pipeline.model.frames import DepthMaps, PhotoSet
 from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import PointCloud
 from vto_pipeline.scan.grey import USUAL
 from vto_pipeline.scan.photos import sfm
-from vto_pipeline.scan.photos.consistency import rays
+from vto_pipeline.scan.photos.consistency import moving, rays
 from vto_pipeline.scan.photos.matching.features import FAINT, FeatureConfig, detect, match
-from vto_pipeline.scan.photos.matching.fixed_camera import moving_matches, still_features
+from vto_pipeline.scan.photos.matching.fixed_camera import MOVING_SHARE, moving_matches, still_features
 from vto_pipeline.scan.photos.matching.mapping import map_photos
 from vto_pipeline.scan.photos.matching.still_background import paint_over, still_pixels
 from vto_pipeline.scan.photos.sfm import SfmConfig, estimate_cameras
+from vto_pipeline.scan.photos.stereo import StereoConfig, estimate_depth_maps
 from vto_pipeline.scan.similarity import fit_similarity
 
 PHOTOS, OBJECT, WALL = 24, 60, 90
@@ -98,6 +101,7 @@ def test_photos_from_a_turntable_are_placed_round_the_object(scene, tmp_path):
     job = Job()
     cameras, _ = estimate_cameras(photos, SfmConfig(), job)
     assert job.metrics["still_share"] > 0.2
+    assert cameras.still
     assert len(cameras.names) == len(poses)
     scale, motion = fit_similarity(cameras.world_from_cam[:, :3, 3], poses[:, :3, 3])
     off = scale * cameras.world_from_cam[:, :3, 3] @ motion[:3, :3].T + motion[:3, 3] - poses[:, :3, 3]
@@ -213,3 +217,50 @@ def test_a_second_model_is_believed_where_it_places_most_photos_and_more_than_th
     again, before = (n and SimpleNamespace(num_reg_images=lambda n=n: n) for n in (again, before))
     second = sfm._Tried(again, [70] * PHOTOS, 9, by_board)
     assert sfm._is_better(second, sfm._Tried(before, [70] * PHOTOS, 9, by_board=False)) is believed
+
+
+def test_what_stays_in_its_place_is_told_from_what_turns():
+    """Rays against a cylinder by formula; for the rest, where two rays through one pixel pass closest, 15° on."""
+    poses, radius = orbit(24, elevations_deg=(0.0,)), 0.1
+    way = rays(PHOTO.matrix, 360, 480) @ poses[0, :3, :3].T
+    eye = poses[0, :3, 3]
+    a, b = (way[..., [0, 2]] ** 2).sum(-1), (way[..., [0, 2]] * eye[[0, 2]]).sum(-1)
+    root = b**2 - a * ((eye[[0, 2]] ** 2).sum() - radius**2)
+    turns = root > 0
+    near = (-b - np.sqrt(np.maximum(root, 0.0))) / a
+    others, depth = [1, 2, 22, 23], np.zeros((24, 360, 480), np.float32)
+    beside = np.abs(np.arange(480) - 239.5) < 10  # farther from the axis, photos do not agree on it
+    its, away = rays(PHOTO.matrix, 360, 480) @ poses[1, :3, :3].T, poses[1, :3, 3] - eye
+    dot = (way * its).sum(-1)
+    length = ((way @ away) * (its**2).sum(-1) - (its @ away) * dot) / ((way**2).sum(-1) * (its**2).sum(-1) - dot**2)
+    for behind in (False, True):
+        depth[0] = np.where(beside, length, 0.0) if behind else np.where(turns, near, 0.0)
+        maps = DepthMaps(tuple(map(str, range(24))), (PHOTO,) * 24, poses, depth)
+        found = moving(maps, 0, others, MOVING_SHARE * 480)
+        assert not found[depth[0] == 0].any()
+        share = found[depth[0] > 0].mean()
+        assert share == 0.0 if behind else share > 0.99
+    assert moving(maps, 0, [], 3.0).sum() == 0
+
+
+def test_a_background_seen_through_a_gap_gets_no_depth(shot, true_cameras, scene, tmp_path):
+    """A strip that is the same in all photos, before the tube's axis: matched with itself, it lies on the axis."""
+    random, paths = np.random.default_rng(5), []
+    strip = cv2.GaussianBlur(random.normal(size=(160, 24, 3)), (0, 0), 1.5) * 90 + 120
+    for path in shot[0].paths:
+        picture = cv2.imread(str(path))
+        picture[100:260, 228:252] = np.clip(strip + random.normal(0, 1, strip.shape), 0, 255)
+        paths.append(tmp_path / path.name)
+        cv2.imwrite(str(paths[-1]), picture, [cv2.IMWRITE_JPEG_QUALITY, 95])
+    photos = PhotoSet(tuple(paths), shot[0].intrinsics)
+    step = scene.vertices[::37]
+    normals = step * [1, 0, 1] / np.linalg.norm(step * [1, 0, 1], axis=1, keepdims=True)
+    cloud, config = PointCloud(step, normals), StereoConfig(rematch={"rounds": 0})
+    shown = []
+    for still in (False, True):
+        maps = estimate_depth_maps(photos, replace(true_cameras, still=still), cloud, config, Job())
+        shown.append((maps.depth > 0).sum(axis=0))
+    in_strip, beside = (slice(110, 250), slice(232, 248)), (slice(110, 250), slice(180, 220))
+    assert shown[0][in_strip].mean() > 2.0
+    assert shown[1][in_strip].mean() < 0.1 * shown[0][in_strip].mean()  # some of it was matched with the tube beside
+    assert shown[1][beside].mean() > 0.98 * shown[0][beside].mean()

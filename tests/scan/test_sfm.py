@@ -8,13 +8,14 @@ import cv2
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scan_scene import distances, make_scene, orbit, photos
+from scan_scene import BOARD, distances, make_scene, orbit, photos
 
 from vto_pipeline.errors import ScanError
 from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.frames import PhotoSet
 from vto_pipeline.model.job import Job
 from vto_pipeline.scan.photos import scale as scale_module
+from vto_pipeline.scan.photos import sfm as sfm_module
 from vto_pipeline.scan.photos.board import board_corners
 from vto_pipeline.scan.photos.matching.features import SURE, FeatureConfig, detect, match
 from vto_pipeline.scan.photos.matching.mapping import copy_database
@@ -35,6 +36,7 @@ def test_every_photo_is_placed_where_it_was_taken(sparse, shot):
     assert cameras.names == tuple(path.name for path in shot[0].paths)
     assert not cameras.unregistered
     assert not cameras.metric
+    assert not cameras.still
     assert job.metrics["registered"] == job.metrics["photos"] == 16
     assert 0.05 < job.metrics["reprojection_px"] < 0.6
     centers, truth = cameras.world_from_cam[:, :3, 3], shot[1][:, :3, 3]
@@ -55,6 +57,21 @@ def test_cameras_are_not_adjusted_to_more_points_when_that_is_not_asked(shot):
     scale, transform = fit_similarity(centers, truth)
     error = np.linalg.norm(scale * centers @ transform[:3, :3].T + transform[:3, 3] - truth, axis=1)
     assert 1e-4 < np.median(error) < 4e-3  # at 1 m; twice what is asked of the default
+
+
+@pytest.mark.parametrize(("enough_features", "fixed_camera", "ways"), [(50, False, 2), (50, True, 2), (500, False, 1)])
+def test_the_board_is_looked_for_once_whatever_is_tried(shot, monkeypatch, enough_features, fixed_camera, ways):
+    """By usual features, then by faint ones, in all of the photo or beside its background; or by faint ones alone."""
+    taken, tried, looked = PhotoSet(shot[0].paths, shot[0].intrinsics, BOARD), [], []
+    none = [(np.empty(0, np.int32), np.empty((0, 2)))] * len(taken.paths)
+    monkeypatch.setattr(sfm_module, "detect", lambda photos, *args: [60] * len(photos.paths))
+    monkeypatch.setattr(sfm_module, "match", lambda *args, **named: (0, fixed_camera))
+    monkeypatch.setattr(sfm_module, "map_photos", lambda *args: tried.append(args))
+    monkeypatch.setattr(sfm_module, "map_from_board", lambda *args: None)
+    monkeypatch.setattr(sfm_module, "detect_board", lambda *args: looked.append(args) or none)
+    with pytest.raises(ScanError, match="fewer than 3 of 16"):
+        estimate_cameras(taken, SfmConfig(enough_features=enough_features), Job())
+    assert (len(tried), len(looked)) == (ways, 1)
 
 
 def test_first_camera_is_in_front_and_up_is_up(sparse):

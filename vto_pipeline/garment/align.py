@@ -77,7 +77,8 @@ def align_to_mannequin(
     """Return mannequin_from_surface, shape (4, 4): rigid, or a similarity where the scan has no scale of its own.
 
     What was scanned of the bare mannequin (neck, forearms, stand) tells the placement. Where that is too little, as of
-    a form without texture, or where the scale is unknown as well, its outline in the photos does.
+    a form without texture, its outline in the photos does. Where there are photos and no scale, the outline alone does:
+    cloth that lies close passes for bare mannequin of another size.
 
     Raises:
         GarmentError: neither settles the placement, and why.
@@ -99,6 +100,11 @@ def align_to_mannequin(
     else:
         job.note(f"the mannequin is placed by its outline in the photos: {reason}")
         return found
+    if scan.free:
+        hint = "or give the scan a scale: a printed board in the photos, or a known length (scale.lengths)"
+        raise GarmentError(
+            no_outline.problem, hint=f"{_of_unplaced(photos.cameras)}{no_outline.hint}; {hint}"
+        ) from no_outline
     try:
         found = scan.on_bare_parts(config.enough_bare, tilted=True)
     except GarmentError as error:

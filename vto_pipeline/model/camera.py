@@ -73,6 +73,7 @@ class CameraSet:
         world_from_cam: Rigid transforms, translation in metres when `metric`, shape (C, 4, 4).
         metric: Whether lengths are metres (a board or depth fixed the scale) or arbitrary.
         unregistered: File names that got no pose.
+        still: Whether one camera that stood still took all photos, before which the object turned.
     """
 
     names: tuple[str, ...]
@@ -80,6 +81,7 @@ class CameraSet:
     world_from_cam: FloatArray
     metric: bool = True
     unregistered: tuple[str, ...] = ()
+    still: bool = False
 
     def __post_init__(self) -> None:
         count = len(self.names)

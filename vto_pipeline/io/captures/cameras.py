@@ -123,6 +123,7 @@ def pack_cameras(cameras: CameraSet) -> dict[str, Any]:
         "names": np.array(cameras.names, dtype=np.str_),
         "unregistered": np.array(cameras.unregistered, dtype=np.str_),
         "metric": np.bool_(cameras.metric),
+        "still": np.bool_(cameras.still),
         "intrinsics": np.array([[getattr(i, key) for key in _INTRINSICS] for i in cameras.intrinsics]).reshape(-1, 7),
         "world_from_cam": cameras.world_from_cam,
     }
@@ -141,6 +142,7 @@ def unpack_cameras(arrays: dict[str, Any]) -> CameraSet:
             world_from_cam=arrays["world_from_cam"],
             metric=bool(arrays["metric"]),
             unregistered=tuple(map(str, arrays["unregistered"])),
+            still=bool(arrays.get("still", False)),
         )
     except (KeyError, OverflowError, TypeError, ValueError) as e:
         raise FormatError(f"not a list of cameras: {e!r}") from None
@@ -151,7 +153,8 @@ def _record(cameras: CameraSet) -> dict[str, Any]:
         {"name": name, "intrinsics": asdict(intrinsics), "world_from_cam": pose}
         for name, intrinsics, pose in zip(cameras.names, cameras.intrinsics, cameras.world_from_cam, strict=True)
     ]
-    return {"metric": cameras.metric, "unregistered": cameras.unregistered, "photos": photos}
+    told = {"metric": cameras.metric, "unregistered": cameras.unregistered, "still": cameras.still}
+    return {**told, "photos": photos}
 
 
 def _cameras(record: Any, path: Path) -> CameraSet:
@@ -163,6 +166,7 @@ def _cameras(record: Any, path: Path) -> CameraSet:
             world_from_cam=np.array([p["world_from_cam"] for p in photos], dtype=np.float64).reshape(-1, 4, 4),
             metric=bool(record["metric"]),
             unregistered=tuple(map(str, record["unregistered"])),
+            still=bool(record.get("still", False)),
         )
     except (KeyError, OverflowError, TypeError, ValueError) as e:
         raise FormatError(f"not a list of cameras: {e!r}", where=str(path)) from None

@@ -73,6 +73,35 @@ def agreeing_views(maps: DepthMaps, index: int, others: list[int], tolerance: fl
     return np.asarray(np.where(depth > 0, votes, 0))
 
 
+def moving(maps: DepthMaps, index: int, others: list[int], least_px: float) -> NDArray[np.bool_]:
+    """Return which pixels of a map show places that another photo shows elsewhere in the picture, shape (H, W).
+
+    Before a camera that stands still, what turns moves between photos. A background stays, and is matched with itself:
+    as if it lay on the axis of the turn, where all rays through one pixel cross.
+
+    Args:
+        maps: Depth maps.
+        index: The map in question.
+        others: Photos to compare it with.
+        least_px: What moves by no more in any of them, stays [px].
+    """
+    depth, pose = maps.depth[index], maps.world_from_cam[index]
+    row, column = np.nonzero(depth)
+    away = depth[row, column].astype(float)
+    local = rays(maps.intrinsics[index].matrix, *depth.shape)[row, column] * away[:, None]
+    points, here = local @ pose[:3, :3].T + pose[:3, 3], np.column_stack([column, row])
+    moves = np.zeros(len(points), dtype=bool)
+    for other in others:
+        camera, its = maps.intrinsics[other], maps.world_from_cam[other]
+        there = (points - its[:3, 3]) @ its[:3, :3]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            pixels = there[:, :2] / there[:, 2:] * [camera.fx, camera.fy] + [camera.cx, camera.cy]
+        moves |= ~(np.linalg.norm(pixels - here, axis=1) <= least_px)
+    shown = np.zeros(depth.shape, dtype=bool)
+    shown[row, column] = moves
+    return shown
+
+
 def views_on_surface(
     points: FloatArray, depth: NDArray[np.float32], camera: Intrinsics, world_from_cam: FloatArray, distance: float
 ) -> NDArray[np.int32]:

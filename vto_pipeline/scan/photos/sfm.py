@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import signal
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,6 +23,7 @@ from vto_pipeline.model.mesh import PointCloud
 from vto_pipeline.model.settings import Config
 from vto_pipeline.scan.photos.board import detect_board
 from vto_pipeline.scan.photos.matching.adjust import adjust
+from vto_pipeline.scan.photos.matching.best_grey import in_best_grey
 from vto_pipeline.scan.photos.matching.board_poses import LEAST_CORNERS, Sightings
 from vto_pipeline.scan.photos.matching.certainty import uncertainty_px
 from vto_pipeline.scan.photos.matching.features import FAINT, SURE, FeatureConfig, detect, match
@@ -43,6 +46,9 @@ STEREO_SIDE = 1000
 """Stereo looks at photos scaled down to this longer side [px]."""
 FEW = 0.8
 """Where a smaller share of the photos could be placed, fainter features are looked for."""
+
+SeekBoard = Callable[[], Sightings | None]
+"""Looks for the board in all photos, once."""
 
 
 class SfmConfig(Config):
@@ -82,15 +88,16 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
     with tempfile.TemporaryDirectory(dir=job.scratch) as scratch:
         job.progress(0.0, "features")
         counts = detect(photos, Path(scratch) / "sure.db", SURE, config.features)
-        database, found, tried = Path(scratch) / "sure.db", None, None
+        database, tried = Path(scratch) / "sure.db", None
+        seek: SeekBoard = cache(partial(_board, photos, job))
         if np.median(counts) < config.enough_features:
             job.note(f"only {int(np.median(counts))} features in the median photo: looking for fainter ones")
+            shown = in_best_grey(photos, Path(scratch) / "grey", job)
             database = Path(scratch) / "faint.db"
-            counts = detect(photos, database, FAINT, config.features)
-            found = _board(photos, job)
-            tried = _by_board_alone(photos, database, counts, found, job)
+            counts = detect(shown, database, FAINT, config.features)
+            tried = _by_board_alone(photos, database, counts, seek(), job)
         if tried is None:
-            tried = _by_features(photos, database, counts, found, config, job)
+            tried = _by_features(photos, database, counts, seek, config, job)
         model, counts, pairs = tried.model, tried.features, tried.pairs
     names = [path.name for path in photos.paths]
     if model is None or model.num_reg_images() < MIN_PHOTOS:
@@ -105,6 +112,7 @@ def estimate_cameras(photos: PhotoSet, config: SfmConfig, job: Job) -> tuple[Cam
         job.leave_out("an adjustment to more points than features", "sfm.refined is false")
     _check_certain(model, photos, config, job)
     cameras, cloud = _upright(*_values(model, names, config))
+    cameras = replace(cameras, still=tried.still)
     cloud = _without_surroundings(cameras, cloud, job)
     if cameras.unregistered:
         why = f"could not be placed, or fewer than {LEAST_TIES} points tie it to the others"
@@ -132,6 +140,7 @@ class _Tried(NamedTuple):
         pairs: That match.
         by_board: Whether the board placed them.
         corners: Of the board, per photo; empty where it was not looked for.
+        still: Whether the camera stood still.
     """
 
     model: Any | None
@@ -139,6 +148,7 @@ class _Tried(NamedTuple):
     pairs: int
     by_board: bool
     corners: Sequence[int] = ()
+    still: bool = False
 
     @property
     def placed(self) -> int:
@@ -147,20 +157,22 @@ class _Tried(NamedTuple):
 
 
 def _by_features(
-    photos: PhotoSet, database: Path, features: list[int], found: Sightings | None, config: SfmConfig, job: Job
+    photos: PhotoSet, database: Path, features: list[int], seek: SeekBoard, config: SfmConfig, job: Job
 ) -> _Tried:
     """Match the features of all photos and place these; where few could be, look for other features or the board."""
     job.progress(0.3, f"matching {len(photos.paths)} photos")
     pairs, fixed_camera = match(photos, database, config.features, job)
     job.progress(0.7, f"placing cameras, {pairs} matched pairs")
-    tried = _placed(photos, database, features, pairs, found, job)
+    tried = _placed(photos, database, features, pairs, seek, job)
     again = None
     if fixed_camera and tried.placed < len(photos.paths):
-        again = _beside_background(photos, database.parent, config, job)
+        again = _beside_background(photos, database.parent, seek, config, job)
     elif tried.placed < FEW * len(photos.paths) and database.stem == "sure" and not tried.by_board:
         job.note(f"only {tried.placed} of {len(photos.paths)} photos could be placed: looking for fainter features")
-        again = _faint(photos, photos, database.parent / "faint", config, job)
-    return again if again is not None and _is_better(again, tried) else tried
+        shown = in_best_grey(photos, database.parent / "grey", job)
+        again = _faint(shown, photos, database.parent / "faint", seek, config, job)
+    best = again if again is not None and _is_better(again, tried) else tried
+    return best._replace(still=fixed_camera)
 
 
 def _board(photos: PhotoSet, job: Job) -> Sightings | None:
@@ -191,16 +203,14 @@ def _by_board_alone(
     return tried
 
 
-def _placed(
-    photos: PhotoSet, database: Path, features: list[int], pairs: int, found: Sightings | None, job: Job
-) -> _Tried:
+def _placed(photos: PhotoSet, database: Path, features: list[int], pairs: int, seek: SeekBoard, job: Job) -> _Tried:
     """Place photos by their features, or by the board if these place few and it places more."""
     folder, names = photos.paths[0].parent, tuple(path.name for path in photos.paths)
     tried = _Tried(map_photos(database, folder, len(names), job), features, pairs, by_board=False)
     if tried.placed >= FEW * len(names) or photos.board is None:
         return tried
     job.note(f"only {tried.placed} of {len(names)} photos could be placed by features: looking for the board")
-    found = found or _board(photos, job) or {}
+    found = seek() or {}
     corners = [len(found[name][0]) for name in names]
     by_board = _Tried(map_from_board(database, folder, photos.board, found, job), features, pairs, True, corners)
     return by_board if by_board.placed > tried.placed else tried._replace(corners=corners)
@@ -241,7 +251,7 @@ def _of_board(tried: _Tried) -> str:
     return f" {shown}: look down on it from higher up, lay it where nothing hides it, or print it as board.yaml says."
 
 
-def _beside_background(photos: PhotoSet, scratch: Path, config: SfmConfig, job: Job) -> _Tried | None:
+def _beside_background(photos: PhotoSet, scratch: Path, seek: SeekBoard, config: SfmConfig, job: Job) -> _Tried | None:
     """Try again with the background painted over: its many features hide that the object has few, and faint ones.
 
     None where the background is not known.
@@ -256,18 +266,25 @@ def _beside_background(photos: PhotoSet, scratch: Path, config: SfmConfig, job: 
     beside = scratch / "beside"
     (beside / "photos").mkdir(parents=True)
     painted = paint_over(photos, masks, grey_beside(photos, masks), beside / "photos")
-    return _faint(painted, photos, beside, config, job, camera_stays=True)
+    return _faint(painted, photos, beside, seek, config, job, camera_stays=True)
 
 
 def _faint(
-    shown: PhotoSet, photos: PhotoSet, folder: Path, config: SfmConfig, job: Job, *, camera_stays: bool = False
+    shown: PhotoSet,
+    photos: PhotoSet,
+    folder: Path,
+    seek: SeekBoard,
+    config: SfmConfig,
+    job: Job,
+    *,
+    camera_stays: bool = False,
 ) -> _Tried:
     """Place the photos by faint features of what is shown of them."""
     folder.mkdir(exist_ok=True)
     database = folder / "faint.db"
     counts = detect(shown, database, FAINT, config.features)
     pairs, _ = match(shown, database, config.features, Job(seed=job.seed), camera_stays=camera_stays)
-    return _placed(photos, database, counts, pairs, None, job)
+    return _placed(photos, database, counts, pairs, seek, job)
 
 
 def _is_better(again: _Tried, before: _Tried) -> bool:
@@ -359,5 +376,5 @@ def transform_reconstruction(
     poses[:, :3, :3] = rotation @ cameras.world_from_cam[:, :3, :3]
     poses[:, :3, 3] = scale * cameras.world_from_cam[:, :3, 3] @ rotation.T + shift
     normals = None if cloud.normals is None else cloud.normals @ rotation.T
-    placed = CameraSet(cameras.names, cameras.intrinsics, poses, metric, cameras.unregistered)
+    placed = replace(cameras, world_from_cam=poses, metric=metric)
     return placed, PointCloud(scale * cloud.points @ rotation.T + shift, normals, cloud.colors)

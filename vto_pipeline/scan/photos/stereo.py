@@ -23,8 +23,9 @@ from vto_pipeline.model.mesh import PointCloud
 from vto_pipeline.model.settings import Config
 from vto_pipeline.numerics.cpu_threads import in_order
 from vto_pipeline.scan.library_message import library_message
-from vto_pipeline.scan.photos.consistency import agreeing_views, consensus, rays
+from vto_pipeline.scan.photos.consistency import agreeing_views, consensus, moving, rays
 from vto_pipeline.scan.photos.disparity import MatchConfig, match_pair
+from vto_pipeline.scan.photos.matching.fixed_camera import MOVING_SHARE
 from vto_pipeline.scan.photos.neighbours import choose_pairs, visibility
 from vto_pipeline.scan.photos.rectify import StereoView, rectify
 from vto_pipeline.scan.photos.region import object_region
@@ -91,13 +92,16 @@ def estimate_depth_maps(
     job.measure(pairs=len(pairs), depth_pixels=kept, consistent_share=round(kept / measured, 3))
     maps = replace(merged, depth=checked)
     del merged  # as large as what is kept
+    if cameras.still:
+        maps = _without_background(maps, pairs, job)
     if config.rematch.rounds == 0:
         return maps
     try:
-        return rematch((undistorted(view.gray, view.camera) for view in views), maps, config.rematch, job)
+        maps = rematch((undistorted(view.gray, view.camera) for view in views), maps, config.rematch, job)
     except ScanError as error:
         job.note(f"no second look: {error.problem}")
         return maps
+    return _without_background(maps, pairs, job) if cameras.still else maps
 
 
 def _threads(views: list[StereoView], pairs: list[tuple[int, int]], config: StereoConfig, job: Job) -> int:
@@ -194,13 +198,37 @@ def _in_order(
             yield pair, future.result()
 
 
+def _without_background(maps: DepthMaps, pairs: list[tuple[int, int]], job: Job) -> DepthMaps:
+    """Leave out depth of what stays in its place before a camera that does: the background, matched with itself."""
+    depth = maps.depth.copy()
+    least = MOVING_SHARE * max(max(lens.width, lens.height) for lens in maps.intrinsics)
+
+    def drop(i: int) -> None:
+        depth[i][~moving(maps, i, _paired(pairs, i), least)] = 0
+
+    for _ in in_order(drop, len(depth)):
+        pass
+    left = int((depth > 0).sum())
+    if left == 0:
+        raise ScanError("all that has depth stays in its place, as a background does", hint="does the object turn?")
+    before = int((maps.depth > 0).sum())
+    job.note(f"left out {100 * (1 - left / before):.1f} % of the depth: it stays in its place, as the camera does")
+    depth.flags.writeable = False
+    return replace(maps, depth=depth)
+
+
+def _paired(pairs: list[tuple[int, int]], index: int) -> list[int]:
+    """Return the photos that one is paired with."""
+    return sorted({a + b - index for a, b in pairs if index in (a, b)})
+
+
 def _check(merged: DepthMaps, pairs: list[tuple[int, int]], config: StereoConfig, job: Job) -> NDArray[np.float32]:
     """Depths that enough other photos confirm and that can be of the object, shape (C, H, W)."""
     checked = np.zeros_like(merged.depth)
     region = object_region(CameraSet(merged.names, merged.intrinsics, merged.world_from_cam))
 
     def check(i: int) -> None:
-        depth, others = merged.depth[i], sorted({a + b - i for a, b in pairs if i in (a, b)})
+        depth, others = merged.depth[i], _paired(pairs, i)
         if others:
             votes = agreeing_views(merged, i, others, config.check_tolerance)
             checked[i] = np.where(votes >= config.check_views, depth, 0)

@@ -2,6 +2,7 @@
 
 fixed_camera: a background that stays where it is, found by its matches
 still_background: which pixels show it, so that it can be painted over
+best_grey: the grey in which few features become many
 features: features, and pairs of photos that share them
 mapping: cameras and points from the pairs
 board_poses, from_board: the same where features are too few, and photos show the board
