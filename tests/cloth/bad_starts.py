@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vto_pipeline.geometry.topology import edges, vertex_normals
+from vto_pipeline.geometry.topology import edge_faces, edges, vertex_normals
 from vto_pipeline.model.mesh import TriangleMesh
 
 
@@ -24,7 +24,7 @@ def sleeves_up(shirt):
 
 def finned(shirt):
     """A hundred of its edges have a third face."""
-    pairs = edges(shirt)
+    pairs = edges(shirt)[edge_faces(shirt)[:, 1] >= 0]
     chosen = pairs[np.random.default_rng(0).choice(len(pairs), 100, replace=False)]
     tips = shirt.vertices[chosen].mean(axis=1) + 0.01 * vertex_normals(shirt)[chosen[:, 0]]
     fins = np.column_stack([chosen, len(shirt.vertices) + np.arange(100)])

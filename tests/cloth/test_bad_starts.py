@@ -1,7 +1,5 @@
 """Starts that no one would choose: each ends clean, judged by ipctk, or fails with the places that still cross."""
 
-import re
-
 import numpy as np
 import pytest
 from bad_starts import finned, shifted, sleeves_up, two, upside_down
@@ -98,8 +96,7 @@ def test_a_hundred_edges_of_three_faces(dressed):
     job = Job()
     mesh = remesh_for_simulation(repair(finned(shirt), RepairConfig(), job), COARSE, job)
     assert any("non-manifold" in note for note in job.notes)
-    dropped, of = map(int, re.search(r"dropped (\d+) of (\d+) pieces", " ".join(job.notes)).groups())
-    assert 90 < dropped == of - 1  # fins of neighbouring edges may hang together
+    assert any("dropped 100 of 101 pieces" in note for note in job.notes)
     ends_clean(mesh, form)
 
 

@@ -1,17 +1,21 @@
 """Seams that a file leaves open are sewn; real openings, and rims further apart, stay."""
 
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial import cKDTree
 
+from vto_pipeline.garment import open_seams
 from vto_pipeline.garment.open_seams import sew_open_seams
 from vto_pipeline.geometry.remeshing.repair import RepairConfig, is_manifold, is_oriented, repair
 from vto_pipeline.geometry.topology import boundary_loops, face_components
 from vto_pipeline.io.meshes import read_mesh
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.stages.garment import STAGES
 
 SUIT = Path(__file__).parents[3] / "shared" / "data" / "garments" / "makehuman" / "male_worksuit01.obj"
 EDGE, WITHIN = 0.01, 2e-3
@@ -66,10 +70,11 @@ def test_pieces_that_a_file_keeps_apart_become_one_whichever_lies_first():
 def test_colours_stay_with_their_vertices():
     lower, upper = strip(4, 2), strip(4, 2, shift=(0.0, 0.02 + 1e-3, 0.0))
     mesh = together(lower, upper)
-    colors = np.repeat(np.array([[255, 0, 0], [0, 0, 255]], np.uint8), len(lower.vertices), axis=0)
+    colors = np.random.default_rng(0).integers(0, 256, mesh.vertices.shape).astype(np.uint8)
     sewn = sew_open_seams(TriangleMesh(mesh.vertices, mesh.faces, colors), WITHIN, Job())
-    assert_array_equal(sewn.colors[sewn.vertices[:, 1] > 0.021], [[0, 0, 255]] * 10)
-    assert_array_equal(sewn.colors[sewn.vertices[:, 1] < 0.019], [[255, 0, 0]] * 10)
+    far, which = cKDTree(mesh.vertices).query(sewn.vertices)
+    assert (far == 0.0).sum() == 20
+    assert_array_equal(sewn.colors[far == 0.0], colors[which[far == 0.0]])
 
 
 @pytest.mark.parametrize(
@@ -92,9 +97,36 @@ def test_of_three_rims_at_one_place_two_are_sewn():
     lower, upper = strip(5, 5), strip(5, 5, shift=(0.0, 0.05 + 1e-3, 0.0))
     along, _, up = upper.vertices.T
     standing = TriangleMesh(np.column_stack([along, 0.0504 + up, 0.051 - upper.vertices[:, 1]]), upper.faces)
-    sewn = sew_open_seams(together(lower, upper, standing), WITHIN, Job())
-    assert is_manifold(sewn)
+    for parts in permutations((lower, upper, standing)):
+        sewn = sew_open_seams(together(*parts), WITHIN, Job())
+        assert is_manifold(sewn)
+        assert face_components(sewn)[0] == 2
+
+
+def test_a_seam_that_would_leave_no_manifold_stays_open_and_is_said(monkeypatch):
+    monkeypatch.setattr(open_seams, "is_manifold", lambda mesh: False)
+    slit, job = slit_tube(0.8e-3), Job()
+    assert sew_open_seams(slit, WITHIN, job) is slit
+    assert "120 mm of rims" in job.warnings[0]
+    assert "stay open" in job.warnings[0]
+
+
+def test_a_lining_is_not_sewn_to_its_cloth_all_around():
+    """Its rims run the other way, as those of a next piece do, but it lies on the same side: no opening would stay."""
+    cloth, lining = slit_tube(0.0), slit_tube(0.0)
+    pair = together(cloth, TriangleMesh(0.985 * lining.vertices + [0.0, 9e-4, 0.0], lining.faces[:, ::-1].copy()))
+    sewn = sew_open_seams(pair, WITHIN, Job())
     assert face_components(sewn)[0] == 2
+    assert len(boundary_loops(sewn)) == 4
+
+
+@pytest.mark.parametrize(("pattern", "pieces"), [({}, 1), ({"garment_pattern": None}, 2)], ids=["mesh", "pattern"])
+def test_a_mesh_is_sewn_where_it_is_taken_in_and_a_pattern_is_not(pattern, pieces):
+    stage = next(stage for stage in STAGES if stage.name == "take_mesh")
+    tube = slit_tube(0.0)
+    gap = together(tube, TriangleMesh(tube.vertices + np.array([0.0, 0.1206, 0.0]), tube.faces))
+    made = stage.run({"garment_mesh": gap, **pattern}, stage.settings(), Job())
+    assert face_components(made["garment"])[0] == pieces
 
 
 @pytest.mark.skipif(not SUIT.exists(), reason="needs garments by others")

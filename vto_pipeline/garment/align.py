@@ -58,6 +58,9 @@ class AlignConfig(Config):
     outline: OutlineConfig = Field(default_factory=OutlineConfig, description="The mannequin's outline in photos")
 
 
+GIVE_A_SCALE = "give the scan a scale: a printed board in the photos, or a known length (scale.lengths)"
+
+
 @dataclass(frozen=True)
 class PosedPhotos:
     """The photos a scan was made from.
@@ -101,10 +104,8 @@ def align_to_mannequin(
         job.note(f"the mannequin is placed by its outline in the photos: {reason}")
         return found
     if scan.free:
-        hint = "or give the scan a scale: a printed board in the photos, or a known length (scale.lengths)"
-        raise GarmentError(
-            no_outline.problem, hint=f"{_of_unplaced(photos.cameras)}{no_outline.hint}; {hint}"
-        ) from no_outline
+        hint = f"{_of_unplaced(photos.cameras)}{no_outline.hint}; or {GIVE_A_SCALE}"
+        raise GarmentError(no_outline.problem, hint=hint) from no_outline
     try:
         found = scan.on_bare_parts(config.enough_bare, tilted=True)
     except GarmentError as error:
@@ -124,7 +125,6 @@ class _Scan:
         self.points, self.normals, _ = sample_surface(surface, config.samples, job.seed)
         self.few = slice(None, None, max(config.samples // FEW, 1))
         self.free = not surface.metric
-        self._in_sizes: list[FloatArray] | None = None
 
     def on_bare_parts(self, least: float, tilted: bool) -> FloatArray:
         """Place the scan by what it shows of the bare mannequin.
@@ -189,11 +189,8 @@ class _Scan:
         return [placement for _, placement in scored]
 
     def _sized(self, count: int) -> list[FloatArray]:
-        """Placements in several sizes, best first; found once, for the outline and the bare parts both ask for them."""
-        if self._in_sizes is None:
-            few, least = self.points[self.few], self.config.enough_bare
-            self._in_sizes = scaled_starts(few, self.mannequin, self.distance, least)
-        return self._in_sizes[:count]
+        """Placements in several sizes, best first."""
+        return scaled_starts(self.points[self.few], self.mannequin, self.distance, self.config.enough_bare)[:count]
 
     def _refined(self, start: FloatArray, bands: FloatArray, which: slice = slice(None)) -> MannequinAlignment:
         points, normals = self.points[which], self.normals[which]
@@ -210,8 +207,7 @@ class _Scan:
             other = max(rivals, key=lambda one: abs(np.log(one.scale / best.scale)))
             raise GarmentError(
                 f"the scan fits the mannequin in two sizes, {other.scale / best.scale:.2f} to 1: too little is bare",
-                hint="give the scan a scale: a printed board in the photos, or a known length (scale.lengths); or show "
-                "more of the bare mannequin",
+                hint=f"{GIVE_A_SCALE}; or show more of the bare mannequin",
             )
         bands = np.geomspace(COARSE_BANDS[-1], config.widest_band_mm * 1e-3, FINE_BANDS)
         placed = self._refined(best.mannequin_from_surface, bands)
