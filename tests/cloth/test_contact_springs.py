@@ -58,7 +58,7 @@ def solved(made, x, y, h=0.01):
     right, held, mass = np.zeros((COUNT, 3)), np.zeros(COUNT, np.bool_), np.full(COUNT, 1e-3)
     vertices, weights = linked_contacts(made, held)
     between = np.zeros((len(vertices), 3, 3))
-    add_contacts(made, mass, held, h, x, y, matrix, right, between)
+    add_contacts(made, mass, held, h, x, y, matrix, right, between, False)
     dense = np.zeros((COUNT, 3, COUNT, 3))
     for i in range(COUNT):
         dense[i, :, i] += matrix.blocks[i] - stiff[i]
@@ -148,7 +148,7 @@ def test_held_places_are_not_put_right_by_what_is_hardly_beside_them(share):
     matrix = BlockMatrix(np.arange(5, dtype=np.int32), at.astype(np.int32), np.tile(1e3 * np.eye(3), (4, 1, 1)), at)
     right, between = np.zeros((4, 3)), np.zeros((1, 3, 3))
     _, weights = linked_contacts(made, held)
-    add_contacts(made, np.full(4, 1e-3), held, 0.01, x, x, matrix, right, between)
+    add_contacts(made, np.full(4, 1e-3), held, 0.01, x, x, matrix, right, between, False)
     move = np.linalg.solve(matrix.blocks[1] + weights[0, 1] ** 2 * between[0], right[1])
     by_guess = np.zeros((4, 3))
     project_to_contacts(made, np.where(held, 0.0, 1e3), x, x, by_guess)

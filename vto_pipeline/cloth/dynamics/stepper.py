@@ -20,7 +20,7 @@ from vto_pipeline.cloth.collision.contacts import (
     gather_contacts,
     without_friction,
 )
-from vto_pipeline.cloth.collision.response.active_set import ActiveSet, active_set, no_contacts
+from vto_pipeline.cloth.collision.response.active_set import LYING, ActiveSet, active_set, no_contacts
 from vto_pipeline.cloth.collision.response.penalty import FREQUENCY, Penalty
 from vto_pipeline.cloth.collision.response.projected_gauss_seidel import separate_pairs
 from vto_pipeline.cloth.collision.self_collision.pairs import no_pairs
@@ -199,7 +199,7 @@ class Stepper:
         x, still = state.positions, np.zeros_like(state.positions)
         pairs = no_pairs() if self.self_contact is None else self.self_contact.find_pairs(x, x, FRAME)
         mass = self._model.inverse_mass
-        touched = active_set(self._contacts, pairs, 0.0, 1.0, mass, x, still, self.contact_memory)
+        touched = active_set(self._contacts, pairs, 0.0, 1.0, mass, x, still, self.contact_memory, LYING)
         return relative_residual(self._model, x, touched)
 
     @property

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vto_pipeline.cloth.collision.contacts import Contacts
-from vto_pipeline.cloth.collision.response.active_set import ActiveSet, active_set, add_pairs, no_contacts
+from vto_pipeline.cloth.collision.response.active_set import LYING, ActiveSet, active_set, add_pairs, no_contacts
 from vto_pipeline.cloth.collision.response.contact_springs import (
     add_contacts,
     add_last_forces,
@@ -170,7 +170,8 @@ class Newton:
         target = x + move + (~held)[:, None] * (h * h * model.gravity)
         itself = self.self_contact
         pairs = no_pairs() if itself is None else itself.find_pairs(start, target, h, move)
-        self.active = active_set(contacts, pairs, t0, t1, model.inverse_mass, start, move, self.active)
+        lying = 0.0 if self.exact else LYING
+        self.active = active_set(contacts, pairs, t0, t1, model.inverse_mass, start, move, self.active, lying)
         if led.any():  # what they pull at their neighbours by being led is no measure
             forces = model.mass[:, None] * model.gravity
             add_forces(start, model.constraints, forces)
@@ -280,7 +281,7 @@ class Newton:
             if touches:
                 matrix.blocks[matrix.diagonal] = bare
                 between = system.couple(*linked_contacts(self.active, self._held))
-                add_contacts(self.active, model.mass, self._held, h, x, y, matrix, right, between)
+                add_contacts(self.active, model.mass, self._held, h, x, y, matrix, right, between, self.definite)
                 project_to_contacts(self.active, model.inverse_mass, x, y, move)
             if self.definite:
                 self.definite = system.eliminated(right, move)

@@ -1,7 +1,7 @@
 """Remeshing, repair and hole filling.
 
 remesh, isotropic: triangles of one size; layers: each vertex back in its own layer
-rims, rim_ears: openings before that and how long they stay, flat triangles at rims after it
+rims: openings before that and how long they stay; slivers: flat triangles after it
 decimate: fewer
 clip: along the line where a value changes sign
 holes: filled so that the filling continues the surface; ears and triangulate span them, refine makes triangles even

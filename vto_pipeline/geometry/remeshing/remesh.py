@@ -14,8 +14,8 @@ from vto_pipeline.geometry.remeshing.decimate import decimate, faces_at
 from vto_pipeline.geometry.remeshing.isotropic import isotropic
 from vto_pipeline.geometry.remeshing.layers import Layers
 from vto_pipeline.geometry.remeshing.repair import is_manifold
-from vto_pipeline.geometry.remeshing.rim_ears import flip_ears
 from vto_pipeline.geometry.remeshing.rims import SMALL, even_rims, perimeter, rim_change, rim_corners
+from vto_pipeline.geometry.remeshing.slivers import flip_slivers
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import (
     boundary_loops,
@@ -74,7 +74,7 @@ def remesh(mesh: TriangleMesh, config: RemeshConfig, job: Job) -> TriangleMesh:
     best: TriangleMesh | None = None
     given, (crossing, change), problem = len(self_intersections(mesh)), (np.inf, np.inf), ""
     for way in (_slid, _slid_between_corners, *([_pinned] if len(_inner(coarse)) else [])):
-        tried = flip_ears(way(coarse, edge, config.iterations))
+        tried = flip_slivers(way(coarse, edge, config.iterations))
         broken = _broken(mesh, tried)
         problem = problem or broken
         if not broken:

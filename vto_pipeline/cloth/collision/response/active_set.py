@@ -25,7 +25,8 @@ from vto_pipeline.numerics.vector import axpy, dot, load, store
 _PAIRS = np.int64(1) << 40  # keys from here on are of pairs, those under it of planes
 LEVER = 1e-4
 """Of the squares of all weights; where held vertices have the rest, a free one would go 100 times the gap."""
-_LYING = 1e-4  # m: what is nearer than this to something that it has not touched yet begins to push
+LYING = 1e-4
+"""Nearer than this to something that it has not touched yet, cloth that falls begins to push [m]."""
 
 
 class ActiveSet(NamedTuple):
@@ -98,7 +99,7 @@ def no_contacts(count):
 
 
 @njit(cache=True, error_model="numpy")
-def active_set(contacts, pairs, t0, t1, inverse_mass, x, drift, before):
+def active_set(contacts, pairs, t0, t1, inverse_mass, x, drift, before, lying):
     """Return the contacts where they are at the end of a step, with a guess which of them push.
 
     Args:
@@ -110,6 +111,7 @@ def active_set(contacts, pairs, t0, t1, inverse_mass, x, drift, before):
         drift: How far vertices go by their speed alone [m], shape (V, 3). In a long step they would fall much farther,
             were they free; but cloth holds most, and a contact guessed wrongly draws it to what it is far away from.
         before: The active set of the last step.
+        lying: What is nearer than this to something that it has not touched yet begins to push [m].
     """
     found = no_contacts(np.sum(contacts.active) + len(pairs.key))
     count = 0
@@ -129,7 +131,7 @@ def active_set(contacts, pairs, t0, t1, inverse_mass, x, drift, before):
         _fill_from_pair(found, count, pairs, p)
         count += 1
     for c in range(count):
-        _warm_start(found, c, before, x, drift)
+        _warm_start(found, c, before, x, drift, lying)
     return _subset(found, np.arange(count))
 
 
@@ -156,7 +158,7 @@ def _new_contacts(pairs, places, contacts, x, guess):
     found = no_contacts(len(places))
     for c in range(len(places)):
         _fill_from_pair(found, c, pairs, places[c])
-        _warm_start(found, c, contacts, x, guess)
+        _warm_start(found, c, contacts, x, guess, LYING)
     return found
 
 
@@ -195,11 +197,11 @@ def _subset(contacts, places):
 
 
 @njit(cache=True, error_model="numpy")
-def _warm_start(found, c, before, x, way):
+def _warm_start(found, c, before, x, way, lying):
     """Guess whether contact c pushes and slides: as in the last step, or where its vertices are going."""
     n = load(found.normal, c)
     place = np.searchsorted(before.key, found.key[c])
-    pushed, near = False, _LYING
+    pushed, near = False, lying
     if place < len(before.key) and before.key[place] == found.key[c]:
         pushed, near = before.pushing[place], 0.0
         found.force[c], found.sliding[c] = before.force[place], before.sliding[place]

@@ -18,7 +18,7 @@ _STIFFER = 1e3  # times mass / h²: a free vertex at rest on a plane sinks g h²
 
 
 @njit(cache=True, error_model="numpy")
-def add_contacts(contacts, mass, held, h, x, y, matrix, right, blocks):
+def add_contacts(contacts, mass, held, h, x, y, matrix, right, blocks, firm):
     """Add the contacts that push to the system (matrix and links) d = right for the move d from y.
 
     Args:
@@ -30,10 +30,11 @@ def add_contacts(contacts, mass, held, h, x, y, matrix, right, blocks):
         matrix: Contacts of a single vertex are added to its diagonal blocks.
         right: Forces [N], shape (V, 3), changed in place.
         blocks: Filled for contacts of several vertices that push, in their order, shape (P, 3, 3).
+        firm: Whether those are as stiff as the cloth, whatever they bear.
     """
     linked = 0
     single = np.empty((3, 3))
-    _set_springs(contacts, mass, held, h, matrix)
+    _set_springs(contacts, mass, held, h, matrix, firm)
     for c in range(len(contacts.key)):
         if not contacts.pushing[c]:
             continue
@@ -88,7 +89,7 @@ def linked_contacts(contacts, held):
 
 
 @njit(cache=True, error_model="numpy")
-def _set_springs(contacts, mass, held, h, matrix):
+def _set_springs(contacts, mass, held, h, matrix, firm):
     """Make planes stiffer than the cloth holds what they touch, and all much stiffer than inertia."""
     for c in range(len(contacts.key)):
         give = stiff_give = free = whole = 0.0
@@ -111,7 +112,8 @@ def _set_springs(contacts, mass, held, h, matrix):
             contacts.rest_offset[c] = contacts.force[c] / contacts.normal_stiffness[c]
         else:
             borne = _FIRM * contacts.force[c] / max(contacts.level[c], _NO_LENGTH)
-            contacts.normal_stiffness[c] = min(1.0 / stiff_give, max(1.0 / give, borne))
+            enough = 1.0 / stiff_give if firm else max(1.0 / give, borne)
+            contacts.normal_stiffness[c] = min(1.0 / stiff_give, enough)
             contacts.rest_offset[c] = contacts.force[c] / contacts.normal_stiffness[c]
         contacts.tangential_stiffness[c] = min(1.0 / stiff_give, contacts.normal_stiffness[c])
 

@@ -60,7 +60,7 @@ class Penalty:
         """
         still = np.zeros_like(x)
         self._start, self._h = x, h
-        self._active = active_set(contacts, pairs, t0, t1, self._inverse_mass, x, still, self._active)
+        self._active = active_set(contacts, pairs, t0, t1, self._inverse_mass, x, still, self._active, LYING)
         _set_springs(self._active, self._inverse_mass, x)
 
     def end(self, y: FloatArray) -> None:
