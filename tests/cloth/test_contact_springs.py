@@ -50,15 +50,15 @@ def slips(made, x, y):
     return along(made, moved - made.carried)
 
 
-def solved(made, x, y, h=0.01):
+def solved(made, x, y, h=0.01, firm=False, stiffness=1e3):
     """What the contacts add: the matrix, dense, and the forces."""
     diagonal = np.arange(COUNT)
-    stiff = np.tile(1e3 * np.eye(3), (COUNT, 1, 1))
+    stiff = np.tile(stiffness * np.eye(3), (COUNT, 1, 1))
     matrix = BlockMatrix(np.arange(COUNT + 1, dtype=np.int32), diagonal.astype(np.int32), stiff.copy(), diagonal)
     right, held, mass = np.zeros((COUNT, 3)), np.zeros(COUNT, np.bool_), np.full(COUNT, 1e-3)
     vertices, weights = linked_contacts(made, held)
     between = np.zeros((len(vertices), 3, 3))
-    add_contacts(made, mass, held, h, x, y, matrix, right, between, False)
+    add_contacts(made, mass, held, h, x, y, matrix, right, between, firm)
     dense = np.zeros((COUNT, 3, COUNT, 3))
     for i in range(COUNT):
         dense[i, :, i] += matrix.blocks[i] - stiff[i]
@@ -69,13 +69,14 @@ def solved(made, x, y, h=0.01):
     return dense.reshape(3 * COUNT, -1), right.ravel()
 
 
+@pytest.mark.parametrize("firm", [False, True])
 @pytest.mark.parametrize("sliding", [False, True])
-def test_forces_and_stiffness_are_those_of_the_energy(sliding):
+def test_forces_and_stiffness_are_those_of_the_energy(sliding, firm):
     rng = np.random.default_rng(3)
     made = contacts(sliding)
     x = 1e-2 * rng.normal(size=(COUNT, 3))
     y = x + 1e-4 * rng.normal(size=(COUNT, 3))
-    matrix, right = solved(made, x, y)
+    matrix, right = solved(made, x, y, firm=firm)
 
     def energy(d):
         return contact_energy(made, x, y + d.reshape(-1, 3))
@@ -88,6 +89,28 @@ def test_forces_and_stiffness_are_those_of_the_energy(sliding):
         [(energy(s + t) - energy(s - t) - energy(t - s) + energy(-s - t)) / (4 * size**2) for t in steps] for s in steps
     ]
     assert_allclose(bend, matrix, rtol=1e-5, atol=1e-7 * np.abs(matrix).max())
+
+
+def test_a_firm_pair_is_as_stiff_as_the_cloth_on_either_side_in_series():
+    """However little it bears. Cloth that is about to buckle between two layers is held by nothing else."""
+    soft, firm = contacts(False), contacts(False)
+    x = np.zeros((COUNT, 3))
+    for made, is_firm in ((soft, False), (firm, True)):
+        made.force[4] = 1e-9
+        solved(made, x, x, firm=is_firm)
+    cloth = 1e3 + 1e3 * 1e-3 / 0.01**2  # and much stiffer than inertia
+    assert_allclose(firm.normal_stiffness[4], cloth / (1.0 + 0.3**2 + 0.3**2 + 0.4**2), rtol=1e-12)
+    assert_allclose(firm.tangential_stiffness[4], firm.normal_stiffness[4], rtol=1e-12)
+    assert soft.normal_stiffness[4] < 0.1 * firm.normal_stiffness[4]
+    assert_allclose(firm.normal_stiffness[:4], soft.normal_stiffness[:4], rtol=1e-12)
+
+
+def test_cloth_that_would_buckle_is_no_negative_spring():
+    made, x = contacts(False), np.zeros((COUNT, 3))
+    solved(made, x, x, firm=True, stiffness=-1e9)
+    inertia = 1e3 * 1e-3 / 0.01**2
+    assert_allclose(made.normal_stiffness[4], inertia / (1.0 + 0.3**2 + 0.3**2 + 0.4**2), rtol=1e-12)
+    assert (made.normal_stiffness > 0.0).all()
 
 
 def test_what_slides_has_the_tangent_of_coulombs_force():

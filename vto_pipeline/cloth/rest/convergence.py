@@ -161,14 +161,12 @@ def relax_to_rest(
             newton_steps.indefinite_step = np.inf
         elif stepper.was_positive_definite:
             stood += span
-        proven = stood >= _FOLDS * newton_steps.indefinite_step
-        balanced = result.residual < limits.residual or not exact
         if not brief:  # a shorter time tells nothing about rest
             moves.append(moved)
             drifts.append(0.5 * rms(after.positions - earlier) if len(moves) > 1 else moved)
             earlier = before
             whole = newton_steps.took_full_step and len(moves) > 1
-            stable = whole or proven
+            stable = whole or stood >= _FOLDS * newton_steps.indefinite_step
             to_come = max(moves[-2:]) if whole else max(moved, _still_to_come(drifts))
             result.error = max(to_come, _VAGUE) if stepper.can_use_exact_stiffness and not stable else to_come
             if not exact:
@@ -182,19 +180,16 @@ def relax_to_rest(
         result.jammed = exact and _is_jammed([one.residual for one in result.trace])
         if result.caught or result.jammed:
             break
-        if brief and proven and balanced:
-            newton_steps.end()  # the usual steps tell how far it still goes
-        elif brief:
-            newton_steps.choose(moved < _STILL, residual, moved)
         if brief:
+            newton_steps.choose(moved < _STILL, residual, moved)
             continue
         first = coarse is None and not exact
         bound = _COARSE * limits.error if first else (1.0 if exact else 0.5) * limits.error
         still = still + 1 if to_come < _STILL else 0
+        balanced = result.residual < limits.residual or not exact
         over = balanced or still >= _LONG
         quiet = quiet + 1 if to_come < bound and over and (stable or not stepper.was_positive_definite) else 0
-        proves = limits.error < _VAGUE and (whole or not proven or stepper.was_positive_definite)
-        if stepper.can_use_exact_stiffness and proves:
+        if stepper.can_use_exact_stiffness and limits.error < _VAGUE:
             newton_steps.choose(moved < (_NEAR if over else _STILL), residual, moved)
         if quiet < (1 if exact and residual < limits.residual else _QUIET):  # at a turn of its way forces are large
             continue

@@ -117,8 +117,6 @@ class StableNewtonSteps:
             self.indefinite_step = min(self.indefinite_step, stepper.step)
             self._shorten(self._usual)
         else:
-            if self._tried:
-                self.indefinite_step = min(self.indefinite_step, stepper.step)
             self._most = _ASIDE * max(residual, _SLIGHT * self._enough)
             if self._tried and stepper.substeps >= _SHORTER * self._usual:  # not even so: there is no end to that way
                 self._give_up()

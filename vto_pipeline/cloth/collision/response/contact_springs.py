@@ -30,7 +30,8 @@ def add_contacts(contacts, mass, held, h, x, y, matrix, right, blocks, firm):
         matrix: Contacts of a single vertex are added to its diagonal blocks.
         right: Forces [N], shape (V, 3), changed in place.
         blocks: Filled for contacts of several vertices that push, in their order, shape (P, 3, 3).
-        firm: Whether those are as stiff as the cloth, whatever they bear.
+        firm: Whether those are as stiff as the cloth, whatever they bear: cloth that would buckle between two layers
+            is held by nothing else. Elimination solves that as fast; cycles of multigrid do not.
     """
     linked = 0
     single = np.empty((3, 3))
@@ -90,7 +91,10 @@ def linked_contacts(contacts, held):
 
 @njit(cache=True, error_model="numpy")
 def _set_springs(contacts, mass, held, h, matrix, firm):
-    """Make planes stiffer than the cloth holds what they touch, and all much stiffer than inertia."""
+    """Make planes stiffer than the cloth holds what they touch, and all much stiffer than inertia.
+
+    Where the exact stiffness of pressed cloth is negative, it counts as none.
+    """
     for c in range(len(contacts.key)):
         give = stiff_give = free = whole = 0.0
         lone = _is_against_other(contacts, c)
@@ -101,7 +105,7 @@ def _set_springs(contacts, mass, held, h, matrix, firm):
                 free += w * w
                 inertia = mass[i] / (h * h)
                 block = matrix.blocks[matrix.diagonal[i]]
-                stiff = (block[0, 0] + block[1, 1] + block[2, 2]) / 3.0 + _STIFFER * inertia
+                stiff = max((block[0, 0] + block[1, 1] + block[2, 2]) / 3.0, 0.0) + _STIFFER * inertia
                 stiff_give += w * w / stiff
                 give += w * w / (_SOFT * inertia)
         if free <= LEVER * whole:  # nothing of it can move, or what can is all but beside it

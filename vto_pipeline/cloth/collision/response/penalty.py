@@ -15,6 +15,7 @@ from numba import njit
 
 from vto_pipeline.cloth.collision.contacts import Contacts
 from vto_pipeline.cloth.collision.response.active_set import (
+    LYING,
     active_set,
     inverse_effective_mass,
     no_contacts,
