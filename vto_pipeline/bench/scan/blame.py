@@ -45,11 +45,16 @@ def blame(run: Path, truth: TriangleMesh, form: TriangleMesh) -> dict[str, Value
     out = run / "out"
     garment = read_own_mesh(out / "garment.ply")
     found = dict(wrong_shares(garment, read_observed(out / "observed.npz"), truth))
-    cameras, placement = out / "cameras.json", out / "garment_placement.json"
-    if cameras.is_file() and placement.is_file():
-        moved = transform_cameras(read_cameras(cameras), read_placement(placement))
-        found |= missing_shares(garment, truth, form, moved)
-    return found
+    cameras = cameras_beside_form(run)
+    return found if cameras is None else found | missing_shares(garment, truth, form, cameras)
+
+
+def cameras_beside_form(run: Path) -> CameraSet | None:
+    """Return the cameras of a finished run's photos in the frame of the form; None where its files do not tell them."""
+    cameras, placement = run / "out" / "cameras.json", run / "out" / "garment_placement.json"
+    if not (cameras.is_file() and placement.is_file()):
+        return None
+    return transform_cameras(read_cameras(cameras), read_placement(placement))
 
 
 def wrong_shares(garment: TriangleMesh, observed: NDArray[np.bool_], truth: TriangleMesh) -> dict[str, Value]:
