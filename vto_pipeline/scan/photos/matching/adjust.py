@@ -148,7 +148,7 @@ def _as_bent_as_shown(model: Any) -> Any:
         return found
     variance = cost / (INDEPENDENT * found.num_reg_images())
     penalty = 0.5 * (bend(found) / USUAL_BEND) ** 2 * variance
-    _bend_lenses(found, gain / (gain + penalty))
+    _bend_lenses(found, gain / (gain + penalty) if gain > 0.0 else 0.0)
     solve(found, SOFT_PX, bent=False)
     return found
 
