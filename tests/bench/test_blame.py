@@ -110,6 +110,8 @@ def test_what_is_missing_is_put_down_to_photos_only_where_they_do_not_show_it():
     found = missing_shares(front, tube(), tube(0.1), few)
     left_out = 100.0 * 0.5 * np.arccos(0.7) / np.pi
     assert_allclose(found["missing_shown_percent"], left_out, rtol=0, atol=1.0)
+    inner = 100.0 * (0.3 - 0.005) / 0.6 * (np.arccos(0.7) - 0.005 / RADIUS) / np.pi  # beyond 5 mm of what is left
+    assert_allclose(found["absent_shown_percent"], inner, rtol=0, atol=1.0)
     assert_allclose(
         found["missing_hidden_percent"], 50.0, rtol=0, atol=1.5
     )  # what is nearer than 1.5 mm is not missing
@@ -136,4 +138,4 @@ def test_a_run_is_blamed_from_its_files(tmp_path):
     write_json(out / "garment_placement.json", {"mannequin_from_surface": placement})
     found = blame(tmp_path, tube(), tube(0.1))
     assert_allclose(found["missing_shown_percent"], 100.0 / 3.0, rtol=0, atol=1.5)
-    assert found["missing_hidden_percent"] == 0.0
+    assert found["missing_hidden_percent"] == found["absent_shown_percent"] == 0.0  # the dent is of 4 mm

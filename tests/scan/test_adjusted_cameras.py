@@ -149,5 +149,45 @@ def test_a_much_bent_lens_is_adjusted_from_a_straight_one_too(monkeypatch, from_
         return from_straight if straight else 1.0
 
     monkeypatch.setattr(adjust_module, "solve", solve)
-    found = adjust_module._from_both_sides(SimpleNamespace(cameras={1: camera}))
+    found, cost = adjust_module._from_both_sides(SimpleNamespace(cameras={1: camera}))
     assert found.cameras[1].params[3] == kept
+    assert cost == (0.5 if kept == 0.0 else 1.0)
+
+
+@pytest.mark.parametrize(("slope", "bent"), [(4e4, True), (1.0, False)])
+def test_a_lens_is_as_bent_as_its_sightings_tell(monkeypatch, slope, bent):
+    """A loss that is a parabola in k1, of that slope: the most probable bend beside the least of a dense search."""
+    camera = SimpleNamespace(width=800, height=600, params=np.array([920.0, 400.0, 300.0, 0.0]))
+    best, least, photos_placed = -0.05, 1000.0, 36
+
+    def solve(model, soft_px, bent):
+        k1 = best if bent else model.cameras[1].params[3]
+        model.cameras[1].params = [920.0, 400.0, 300.0, k1]
+        return least + slope * (k1 - best) ** 2
+
+    monkeypatch.setattr(adjust_module, "solve", solve)
+    found = adjust_module._as_bent_as_shown(SimpleNamespace(cameras={1: camera}, num_reg_images=lambda: photos_placed))
+
+    searched = np.linspace(-0.06, 0.01, 70_001)
+    bends = searched * (400**2 + 300**2) / 920**2
+    variance = least / (adjust_module.INDEPENDENT * photos_placed)
+    log_posterior = -slope * (searched - best) ** 2 / variance - 0.5 * (bends / adjust_module.USUAL_BEND) ** 2
+    most_probable = searched[np.argmax(log_posterior)]
+    assert_allclose(found.cameras[1].params[3], most_probable, rtol=0, atol=1e-6)  # the search's own step
+    assert (abs(most_probable) > 0.04) == bent
+
+
+@pytest.mark.parametrize(("k1", "solved"), [(-0.002, 1), (-0.05, 2)])
+def test_a_lens_all_but_straight_or_one_that_cannot_be_straight_stays_as_found(monkeypatch, k1, solved):
+    camera, calls = SimpleNamespace(width=800, height=600, params=np.array([920.0, 400.0, 300.0, k1])), []
+
+    def solve(model, soft_px, bent):
+        calls.append(bent)
+        if not bent:
+            raise ValueError("no convergence")
+        return 1.0
+
+    monkeypatch.setattr(adjust_module, "solve", solve)
+    found = adjust_module._as_bent_as_shown(SimpleNamespace(cameras={1: camera}, num_reg_images=lambda: 36))
+    assert found.cameras[1].params[3] == k1
+    assert len(calls) == solved

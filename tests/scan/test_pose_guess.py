@@ -1,5 +1,6 @@
 """Motion between two depth frames from matched features: a known one, and features that tell none."""
 
+import cv2
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -7,7 +8,7 @@ from scan_scene import render
 from scipy.spatial.transform import Rotation
 
 from vto_pipeline.model.camera import Intrinsics
-from vto_pipeline.scan.depth.pose_guess import ImageFeatures, find_features, guess_motion
+from vto_pipeline.scan.depth.pose_guess import RATIO, ImageFeatures, clear_matches, find_features, guess_motion
 
 CAMERA = Intrinsics(fx=525.0, fy=525.0, cx=319.5, cy=239.5, width=640, height=480)
 
@@ -63,6 +64,20 @@ def test_a_faint_print_tells_the_motion(scene, walk):
     truth = np.linalg.inv(walk[1][1]) @ walk[1][0]
     assert_allclose(motion[:3, 3], truth[:3, 3], rtol=0, atol=0.01)  # of 280 mm
     assert_allclose(motion[:3, :3], truth[:3, :3], rtol=0, atol=0.02)
+
+
+@pytest.mark.parametrize("count", [2, 30, 700])
+def test_clear_matches_are_those_of_an_independent_matcher(count):
+    """Descriptors as SIFT's: some of them twice, some a little changed."""
+    rng = np.random.default_rng(count)
+    target = np.minimum(rng.exponential(25.0, (count, 128)), 255).astype(np.uint8)
+    source = np.vstack([target, np.minimum(rng.exponential(25.0, (40, 128)), 255)]).astype(np.int64)
+    source = np.clip(source + rng.integers(-12, 13, source.shape), 0, 255).astype(np.uint8)
+    target[1] = target[0]
+    found = cv2.BFMatcher(cv2.NORM_L2).knnMatch(source, target, k=2)
+    wanted = [(m.queryIdx, m.trainIdx) for m, second in found if m.distance < RATIO * second.distance]
+    assert list(zip(*clear_matches(source, target), strict=True)) == wanted
+    assert len(wanted) >= min(count - 2, 600)
 
 
 def test_frames_without_colour_or_texture_have_no_features():

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.camera import Intrinsics
-from vto_pipeline.scan.photos.consistency import rays
 
 LEAST_SPREAD = 0.1
 """Mean squared sine of the angles between the lines of sight and their common direction; below, they are parallel."""
@@ -66,5 +66,19 @@ def inside_sphere(
         sphere: The ball.
     """
     middle = world_from_cam[:3, :3].T @ (sphere.center - world_from_cam[:3, 3])
-    away = rays(camera.matrix, *depth.shape).astype(np.float32) * depth[..., None] - middle.astype(np.float32)
-    return np.where(np.einsum("hwd,hwd->hw", away, away) < sphere.radius**2, depth, np.float32(0))
+    lens = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
+    return np.asarray(_inside(np.ascontiguousarray(depth), lens, middle, sphere.radius))
+
+
+@njit(cache=True, nogil=True)
+def _inside(depth, lens, middle, radius):  # type: ignore[no-untyped-def]  # typed by Numba
+    """The readings (H, W) nearer than a radius to a place in the camera's frame (3,)."""
+    height, width = depth.shape
+    kept = np.zeros_like(depth)
+    for row in range(height):
+        for column in range(width):
+            z = depth[row, column]
+            x, y = (column - lens[2]) / lens[0] * z - middle[0], (row - lens[3]) / lens[1] * z - middle[1]
+            if x * x + y * y + (z - middle[2]) ** 2 < radius * radius:
+                kept[row, column] = z
+    return kept

@@ -15,9 +15,9 @@ from vto_pipeline.bench.scan.captures import KINDS, scan_row
 _COLUMNS = (
     *("capture", "kind", "exit", "seconds", "cpu_s", "peak_mb", "cameras_mm", "median_mm", "p95_mm", "p99_mm"),
     *("back_p95_mm", "complete_2mm", "wrong_filled_percent", "wrong_rim_percent", "wrong_seen_percent"),
-    *("missing_hidden_percent", "missing_shown_percent"),
-    *("openings", "true_openings", "rim_off_percent", "scale_off_percent", "said_scale_percent", "predicted_median_mm"),
-    *("predicted_p95_mm", "reason"),
+    *("missing_hidden_percent", "missing_shown_percent", "absent_shown_percent"),
+    *("openings", "true_openings", "shown_rim_mm", "rim_found_percent", "rim_false_percent", "rim_off_percent"),
+    *("scale_off_percent", "said_scale_percent", "predicted_median_mm", "predicted_p95_mm", "reason"),
 )
 
 

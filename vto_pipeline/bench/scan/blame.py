@@ -24,6 +24,8 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 WRONG = 0.0015
 """A surface farther from the other is wrong, or missing [m]."""
+ABSENT = 0.005
+"""A place farther from the scan is not in it at all; nearer, it was scanned wrong [m]."""
 BESIDE_RIM = 0.01
 """What was seen so near to an opening's rim is counted by itself [m]."""
 ENOUGH = 3
@@ -45,11 +47,16 @@ def blame(run: Path, truth: TriangleMesh, form: TriangleMesh) -> dict[str, Value
     out = run / "out"
     garment = read_own_mesh(out / "garment.ply")
     found = dict(wrong_shares(garment, read_observed(out / "observed.npz"), truth))
-    cameras, placement = out / "cameras.json", out / "garment_placement.json"
-    if cameras.is_file() and placement.is_file():
-        moved = transform_cameras(read_cameras(cameras), read_placement(placement))
-        found |= missing_shares(garment, truth, form, moved)
-    return found
+    cameras = cameras_beside_form(run)
+    return found if cameras is None else found | missing_shares(garment, truth, form, cameras)
+
+
+def cameras_beside_form(run: Path) -> CameraSet | None:
+    """Return the cameras of a finished run's photos in the frame of the form; None where its files do not tell them."""
+    cameras, placement = run / "out" / "cameras.json", run / "out" / "garment_placement.json"
+    if not (cameras.is_file() and placement.is_file()):
+        return None
+    return transform_cameras(read_cameras(cameras), read_placement(placement))
 
 
 def wrong_shares(garment: TriangleMesh, observed: NDArray[np.bool_], truth: TriangleMesh) -> dict[str, Value]:
@@ -75,7 +82,8 @@ def wrong_shares(garment: TriangleMesh, observed: NDArray[np.bool_], truth: Tria
 def missing_shares(
     garment: TriangleMesh, truth: TriangleMesh, form: TriangleMesh, cameras: CameraSet
 ) -> dict[str, Value]:
-    """Return how much of the truth is missing, in per cent of its area: what too few photos show, and the rest.
+    """Return how much of the truth is missing, in per cent of its area: what too few photos show, and the rest; and
+    how much of the rest is absent, not only wrong.
 
     Args:
         garment: In the frame of the truth [m].
@@ -84,10 +92,14 @@ def missing_shares(
         cameras: Of the photos, in that frame.
     """
     points, normals, _ = sample_surface(truth, SAMPLES, seed=0)
-    missing = SurfaceDistance(garment).nearest(points).distance > WRONG
+    away = SurfaceDistance(garment).nearest(points).distance
     shown = photos_that_show(points, normals, concatenate([truth, form]), cameras) >= ENOUGH
-    parts = {"hidden": ~shown, "shown": shown}
-    return {f"missing_{name}_percent": 100.0 * float((missing & part).mean()) for name, part in parts.items()}
+    parts = {
+        "missing_hidden": ~shown & (away > WRONG),
+        "missing_shown": shown & (away > WRONG),
+        "absent_shown": shown & (away > ABSENT),
+    }
+    return {f"{name}_percent": 100.0 * float(part.mean()) for name, part in parts.items()}
 
 
 def photos_that_show(points: FloatArray, normals: FloatArray, scene: TriangleMesh, cameras: CameraSet) -> IntArray:

@@ -10,7 +10,8 @@ import numpy as np
 
 from vto_pipeline.bench.bench import Value
 from vto_pipeline.bench.own_process import run_vto
-from vto_pipeline.bench.scan.blame import blame
+from vto_pipeline.bench.scan.blame import blame, cameras_beside_form
+from vto_pipeline.bench.scan.shown_rims import shown_rims
 from vto_pipeline.bench.scan.truth import beside_truth, cameras_off
 from vto_pipeline.io.captures.cameras import read_cameras
 from vto_pipeline.io.documents import read_json
@@ -43,8 +44,11 @@ def scan_row(capture: Path, kind: str, folder: Path, settings: Sequence[str], li
     garment = folder / "out" / "garment.ply"
     found: dict[str, Value] = {}
     if ended.code == 0 and garment.is_file():
-        truth = read_mesh(capture / TRUTH)
-        found = beside_truth(read_own_mesh(garment), truth) | blame(folder, truth, read_mesh(capture / FORM))
+        scanned, truth, form = read_own_mesh(garment), read_mesh(capture / TRUTH), read_mesh(capture / FORM)
+        found = beside_truth(scanned, truth) | blame(folder, truth, form)
+        cameras = cameras_beside_form(folder)
+        if cameras is not None:
+            found |= shown_rims(scanned, truth, form, cameras)
     return {
         "capture": capture.name,
         "kind": kind,

@@ -53,6 +53,28 @@ def find_features(color: ByteArray | None, depth: NDArray[np.float32], camera: I
     )
 
 
+def clear_matches(
+    source: NDArray[np.float32] | NDArray[np.uint8], target: NDArray[np.float32] | NDArray[np.uint8]
+) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+    """Return the descriptors of one frame whose nearest in another is clearly nearer than the second, and that nearest.
+
+    By one matrix product, which is exact for OpenCV's descriptors: their squares add up to less than 2^24.
+
+    Args:
+        source: Shape (K, 128).
+        target: Shape (L, 128), L >= 2.
+    """
+    one, other = source.astype(np.float32), target.astype(np.float32)
+    apart_sq = (other**2).sum(axis=1) - 2.0 * (one @ other.T)  # and the square of one, which is the same along a row
+    rows = np.arange(len(one))
+    nearest = np.argmin(apart_sq, axis=1)
+    first = apart_sq[rows, nearest].copy()
+    apart_sq[rows, nearest] = np.inf
+    own = (one**2).sum(axis=1)
+    clear = np.flatnonzero(own + first < RATIO**2 * (own + apart_sq.min(axis=1)))
+    return clear, nearest[clear]
+
+
 def guess_motion(source: ImageFeatures, target: ImageFeatures, camera: Intrinsics) -> FloatArray | None:
     """Estimate target_from_source by perspective-n-point with RANSAC.
 
@@ -63,9 +85,7 @@ def guess_motion(source: ImageFeatures, target: ImageFeatures, camera: Intrinsic
 
     if min(len(source.pixels), len(target.pixels)) < MIN_MATCHES:
         return None
-    matches = cv2.BFMatcher(cv2.NORM_L2).knnMatch(source.descriptors, target.descriptors, k=2)
-    pairs = [(m.queryIdx, m.trainIdx) for m, second in matches if m.distance < RATIO * second.distance]
-    a, b = np.array(pairs, dtype=int).reshape(-1, 2).T
+    a, b = clear_matches(source.descriptors, target.descriptors)
     near = source.points[a, 2] > 0
     matched = np.hstack([source.points[a], target.pixels[b]])[near]
     matched = matched[np.sort(np.unique(matched, axis=0, return_index=True)[1])]  # SIFT: a row for each orientation
