@@ -171,7 +171,7 @@ def test_a_lens_is_as_bent_as_its_sightings_tell(monkeypatch, slope, bent):
     searched = np.linspace(-0.06, 0.01, 70_001)
     bends = searched * (400**2 + 300**2) / 920**2
     variance = least / (adjust_module.INDEPENDENT * photos_placed)
-    log_posterior = -slope * (searched - best) ** 2 / variance - 0.5 * (bends / adjust_module.USUAL_BEND) ** 2
+    log_posterior = -slope * (searched - best) ** 2 / variance - np.log1p(0.5 * (bends / adjust_module.USUAL_BEND) ** 2)
     most_probable = searched[np.argmax(log_posterior)]
     assert_allclose(found.cameras[1].params[3], most_probable, rtol=0, atol=1e-6)  # the search's own step
     assert (abs(most_probable) > 0.04) == bent

@@ -133,9 +133,10 @@ def _as_bent_as_shown(model: Any) -> Any:
     """Return a model adjusted, its lenses as bent as its sightings tell.
 
     Least squares finds some bend in any photos, and the more, the less these tell of it: it then explains what their
-    sightings have wrong alike. So the bend has a prior, normal with mean 0 and spread `USUAL_BEND`. The loss is taken
-    as a parabola in the bend, known by its lowest point and by its value for a straight lens; the most probable bend
-    lies between (Bishop 2006, "Pattern recognition and machine learning", section 3.3).
+    sightings have wrong alike. So the bend has a prior about 0 (Bishop 2006, "Pattern recognition and machine
+    learning", section 3.3) of the breadth `USUAL_BEND`. It has the wide tails of Student's, since some lenses are made
+    to bend by ten times as much, and show it. The loss is taken as a parabola in the bend, known by its lowest point
+    and by its value for a straight lens; the most probable bend lies between.
     """
     found, cost = _from_both_sides(model)
     if bend(found) < SHOWN_BEND:
@@ -147,10 +148,22 @@ def _as_bent_as_shown(model: Any) -> Any:
     except ValueError:  # a straight lens explains nothing
         return found
     variance = cost / (INDEPENDENT * found.num_reg_images())
-    penalty = 0.5 * (bend(found) / USUAL_BEND) ** 2 * variance
-    _bend_lenses(found, gain / (gain + penalty) if gain > 0.0 else 0.0)
+    _bend_lenses(found, _most_probable_share(gain / variance, bend(found)))
     solve(found, SOFT_PX, bent=False)
     return found
+
+
+def _most_probable_share(gain: float, bent: float) -> float:
+    """Return the share t of a bend that is left: the least of gain (1 - t)² + ln(1 + ½ (t bent / usual)²).
+
+    Args:
+        gain: By how much the sightings speak for the bend found, and not for none, as a logarithm of probability.
+        bent: The bend found [share].
+    """
+    usual_sq = (bent / USUAL_BEND) ** 2
+    level = np.roots([gain * usual_sq, -gain * usual_sq, 2.0 * gain + usual_sq, -2.0 * gain])  # where its slope is 0
+    shares = np.append(level.real[np.abs(level.imag) < 1e-9], [0.0, 1.0]).clip(0.0, 1.0)
+    return float(shares[np.argmin(gain * (1.0 - shares) ** 2 + np.log1p(0.5 * usual_sq * shares**2))])
 
 
 def _bend_lenses(model: Any, share: float) -> None:
