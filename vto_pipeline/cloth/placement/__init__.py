@@ -1,6 +1,6 @@
 """Placement: a start on the body without crossings.
 
-place, orientation, voxel_fit: unit, axes and place of a garment on a body it was never on
+place, orientation, voxels, voxel_fit: unit, axes and place of a garment on a body it was never on
 transfer, regrade: from the body it was on to another; in the same size or in the customer's
 rigid_escape, flexible_escape: the garment led about a body as a whole, or part by part
 limbs: a body's limbs, the openings that are there for them, sleeves laid on arms

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfftn, next_fast_len, rfftn
 
+from vto_pipeline.cloth.placement.voxels import solid_cubes
 from vto_pipeline.geometry.topology import boundary_loops
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
@@ -72,7 +73,7 @@ class BodyCubes:
     def of_side(self, cube: float) -> NDArray[np.bool_]:
         """Return which cubes of this side [m], counted from `low`, are inside."""
         if cube not in self._made:
-            self._made[cube] = _voxelise(self.mesh, self.low, cube)
+            self._made[cube] = solid_cubes(self.mesh, self.low, cube)
         return self._made[cube]
 
     def fit(self, garment: TriangleMesh, coarser: float = 1.0) -> VoxelFit:
@@ -96,7 +97,7 @@ class VoxelFit:
         # garment cubes lie on the body's lattice, so that the shifts found include "none"
         low = garment.vertices.min(axis=0)
         self._low = self._body_low + np.floor((low - self._body_low) / cube) * cube
-        inside = _voxelise(close_openings(garment), self._low, cube)
+        inside = solid_cubes(close_openings(garment), self._low, cube)
         cloth = np.zeros_like(inside)
         points = np.vstack([garment.vertices, garment.vertices[garment.faces].mean(axis=1)])
         cloth[tuple(((points - self._low) / cube).astype(np.int64).T)] = True
@@ -145,16 +146,6 @@ class VoxelFit:
         back = tuple(axis for axis in range(3) if turn[axis].sum() < 0.0)
         ends = np.stack([self._low, self._low + self._cube * np.array(self._worth.shape)]) @ turn.T
         return np.flip(self._worth.transpose(axes), back), ends.min(axis=0)
-
-
-def _voxelise(mesh: TriangleMesh, low: FloatArray, cube: float) -> NDArray[np.bool_]:
-    """Return which cubes, counted from `low`, have their centre inside the mesh, whichever way it is oriented."""
-    import igl
-
-    counts = np.ceil((mesh.vertices.max(axis=0) - low) / cube).astype(np.int64) + 1
-    centres = low + cube * (np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), axis=-1) + 0.5)
-    winding = igl.fast_winding_number(mesh.vertices, mesh.faces.astype(np.int64), centres.reshape(-1, 3))
-    return (np.abs(winding) > 0.5).reshape(counts)
 
 
 def close_openings(garment: TriangleMesh) -> TriangleMesh:
