@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from cloth_scenes import fabric, tube
+import trimesh
+from cloth_scenes import ball, fabric, moved, sheet, tube
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 from test_drape import double_vest, pear, vest
@@ -133,7 +134,11 @@ def test_what_a_coarse_mesh_leaves_in_the_body_begins_on_a_finer_one(monkeypatch
     drape(vest(), pear(), fabric(), {**settings, "coarsen_above": 1000})
     assert cleared == [True, False, True]  # alone; what is clear of the body on a coarse mesh; and then alone
     monkeypatch.setattr(levels_module.Phases, "resolve_crossings", in_part)
-    monkeypatch.setattr(levels_module, "intersecting_faces", lambda *_: np.zeros((7, 2), np.int32))
+    monkeypatch.setattr(
+        levels_module,
+        "intersecting_faces",
+        lambda cloth, _: np.zeros((7 * (len(cloth.vertices) < len(vest().vertices)), 2), np.int32),
+    )
     found = drape(vest(), pear(), fabric(), {**settings, "coarsen_above": 1000}, job)
     assert cleared[3:] == [True, True]
     assert "too coarse: 7 pairs of triangles still intersect" in [why for _, why in job.left_out]
@@ -194,3 +199,23 @@ def test_how_it_was_put_on_is_told_though_only_a_coarse_mesh_was(monkeypatch):
     drape(vest(), pear(), fabric(), {"settle_seconds": 0.1, "coarsen_above": 1000}, job)
     assert job.warnings.count("it was moved by 453 mm") == 1
     assert not any("453 mm" in note for note in job.notes)
+
+
+@pytest.mark.parametrize(("size", "coarse"), [(0.5, False), (0.4, True)])
+def test_a_thorn_that_comes_between_the_vertices_stays_out_of_the_cloth(size, coarse):
+    """It is thinner than triangles, which alone would lie on the ball with the thorn through them."""
+    round_one, cone = ball(0.15, levels=4), trimesh.creation.cone(0.006, 0.05, sections=12)
+    tip = cone.vertices[:, [1, 2, 0]] + [0.004, 0.14, 0.003]
+    body = TriangleMesh(
+        np.vstack([round_one.vertices, tip]),
+        np.vstack([round_one.faces, cone.faces + len(round_one.vertices)]).astype(np.int32),
+    )
+    top, job = tip[:, 1].max(), Job()
+    cloth = moved(sheet(33, 33, size, size, upright=False), 0.001 - size / 2, top + 0.005, 0.002 - size / 2)
+    settings = {"settle_seconds": 1.0, "coarsen_above": 1000, "place": "as_it_stands"}
+    found = drape(cloth, body, fabric(bending=1e-5), settings, job)
+    between = [note for note in job.notes if "parts of the body came between" in note]
+    assert len(between) == 1
+    assert ("1089 vertices" in between[0]) is not coarse
+    assert found.audit["body_intersections"] == found.audit["self_intersections"] == 0
+    assert found.mesh.vertices[:, 1].max() > top - 1e-3  # it hangs over the tip

@@ -61,3 +61,20 @@ def find_collision_free_start(
     elif count > 0:
         job.warn(f"{count} pairs of triangles intersect at the start; not all can be untangled before it moves")
     return Start(positions, count, remaining, meeting_vertices(left, faces, len(positions)))
+
+
+def freed_of_body(
+    positions: FloatArray, faces: IntArray, rest: FloatArray, thickness: float, body: TriangleMesh
+) -> FloatArray | None:
+    """Return the cloth moved as little as needed so that no triangle crosses the body [m], shape (V, 3).
+
+    Args:
+        positions, faces, rest, thickness, body: See `find_collision_free_start`.
+
+    Returns:
+        None where some do all the same.
+    """
+    start = find_collision_free_start(positions, faces, rest, thickness, Job(), body)
+    if start.crossings_left > 0 and len(intersecting_faces(TriangleMesh(start.positions, faces), body)) > 0:
+        return None
+    return start.positions

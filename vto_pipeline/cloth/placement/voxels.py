@@ -51,7 +51,7 @@ def _is_closed(faces: NDArray[np.int32]) -> bool:
 
 
 @njit(cache=True)
-def _mark_boxes(vertices, faces, cut):
+def _mark_boxes(vertices, faces, cut):  # type: ignore[no-untyped-def]
     """Mark the cubes that a triangle's box meets; vertices in sides of cubes, shape (V, 3)."""
     for f in range(len(faces)):
         a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]

@@ -22,6 +22,7 @@ from vto_pipeline.cloth.dynamics.stepper import Stepper
 from vto_pipeline.cloth.model.build import ClothModel, ClothState, at_rest, build_cloth
 from vto_pipeline.cloth.model.coarsening import CoarseGarment, coarsen
 from vto_pipeline.cloth.placement.clear_body import edge_stretches
+from vto_pipeline.cloth.placement.collision_free_start import freed_of_body
 from vto_pipeline.cloth.rest.convergence import SettlingResult, rms
 from vto_pipeline.cloth.rest.phases import ENLARGED, ROUGH, Phases
 from vto_pipeline.cloth.rest.softened import softened
@@ -123,7 +124,7 @@ class _CoarseToFine:
         start, motion, fresh = garments[-1], body, True
         for level in range(len(self._coarser), 0, -1):
             now = time.perf_counter()
-            found = self._rest_on(level, start, motion, now + _FIRST * (deadline - now), fresh=fresh)
+            found = self._rest_clear(level, start, motion, now + _FIRST * (deadline - now), fresh=fresh)
             if isinstance(found, _TooCoarse):
                 self._refuse_if_too_small(found.why)
                 self._job.leave_out(f"coming to rest on {found.vertices} vertices first", f"too coarse: {found.why}")
@@ -140,15 +141,54 @@ class _CoarseToFine:
             finer = garments[level - 1]
             start, fresh = Garment(TriangleMesh(there, finer.mesh.faces), finer.rest), False
             motion = MovingBody(body.keyframes[-1:], body.faces)
-        reached = self._rest_on(0, start, motion, deadline, fresh=fresh)
+        reached = self._rest_clear(0, start, motion, deadline, fresh=fresh)
         assert isinstance(reached, RestOnMesh)  # only coarser ones are given up
         settling = reached.settling
         final = reached.phases.some(settling.state.positions)
         settling.trace = with_true_distances(trace + settling.trace, looks + settling.looks, final)
         return reached._replace(before=before)
 
-    def _rest_on(
+    def _rest_clear(
         self, level: int, garment: Garment, body: MovingBody, deadline: float, *, fresh: bool
+    ) -> RestOnMesh | _TooCoarse:
+        """Return the garment at rest on one mesh, where the next finer one can begin.
+
+        Ears, fingers and toes may be finer than a mesh, and come between its vertices. What holds it so holds it for
+        ever, and a finer mesh that begins there. Then it is done again, and the body's corners and edges keep out of
+        the cloth, too.
+
+        Args:
+            level, garment, body, deadline, fresh: See `_rest_on`.
+        """
+        told = len(self._job.warnings)
+        found = self._rest_on(level, garment, body, deadline, fresh=fresh)
+        if not self._config.self_collision or not self._is_pierced(level, found, body.final):
+            return found
+        count = len(garment.mesh.vertices)
+        if not self._config.body_features:
+            self._job.note(f"parts of the body came between {count} vertices: once more, so that they cannot")
+            del self._job.warnings[told:]
+            found = self._rest_on(level, garment, body, deadline, fresh=fresh, closely=True)
+        if level > 0 and self._is_pierced(level, found, body.final):
+            return _TooCoarse("parts of the body go through the cloth", count)
+        return found
+
+    def _is_pierced(self, level: int, found: RestOnMesh | _TooCoarse, body: TriangleMesh) -> bool:
+        """Return whether the body goes through the cloth, or would through the next finer mesh, moved a little."""
+        if isinstance(found, _TooCoarse) or found.settling.caught or found.settling.jammed:
+            return False
+        there, finer = found.settling.state.positions, self._garment
+        if level > 0:
+            there = self._coarser[level - 1].prolong(there)
+            finer = self._garment if level == 1 else self._coarser[level - 2].garment
+        if len(intersecting_faces(TriangleMesh(there, finer.mesh.faces), body)) == 0:
+            return False
+        if level == 0:  # it was moved a little already
+            return True
+        return freed_of_body(there, finer.mesh.faces, finer.rest.positions, self._fabric.thickness, body) is None
+
+    def _rest_on(
+        self, level: int, garment: Garment, body: MovingBody, deadline: float, *, fresh: bool, closely: bool = False
     ) -> RestOnMesh | _TooCoarse:
         """Return the garment at rest on one mesh: 0 is its own, the last the coarsest.
 
@@ -158,11 +198,14 @@ class _CoarseToFine:
             body: What it lies on.
             deadline: `time.perf_counter` at which to stop settling.
             fresh: Whether it starts where the garment was given, not where a coarser mesh came to rest.
+            closely: Whether the body's corners and edges keep out of the cloth in any case.
         """
         model, config, job = self._model, self._config, self._job
         if level > 0:
             config, job = self._rough, self._part(level)
             model = self._soft(garment, config)
+        if closely:
+            config = config.model_copy(update={"body_features": True})
         phases = Phases(model, garment.rest, self._fabric, config, job)
         phases.some = partial(self._some, level)
         first = TriangleMesh(body.keyframes[0], body.faces)

@@ -17,7 +17,7 @@ from vto_pipeline.cloth.dynamics.stepper import Stepper
 from vto_pipeline.cloth.model.build import ClothModel, ClothState, at_rest, without_gravity
 from vto_pipeline.cloth.placement.body_growth import plan_body_growth
 from vto_pipeline.cloth.placement.clear_body import OVERSTRETCHED, clear_body_crossings, edge_stretches
-from vto_pipeline.cloth.placement.collision_free_start import find_collision_free_start
+from vto_pipeline.cloth.placement.collision_free_start import find_collision_free_start, freed_of_body
 from vto_pipeline.cloth.placement.limbs.limbs import Limbs
 from vto_pipeline.cloth.placement.thinning import BodyGrowth
 from vto_pipeline.cloth.rest.convergence import SettleLimits, SettlingResult, relax_to_rest
@@ -161,10 +161,9 @@ class Phases:
         if not self._config.self_collision or self._config.body_features:
             return grown
         rest, faces = self._rest.positions, self._model.faces
-        start = find_collision_free_start(grown.positions, faces, rest, self._fabric.thickness, Job(), body)
-        freed = replace(grown, positions=start.positions)
-        if start.crossings_left == 0 or len(intersecting_faces(TriangleMesh(freed.positions, faces), body)) == 0:
-            return freed
+        freed = freed_of_body(grown.positions, faces, rest, self._fabric.thickness, body)
+        if freed is not None:
+            return replace(grown, positions=freed)
         self._job.progress(0.05, f"{_GROWING}, closely")
         try:
             return self._grown(growth, self._config.model_copy(update={"body_features": True}))
