@@ -124,12 +124,13 @@ class _CoarseToFine:
         start, motion, fresh = garments[-1], body, True
         for level in range(len(self._coarser), 0, -1):
             now = time.perf_counter()
-            found = self._rest_clear(level, start, motion, now + _FIRST * (deadline - now), fresh=fresh)
-            if isinstance(found, _TooCoarse):
-                self._refuse_if_too_small(found.why)
-                self._job.leave_out(f"coming to rest on {found.vertices} vertices first", f"too coarse: {found.why}")
+            went = self._rest_on_coarser(level, start, motion, now + _FIRST * (deadline - now), fresh=fresh)
+            if isinstance(went, _TooCoarse):
+                self._refuse_if_too_small(went.why)
+                self._job.leave_out(f"coming to rest on {went.vertices} vertices first", f"too coarse: {went.why}")
                 start, motion, fresh = garments[level - 1], body, True
                 continue
+            found, finer = went
             trace += found.settling.trace
             looks += found.settling.looks
             before += (found.phases,)
@@ -137,55 +138,84 @@ class _CoarseToFine:
                 f"first came to rest on {len(start.mesh.vertices)} vertices: {time.perf_counter() - now:.1f} s, "
                 f"{found.stepper.steps} steps"
             )
-            there = self._coarser[level - 1].prolong(found.settling.state.positions)
-            finer = garments[level - 1]
-            start, fresh = Garment(TriangleMesh(there, finer.mesh.faces), finer.rest), False
+            start, fresh = finer, False
             motion = MovingBody(body.keyframes[-1:], body.faces)
-        reached = self._rest_clear(0, start, motion, deadline, fresh=fresh)
-        assert isinstance(reached, RestOnMesh)  # only coarser ones are given up
+        reached = self._rest_on_own(start, motion, deadline, fresh=fresh)
         settling = reached.settling
         final = reached.phases.some(settling.state.positions)
         settling.trace = with_true_distances(trace + settling.trace, looks + settling.looks, final)
         return reached._replace(before=before)
 
-    def _rest_clear(
+    def _rest_on_coarser(
         self, level: int, garment: Garment, body: MovingBody, deadline: float, *, fresh: bool
-    ) -> RestOnMesh | _TooCoarse:
-        """Return the garment at rest on one mesh, where the next finer one can begin.
-
-        Ears, fingers and toes may be finer than a mesh, and come between its vertices. What holds it so holds it for
-        ever, and a finer mesh that begins there. Then it is done again, and the body's corners and edges keep out of
-        the cloth, too.
+    ) -> tuple[RestOnMesh, Garment] | _TooCoarse:
+        """Return the garment at rest on a coarser mesh, and where the next finer one begins.
 
         Args:
             level, garment, body, deadline, fresh: See `_rest_on`.
         """
         told = len(self._job.warnings)
-        found = self._rest_on(level, garment, body, deadline, fresh=fresh)
-        if not self._config.self_collision or not self._is_pierced(level, found, body.final):
-            return found
-        count = len(garment.mesh.vertices)
-        if not self._config.body_features:
-            self._job.note(f"parts of the body came between {count} vertices: once more, so that they cannot")
-            del self._job.warnings[told:]
-            found = self._rest_on(level, garment, body, deadline, fresh=fresh, closely=True)
-        if level > 0 and self._is_pierced(level, found, body.final):
-            return _TooCoarse("parts of the body go through the cloth", count)
-        return found
+        for closely in (False, True):
+            found = self._rest_on(level, garment, body, deadline, fresh=fresh, closely=closely)
+            if isinstance(found, _TooCoarse):
+                return found
+            finer = self._finer_start(level, found.settling.state.positions, body.final)
+            if finer is not None:
+                return found, finer
+            if self._config.body_features:
+                break
+            if not closely:
+                self._tell_once_more(garment, told)
+        return _TooCoarse("parts of the body go through the cloth", len(garment.mesh.vertices))
 
-    def _is_pierced(self, level: int, found: RestOnMesh | _TooCoarse, body: TriangleMesh) -> bool:
-        """Return whether the body goes through the cloth, or would through the next finer mesh, moved a little."""
-        if isinstance(found, _TooCoarse) or found.settling.caught or found.settling.jammed:
-            return False
-        there, finer = found.settling.state.positions, self._garment
-        if level > 0:
-            there = self._coarser[level - 1].prolong(there)
-            finer = self._garment if level == 1 else self._coarser[level - 2].garment
-        if len(intersecting_faces(TriangleMesh(there, finer.mesh.faces), body)) == 0:
-            return False
-        if level == 0:  # it was moved a little already
-            return True
-        return freed_of_body(there, finer.mesh.faces, finer.rest.positions, self._fabric.thickness, body) is None
+    def _finer_start(self, level: int, positions: FloatArray, body: TriangleMesh) -> Garment | None:
+        """Return the next finer garment where this one lies, moved a little so that it is clear of the body.
+
+        Args:
+            level: Of the coarser mesh.
+            positions: Of its vertices [m], shape (V, 3).
+            body: Where it is now.
+
+        Returns:
+            None where that cannot be: cloth would be held for ever by what goes through it.
+        """
+        finer = self._garment if level == 1 else self._coarser[level - 2].garment
+        there, faces = self._coarser[level - 1].prolong(positions), finer.mesh.faces
+        if self._config.self_collision and len(intersecting_faces(TriangleMesh(there, faces), body)) > 0:
+            freed = freed_of_body(there, faces, finer.rest.positions, self._fabric.thickness, body)
+            if freed is None:
+                return None
+            there = freed
+        return Garment(TriangleMesh(there, faces), finer.rest)
+
+    def _rest_on_own(self, garment: Garment, body: MovingBody, deadline: float, *, fresh: bool) -> RestOnMesh:
+        """Return the garment at rest on its own mesh.
+
+        Ears, fingers and toes may be finer than that, and come between its vertices. Then it is done once more, and the
+        body's corners and edges keep out of the cloth, too.
+
+        Args:
+            garment, body, deadline, fresh: See `_rest_on`.
+        """
+        told = len(self._job.warnings)
+        found = self._rest_on(0, garment, body, deadline, fresh=fresh)
+        assert isinstance(found, RestOnMesh)  # only coarser ones are given up
+        config, settling = self._config, found.settling
+        if config.body_features or not config.self_collision or settling.caught or settling.jammed:
+            return found
+        lies = TriangleMesh(settling.state.positions, garment.mesh.faces)
+        if len(intersecting_faces(lies, body.final)) == 0:
+            return found
+        self._tell_once_more(garment, told)
+        again = self._rest_on(0, garment, body, deadline, fresh=fresh, closely=True)
+        assert isinstance(again, RestOnMesh)
+        return again
+
+    def _tell_once_more(self, garment: Garment, told: int) -> None:
+        """Say that a mesh is gone through once more, in place of the warnings from so many on."""
+        count = len(garment.mesh.vertices)
+        self._job.note(f"parts of the body came between {count} vertices: once more, so that they cannot")
+        del self._job.warnings[told:]
 
     def _rest_on(
         self, level: int, garment: Garment, body: MovingBody, deadline: float, *, fresh: bool, closely: bool = False
