@@ -89,7 +89,7 @@ LOW, HIGH = (-0.52, -0.02, -0.2), (0.52, 0.94, 0.2)
 
 
 def make_scene(cell=0.006, noise=0.0003, holes=4, motion=None, color=True, seed=0, region=shirt_region):
-    """region: Of points (N, 3), negative where there is cloth. The truth is the shirt's largest piece, of others all."""
+    """region: Of points (N, 3), negative in cloth. The truth is the shirt's largest piece, of others all."""
     rng = np.random.default_rng(seed)
     form = outward(*level_set(form_distance, LOW, HIGH, cell))
     shirt_all = outward(*level_set(lambda p: form_distance(p) - shirt_gap(p), LOW, HIGH, cell))

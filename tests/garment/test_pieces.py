@@ -110,7 +110,7 @@ def test_what_stands_far_off_is_neither_worn_nor_lost():
 def test_a_larger_thing_in_the_room_is_not_the_garment():
     job = Job()
     shell = concatenate([tube(0.0, 0.3), moved(tube(-0.2, 0.5), [0.5, 0.0, 0.0])])
-    garment, openings, _ = closed([shell], job)
+    _, openings, _ = closed([shell], job)
     assert_allclose([one.center for one in openings], [[0, 0.3, 0], [0, 0, 0]], atol=1e-3)
     assert job.metrics["lost_cm2"] == 0.0
 
