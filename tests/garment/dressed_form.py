@@ -88,23 +88,25 @@ def level_set(field, low, high, cell):
 LOW, HIGH = (-0.52, -0.02, -0.2), (0.52, 0.94, 0.2)
 
 
-def make_scene(cell=0.006, noise=0.0003, holes=4, motion=None, color=True, seed=0):
+def make_scene(cell=0.006, noise=0.0003, holes=4, motion=None, color=True, seed=0, region=shirt_region):
+    """region: Of points (N, 3), negative in cloth. The truth is the shirt's largest piece, of others all."""
     rng = np.random.default_rng(seed)
     form = outward(*level_set(form_distance, LOW, HIGH, cell))
     shirt_all = outward(*level_set(lambda p: form_distance(p) - shirt_gap(p), LOW, HIGH, cell))
-    inside = (shirt_region(shirt_all.vertices) < 0)[shirt_all.faces].all(axis=1)
-    shirt = largest(submesh(shirt_all, inside)[0])
+    inside = (region(shirt_all.vertices) < 0)[shirt_all.faces].all(axis=1)
+    shirt = submesh(shirt_all, inside)[0]
+    shirt = largest(shirt) if region is shirt_region else shirt
 
     def seen(p):
         body = form_distance(p)
         board = np.max(np.abs(p - [0, -0.005, 0]) - [0.4, 0.005, 0.18], axis=1)
-        return np.minimum(np.minimum(body, np.maximum(body - shirt_gap(p), shirt_region(p))), board)
+        return np.minimum(np.minimum(body, np.maximum(body - shirt_gap(p), region(p))), board)
 
     scan = outward(*level_set(seen, LOW, HIGH, cell))
     v = scan.vertices
     d = form_distance(v)
-    is_shirt = (shirt_region(v) < 0.5 * cell) & (d > 0.5 * shirt_gap(v))
-    on_ledge = (d > 0.0015) & (d < shirt_gap(v) - 0.0015) & (np.abs(shirt_region(v)) < 0.003)
+    is_shirt = (region(v) < 0.5 * cell) & (d > 0.5 * shirt_gap(v))
+    on_ledge = (d > 0.0015) & (d < shirt_gap(v) - 0.0015) & (np.abs(region(v)) < 0.003)
     board = v[:, 1] < 0.001
     rgb = np.where(is_shirt[:, None], [60, 90, 160], [205, 190, 170]).astype(float)
     rgb[is_shirt & (np.sin(v[:, 1] * 400) > 0.3)] = [200, 60, 60]

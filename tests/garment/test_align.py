@@ -10,7 +10,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.align import AlignConfig, align_to_mannequin
+from vto_pipeline.garment.outline.inside import inside_share
 from vto_pipeline.geometry.rigid import transform_mesh
+from vto_pipeline.geometry.sampling import sample_surface
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -78,6 +81,35 @@ def test_a_mannequin_that_looks_alike_all_round_is_refused():
             Job(),
         )
     assert "several sides" in caught.value.hint
+
+
+@pytest.mark.parametrize("noisy", [False, True])
+def test_a_wrong_mannequin_is_in_the_garment_whatever_stereo_says_of_the_limbs(scene, noisy):
+    """Turned by 6 degrees or 6 % too large, as against noise of a centimetre on all that is bare."""
+    placed = transform_mesh(scene.scan, scene.mannequin_from_surface)
+    if noisy:
+        shift = np.random.default_rng(0).normal(0.0, 0.012, placed.vertices.shape)
+        limbs = ~scene.is_shirt & (placed.vertices[:, 1] > 0.3)
+        placed = TriangleMesh(placed.vertices + np.where(limbs[:, None], shift, 0.0), placed.faces)
+    middle = np.array([0.0, 0.45, 0.0])
+
+    def share(motion):
+        about = np.eye(4)
+        about[:3, 3] = middle
+        moved = transform_mesh(placed, about @ motion @ np.linalg.inv(about))
+        return inside_share(moved, scene.form, 0.004, seed=0)
+
+    right = share(np.eye(4))
+    deep = SurfaceDistance(scene.form).signed(sample_surface(placed, 8000, 0)[0]).distance < -0.004
+    most = AlignConfig().most_inside
+    assert right < 0.5 * most
+    assert deep.mean() > 3.0 * most if noisy else deep.mean() < most
+    for wrong in (
+        dressed_form.rigid([6, 0, 0], [0, 0, 0]),
+        dressed_form.rigid([0, 0, 6], [0, 0, 0]),
+        np.diag([1 / 1.06] * 3 + [1.0]),
+    ):
+        assert share(wrong) > 1.2 * most  # rough limbs have more area, of which cloth is a smaller share
 
 
 UNSCALED = 0.137  # units of the scan per metre: as arbitrary as structure from motion has it

@@ -18,6 +18,7 @@ from vto_pipeline.garment.outline.contour import ContourMesh
 from vto_pipeline.garment.outline.edges import load_edges
 from vto_pipeline.garment.outline.fit import OutlineProblem
 from vto_pipeline.geometry.rigid import transform_mesh
+from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import concatenate, submesh
 from vto_pipeline.model.camera import CameraSet, Intrinsics
@@ -169,6 +170,21 @@ def test_without_scale_or_outline_bare_parts_alone_are_not_believed(scene, shots
     with pytest.raises(GarmentError, match="outline is not in the photos") as caught:
         align_to_mannequin(surface, scene.form, QUICK, Job(), photos)
     assert "scale.lengths" in caught.value.hint
+
+
+def test_what_stereo_guesses_of_bare_limbs_does_not_count_as_inside(scene, worn, shots):
+    """Arms and neck lie on both sides of the form, a centimetre and more off, as photos of white limbs have them."""
+    out = dressed_form.shirt_region(scene.form.vertices) > 0.01
+    limbs, _ = submesh(scene.form, (out & (scene.form.vertices[:, 1] > 0.3))[scene.form.faces].all(axis=1))
+    limbs = replace(limbs, vertices=limbs.vertices + np.random.default_rng(0).normal(0.0, 0.01, limbs.vertices.shape))
+    both = concatenate([worn, limbs])
+    deep = SurfaceDistance(scene.form).signed(sample_surface(both, 4000, 0)[0]).distance < -1.5 * PIXEL
+    assert deep.mean() > 1.25 * AlignConfig().most_inside
+    surface, photos = in_scan_frame(both, shots[1], shots[0], unit=0.137)
+    job = Job()
+    found = align_to_mannequin(surface, scene.form, QUICK, job, photos)
+    assert misplacement(scene.form, found, unit=0.137) < 2.0 * PIXEL  # the guesses inside still push the form
+    assert job.metrics["inside_share"] < 0.3 * deep.mean()
 
 
 def test_a_form_that_is_round_is_refused(tmp_path):

@@ -14,7 +14,6 @@ from vto_pipeline.geometry.remeshing.repair import is_manifold
 from vto_pipeline.geometry.rigid import transform_mesh
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import concatenate, face_components, face_normals, submesh
-from vto_pipeline.model.garment import SurfaceLabels
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -149,22 +148,3 @@ def test_tight_cloth_on_a_form_that_was_scanned_roughly_is_cloth(scene, placed):
     shirt = scene.is_shirt[source]
     assert labels.garment[shirt].mean() > 0.95
     assert labels.garment[~shirt].mean() < 0.3
-
-
-@pytest.mark.parametrize(("width", "warned"), [(0.05, False), (0.3, True)])
-def test_a_garment_torn_in_two_is_warned_of(width, warned):
-    """Two sheets beside each other, the first a metre wide: 5 and 23 % of the cloth lie in the second."""
-
-    def sheet(left, right, first):
-        x, y = np.meshgrid(np.linspace(left, right, 30), np.linspace(0.0, 1.0, 30), indexing="ij")
-        at = first + np.arange(900).reshape(30, 30)
-        a, b, c, d = at[:-1, :-1].ravel(), at[1:, :-1].ravel(), at[1:, 1:].ravel(), at[:-1, 1:].ravel()
-        points = np.column_stack([x.ravel(), y.ravel(), np.zeros(900)])
-        return points, np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
-
-    points, faces = zip(sheet(0.0, 1.0, 0), sheet(1.2, 1.2 + width, 900), strict=True)
-    surface, job = TriangleMesh(np.vstack(points), np.vstack(faces).astype(np.int32)), Job()
-    shell = extract_garment(surface, SurfaceLabels(np.ones(1800, bool), np.ones(1800)), SubtractConfig(), job)
-    assert_allclose(shell.vertices[:, 0].max(), 1.0, rtol=0, atol=1e-12)
-    assert bool(job.warnings) is warned
-    assert not warned or "23 %" in job.warnings[0]

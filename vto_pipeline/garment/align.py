@@ -11,9 +11,11 @@ from pydantic import Field
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.coarse_align import PlacementSearch, tilted_rotations, upright_rotations
 from vto_pipeline.garment.outline.edges import load_edges
+from vto_pipeline.garment.outline.inside import inside_share
 from vto_pipeline.garment.outline.search import OutlineConfig, place_by_outline
 from vto_pipeline.garment.robust_icp import MannequinAlignment, robust_icp, scale_of
 from vto_pipeline.garment.scale_search import scaled_starts
+from vto_pipeline.geometry.rigid import transform_mesh
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import face_normals, surface_area
@@ -176,11 +178,13 @@ class _Scan:
             raise GarmentError("the scan fits the mannequin in no size", hint="is it the right mannequin?")
         edges = load_edges(photos.paths, photos.cameras, self.surface)
         found = place_by_outline(self.mannequin, self.points[self.few], edges, starts, self.free, config.outline, job)
-        _check_inside(found.fit.inside, config)
-        job.measure(placed_by="outline")
+        placement = found.mannequin_from_scan
+        inside = inside_share(transform_mesh(self.surface, placement), self.mannequin, found.depth, job.seed)
+        job.measure(placed_by="outline", inside_share=inside)
+        _check_inside(inside, config)
         if self.free:
-            _tell_scale(scale_of(found.mannequin_from_scan), found.scale_error, job)
-        return found.mannequin_from_scan
+            _tell_scale(scale_of(placement), found.scale_error, job)
+        return placement
 
     def _starts(self, rotations: list[FloatArray]) -> list[FloatArray]:
         """The best translation of each rotation, best first."""

@@ -17,6 +17,9 @@ OUTSIDE, INSIDE = 0.15, 0.5
 """It is as deep so many radii before the loop and behind it: what bulges into a hole, or slants across, ends there."""
 RIM_OUTSIDE = 0.9
 """Share of the rim that must stay outside the mannequin while the disc is moved inwards."""
+BEYOND, GOES_ON = 1.1, 0.1
+"""In the plane of a loop that goes round a part of the mannequin, that does not reach so many radii out, but for this
+share of the way round."""
 RINGS = np.arange(0.5, 6.0) / 6.0
 AROUND = 36
 """A loop is looked at in so many places, evenly along it."""
@@ -87,6 +90,23 @@ def encloses(points: FloatArray, distance: SurfaceDistance, reach: float) -> boo
         if loop.is_filled(inward, distance):
             return True
     return False
+
+
+def goes_round(points: FloatArray, distance: SurfaceDistance) -> bool:
+    """Return whether a loop goes round a part of the mannequin: in its plane nothing of it lies beyond.
+
+    The rim of a sheet that lies over half of a limb encloses some of it, too, but the limb goes on under the sheet's
+    ends.
+
+    Args:
+        points: The loop in order [m], shape (L, 3).
+        distance: Signed distances to the mannequin.
+    """
+    loop = _Loop(points)
+    middle = loop.points.mean(axis=0)
+    out = BEYOND * (loop.points - middle)
+    in_plane = middle + out - (out @ loop.normal)[:, None] * loop.normal
+    return float(np.mean(distance.inside(in_plane))) < GOES_ON
 
 
 def outside_share(points: FloatArray, distance: SurfaceDistance) -> float:

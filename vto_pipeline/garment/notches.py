@@ -11,7 +11,7 @@ from vto_pipeline.garment.loop_evidence import RIM_OUTSIDE, encloses, outside_sh
 from vto_pipeline.garment.rims import smooth_curve
 from vto_pipeline.geometry.remeshing.holes import fill_notch
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import boundary_walks, face_normals, half_edges
+from vto_pipeline.geometry.topology import boundary_walks, face_components, face_normals, half_edges
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -103,7 +103,9 @@ def _tightest_notch(
     """
     points = mesh.vertices[half_edges(mesh)[walk, 0]]
     beside = face_normals(mesh)[walk // 3]
-    cloth, rim_there = cKDTree(mesh.vertices), cKDTree(points)
+    piece = face_components(mesh)[1]  # a jacket's rim may run over trousers
+    mine = np.unique(mesh.faces[piece == piece[walk[0] // 3]])
+    cloth, rim_there = cKDTree(mesh.vertices[mine]), cKDTree(points)
     for _ in range(2):
         points = smooth_curve(points, WAVELENGTH)
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1))])

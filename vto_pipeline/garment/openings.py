@@ -10,7 +10,7 @@ from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.align import PosedPhotos
 from vto_pipeline.garment.bare_parts import BareParts
 from vto_pipeline.garment.lifting import HINT, check_lifted, lift_fillings, pierced_fillings
-from vto_pipeline.garment.loop_evidence import LoopShape, encloses, measure_loops
+from vto_pipeline.garment.loop_evidence import LoopShape, encloses, goes_round, measure_loops
 from vto_pipeline.garment.notches import close_notches
 from vto_pipeline.garment.photographed.carved import carve_fillings
 from vto_pipeline.garment.photographed.confirmed import LookAgain, confirm_fillings
@@ -18,14 +18,22 @@ from vto_pipeline.garment.photographed.covered import covered_loops
 from vto_pipeline.garment.photographed.parted import refuse_parted
 from vto_pipeline.garment.photographed.sightings import look_at_mannequin
 from vto_pipeline.garment.pierced import open_pierced
-from vto_pipeline.garment.rims import drop_flaps, fair_rims, largest_piece, trim_ledges
+from vto_pipeline.garment.rims import drop_flaps, fair_rims, trim_ledges
+from vto_pipeline.garment.subtraction.pieces import (
+    LEAST,
+    lost_cloth,
+    may_be_worn,
+    split_off,
+    warn_of_torn,
+    without_crumbs,
+)
 from vto_pipeline.garment.wearable import LEAST_PERIMETER_MM, check_wearable
 from vto_pipeline.geometry.remeshing.decimate import decimate, faces_at
 from vto_pipeline.geometry.remeshing.holes import fill_holes
 from vto_pipeline.geometry.remeshing.remesh import edge_lengths
 from vto_pipeline.geometry.remeshing.repair import RepairConfig, repair
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import face_areas, face_components, surface_area
+from vto_pipeline.geometry.topology import component_areas, face_areas, face_components, surface_area
 from vto_pipeline.model.garment import Opening
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -39,12 +47,15 @@ class OpeningsConfig(Config):
     """What counts as an opening, and how far its rim is cleaned."""
 
     edge_mm: float = Field(4.0, ge=0.5, le=50, description="Finer scans are thinned to about this edge length [mm]")
-    expected: int | None = Field(None, ge=0, le=50, description="Number of openings; any other count is an error")
+    expected: int | None = Field(
+        None, ge=0, le=50, description="Number of openings of all pieces together; any other count is an error"
+    )
     keep: int | None = Field(
         None,
         ge=1,
         le=50,
-        description="Number of openings that stay, whatever the evidence: the likeliest, then longest",
+        description="Number of openings of all pieces together that stay, whatever the evidence: the likeliest, then "
+        "longest",
     )
     least_seen: float = Field(
         0.8, ge=0, le=1, description="Share of the garment that must have been seen; `keep` makes less a warning"
@@ -76,6 +87,9 @@ def close_scan_holes(
     it, when the loop is long and the cloth runs across its plane like the end of a tube; that is a guess, and said so.
     A filling that a part of the mannequin comes through is opened there once, with a warning.
 
+    A garment may have several pieces, as a jacket and trousers. The largest is one; another is if by that evidence it
+    has an opening. The others are left out, and what of them is cloth counts as not seen.
+
     Args:
         shell: The garment cut out of the scan, oriented outward.
         mannequin: In the same frame, or None.
@@ -86,7 +100,7 @@ def close_scan_holes(
         look: Looks in the photos for what was filled; what they confirm counts as observed.
 
     Returns:
-        The garment in one piece; its openings, highest first; which of its vertices were observed, shape (V,).
+        The garment; its openings, highest first; which of its vertices were observed, shape (V,).
 
     Raises:
         GarmentError: another number of openings than expected, a hole that cannot be filled, too little was seen, or
@@ -94,15 +108,20 @@ def close_scan_holes(
         InputError: no opening is left that a body could get through.
     """
     job.progress(0.0, "cleaning rims")
-    thinned = _thinned(shell, config.edge_mm * 1e-3, job)
+    distance = None if mannequin is None else SurfaceDistance(mannequin)
+    large, rest = split_off(shell, may_be_worn(shell, distance))
+    thinned = _thinned(large, config.edge_mm * 1e-3, job)
     trimmed = thinned if mannequin is None else trim_ledges(thinned, mannequin, config.ledge_mm * 1e-3)
     edge = float(np.median(edge_lengths(trimmed)))
     least_perimeter = config.least_perimeter_mm * 1e-3
     clean = repair(drop_flaps(trimmed, config.flap_edges * edge, least_perimeter), RepairConfig(weld_mm=0.0), job)
-    distance = None if mannequin is None else SurfaceDistance(mannequin)
     bridged, notches = clean, 0
     if distance is not None:
         bridged, notches = close_notches(clean, distance, bare, least_perimeter, config.reach_mm * 1e-3)
+    worn = _worn_faces(bridged, distance, mannequin, photos, config, job)
+    bridged, _ = split_off(bridged, worn)
+    clean, unworn = split_off(clean, worn[: len(clean.faces)])
+    pieces = face_components(clean)[0]
     shapes, is_opening = _told_apart(bridged, distance, mannequin, photos, config, job)
     job.progress(0.5, f"filling {len(shapes) - sum(is_opening)} scan holes")
     if all(is_opening):
@@ -125,7 +144,7 @@ def close_scan_holes(
         filled, observed = lifted.after, ~lifted.filled
         job.measure(lifted_cm2=1e4 * float(face_areas(filled)[lifted.moved[filled.faces].any(axis=1)].sum()))
     final = fair_rims(filled, config.fair_mm * 1e-3)
-    if face_components(final)[0] != 1:
+    if face_components(final)[0] != pieces:
         raise GarmentError(f"the garment fell apart into {face_components(final)[0]} pieces")
     count = sum(is_opening)
     if config.expected is not None and count != config.expected:
@@ -140,13 +159,15 @@ def close_scan_holes(
         scanned |= observed[final.faces].all(axis=1) & ~before[final.faces].all(axis=1)
     found = list_openings(final)
     check_wearable(final, found)
-    seen = float(face_areas(final)[scanned].sum()) / surface_area(final)
+    lost = lost_cloth([*rest, *unworn], final, observed, distance, job)
+    seen = float(face_areas(final)[scanned].sum()) / (surface_area(final) + lost)
     job.measure(
+        pieces=pieces,
         openings=len(found),
         filled_holes=len(shapes) - count,
         filled_notches=notches,
         perimeters_mm=[round(opening.perimeter * 1e3, 1) for opening in found],
-        trimmed_cm2=(surface_area(shell) - surface_area(clean)) * 1e4,
+        trimmed_cm2=(surface_area(large) - sum(map(surface_area, [clean, *unworn]))) * 1e4,
         unobserved_share=1.0 - seen,
     )
     _check_seen(seen, final, config, job)
@@ -155,7 +176,36 @@ def close_scan_holes(
         if sightings is not None:
             refuse_parted(sightings, final, found, config.keep is not None, job)
     warn_of_filled_rims(found, observed, job)
+    if bare is not None and pieces > 1:
+        warn_of_torn(final, bare, job)
     return final, found, observed
+
+
+def _worn_faces(
+    mesh: TriangleMesh,
+    distance: SurfaceDistance | None,
+    mannequin: TriangleMesh | None,
+    photos: PosedPhotos | None,
+    config: OpeningsConfig,
+    job: Job,
+) -> NDArray[np.bool_]:
+    """Return which faces belong to the largest piece or to one that is worn by itself, shape (F,).
+
+    The mannequin passes through two openings of that, or through one that goes round it, as into a sock. What hangs
+    beyond it is held by what is worn. Without a mannequin, shape alone tells.
+    """
+    piece, area = component_areas(mesh)
+    passed = np.where(area == area.max(), 2, 0)
+    if len(area) == 1:
+        return np.ones(len(piece), dtype=bool)
+    shapes, is_opening = _told_apart(
+        mesh, distance, mannequin, photos, config.model_copy(update={"keep": None}), Job(seed=job.seed)
+    )
+    for shape, real in zip(shapes, is_opening, strict=True):
+        rim = mesh.vertices[shape.loop]
+        if real and (distance is None or encloses(rim, distance, 1e-3 * config.reach_mm)):
+            passed[piece[shape.walk[0] // 3]] += 2 if distance is None or goes_round(rim, distance) else 1
+    return np.asarray(((passed >= 2) & (area >= LEAST * area.max()))[piece])
 
 
 def _told_apart(
@@ -210,7 +260,7 @@ def _thinned(shell: TriangleMesh, edge: float, job: Job) -> TriangleMesh:
         job.leave_out("thinning", f"{len(shell.faces)} faces; the target is {faces}")
         return shell
     job.note(f"thinned {len(shell.faces)} faces to {faces}")
-    return largest_piece(repair(decimate(shell, faces, aggressiveness=3.0), RepairConfig(weld_mm=0.0), job))
+    return without_crumbs(repair(decimate(shell, faces, aggressiveness=3.0), RepairConfig(weld_mm=0.0), job))
 
 
 def _check_seen(share: float, garment: TriangleMesh, config: OpeningsConfig, job: Job) -> None:

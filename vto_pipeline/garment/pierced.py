@@ -51,7 +51,7 @@ def open_pierced(
     deepest = -float(beyond[own].min(initial=-least))
     beyond[~own] = deepest  # so far from zero that no cut moves to them
     opened = clip_to_positive(filled, beyond)
-    opened = _joined(opened, ~_no_cloth(opened, seen, mannequin, distance, bare))
+    opened = _joined(opened, ~_no_cloth(opened, seen, mannequin, distance, bare), seen)
     return repair(opened, RepairConfig(weld_mm=0.0), job)
 
 
@@ -73,8 +73,8 @@ def _no_cloth(
     return reached(mesh, doubtful, doubtful & cut[mesh.faces].any(axis=1))
 
 
-def _joined(mesh: TriangleMesh, keep: NDArray[np.bool_]) -> TriangleMesh:
-    """Return the kept faces that are connected with the first of the mesh."""
+def _joined(mesh: TriangleMesh, keep: NDArray[np.bool_], seen: int) -> TriangleMesh:
+    """Return the kept faces that are connected with the first of the mesh, which are all kept."""
     kept = submesh(mesh, keep)[0]
     _, piece = face_components(kept)
-    return submesh(kept, piece == piece[0])[0]
+    return submesh(kept, np.isin(piece, piece[:seen]))[0]

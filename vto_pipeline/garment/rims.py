@@ -8,6 +8,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from vto_pipeline.garment.subtraction.pieces import large_faces, without_crumbs
 from vto_pipeline.geometry.geodesic import distance_from
 from vto_pipeline.geometry.laplace import extend_smoothly
 from vto_pipeline.geometry.remeshing.clip import clip_to_positive
@@ -15,8 +16,8 @@ from vto_pipeline.geometry.remeshing.rims import perimeter
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import (
     boundary_loops,
-    component_areas,
     edge_faces,
+    face_components,
     face_normals,
     submesh,
 )
@@ -54,12 +55,12 @@ def trim_ledges(shell: TriangleMesh, mannequin: TriangleMesh, widest: float) -> 
     on_rim = np.zeros(len(shell.vertices), dtype=bool)
     on_rim[rim] = True
     ledge = reached(shell, steep, steep & (on_rim[shell.faces].sum(axis=1) >= 2))
-    return largest_piece(submesh(shell, ~ledge)[0]) if ledge.any() else shell
+    return without_crumbs(submesh(shell, ~ledge)[0]) if ledge.any() else shell
 
 
 def drop_flaps(shell: TriangleMesh, width: float, shortest: float) -> TriangleMesh:
-    """Return the shell without what hangs on it by less than a width: erode by half of it, keep the largest piece, grow
-    back.
+    """Return the shell without what hangs on it by less than a width: erode by half of it, keep the large parts of
+    each piece, grow back.
 
     Cloth between small holes hangs on nothing: they will be filled, and much of a patchy scan is such cloth.
 
@@ -78,10 +79,9 @@ def drop_flaps(shell: TriangleMesh, width: float, shortest: float) -> TriangleMe
     if not kept_faces.any():
         return shell
     core, source = submesh(shell, kept_faces)
-    core_faces = _largest_mask(core)
-    seeds = source[np.unique(core.faces[core_faces])]
+    seeds = source[np.unique(core.faces[large_faces(core, face_components(shell)[1][kept_faces])])]
     reach = distance_from(shell, seeds.astype(np.int32), 8.0 * radius)
-    return largest_piece(clip_to_positive(shell, 1.5 * radius - np.minimum(reach, 8.0 * radius)))
+    return without_crumbs(clip_to_positive(shell, 1.5 * radius - np.minimum(reach, 8.0 * radius)))
 
 
 def fair_rims(shell: TriangleMesh, wavelength: float) -> TriangleMesh:
@@ -123,16 +123,6 @@ def smooth_curve(points: FloatArray, wavelength: float) -> FloatArray:
     move = np.fft.irfft(np.fft.rfft(curve, axis=0) * gain[:, None], count, axis=0) - curve
     move = np.vstack([move, move[:1]])
     return points + np.column_stack([np.interp(along[:-1], even, move[:, d]) for d in range(3)])
-
-
-def largest_piece(mesh: TriangleMesh) -> TriangleMesh:
-    """Return the piece of largest area."""
-    return submesh(mesh, _largest_mask(mesh))[0]
-
-
-def _largest_mask(mesh: TriangleMesh) -> NDArray[np.bool_]:
-    piece, area = component_areas(mesh)
-    return piece == int(np.argmax(area))
 
 
 def reached(mesh: TriangleMesh, among: NDArray[np.bool_], seeds: NDArray[np.bool_]) -> NDArray[np.bool_]:

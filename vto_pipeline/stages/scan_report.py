@@ -70,6 +70,7 @@ def scan_report(
         "coverage": said.get("coverage"),
         "unobserved_share": said.get("unobserved_share"),
         "openings": said.get("openings"),
+        "pieces": said.get("pieces"),
         "used": said.get("registered"),
         "given": said.get("photos"),
         "left_out": said.get("left_out_photos", {}),

@@ -23,11 +23,12 @@ from vto_pipeline.bench.live_rows import LiveRows
 from vto_pipeline.bench.scan.captures import FORM, KINDS, TRUTH
 from vto_pipeline.errors import VtoError
 from vto_pipeline.garment.subtraction.estimated import label_over_estimate
+from vto_pipeline.garment.subtraction.pieces import may_be_worn
 from vto_pipeline.garment.subtraction.subtract import SubtractConfig, label_garment
 from vto_pipeline.geometry.closest import barycentric
 from vto_pipeline.geometry.rigid import transform_mesh
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import component_areas, edge_face_counts, submesh
+from vto_pipeline.geometry.topology import edge_face_counts, submesh
 from vto_pipeline.io.captures.cameras import read_placement
 from vto_pipeline.io.meshes import read_mesh, read_own_mesh
 from vto_pipeline.model.body import Measurements
@@ -66,12 +67,11 @@ def true_garment(surface: TriangleMesh, garment: TriangleMesh, form: TriangleMes
     return (near.distance < _NEAR) & (~beyond | (near.distance < bare.distance))
 
 
-def largest_piece(surface: TriangleMesh, garment: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which vertices belong to the largest piece of what is labelled garment, the one that is kept."""
+def worn_pieces(surface: TriangleMesh, garment: NDArray[np.bool_], form: TriangleMesh) -> NDArray[np.bool_]:
+    """Return which vertices belong to pieces of what is labelled garment that may be worn: they are kept."""
     part, source = submesh(surface, np.asarray(garment[surface.faces].all(axis=1)))
-    piece, area = component_areas(part)
     kept = np.zeros(len(surface.vertices), dtype=bool)
-    kept[source[part.faces[piece == int(np.argmax(area))].ravel()]] = True
+    kept[source[part.faces[may_be_worn(part, SurfaceDistance(form))].ravel()]] = True
     return kept
 
 
@@ -96,7 +96,7 @@ def withheld_row(capture: Path, run: Path, known: str, sex: str) -> dict[str, Va
         labels = _labels(surface, placed, form, known, sex, job)
     except VtoError as error:
         return row | {"reason": error.problem}
-    found = largest_piece(surface, labels.garment)
+    found = worn_pieces(placed, labels.garment, form)
     whole = float(area[true].sum())
     said: dict[str, Value] = {
         name: float(str(job.metrics[name])) for name in ("bare_ends_share", "colors_alike") if name in job.metrics

@@ -24,6 +24,8 @@ SECTORS = 6
 """Photos from one side share what is wrong with their cameras: only so many sides are taken to err on their own."""
 ALIKE = 0.01
 """Along so much of an outline its distance from the edges is one and the same error [share of the form's size]."""
+INSIDE_REACH = 0.5
+"""So many reaches of the search inside the form, a point is inside it."""
 INSIDE_WEIGHT = 0.3
 """Of all scan points, were they all inside, against all points of the outline: cloth inside the form is impossible."""
 
@@ -171,7 +173,7 @@ class OutlineProblem:
         arm = points[deep] - self.middle
         jacobian = np.hstack([np.cross(arm, outward), outward, np.einsum("nd,nd->n", arm, outward)[:, None]])[:, free]
         away = np.maximum(near.distance[deep], -reach)  # the form is to move inward there
-        return (jacobian.T @ jacobian, jacobian.T @ away), float((near.distance < -0.5 * reach).mean())
+        return (jacobian.T @ jacobian, jacobian.T @ away), float((near.distance < -INSIDE_REACH * reach).mean())
 
     def _moved(self, placement: FloatArray, change: FloatArray, reach: float) -> FloatArray:
         """The placement after a change in the form's axes, shortened if it moves the form too far at once."""

@@ -11,7 +11,7 @@ from pydantic import Field
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.outline.contour import ContourMesh
 from vto_pipeline.garment.outline.edges import EdgePhoto
-from vto_pipeline.garment.outline.fit import OutlineFit, OutlineProblem
+from vto_pipeline.garment.outline.fit import INSIDE_REACH, OutlineFit, OutlineProblem
 from vto_pipeline.geometry.remeshing.decimate import decimate
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.arrays import FloatArray
@@ -61,12 +61,14 @@ class OutlinePlacement:
         fit: The last step.
         sigma: Standard error of the least certain point [m].
         scale_error: Standard error of the scale [share]; 0 where it was known.
+        depth: So far inside the form is inside by more than the photos' pixels explain [m].
     """
 
     mannequin_from_scan: FloatArray
     fit: OutlineFit
     sigma: float
     scale_error: float
+    depth: float
 
 
 def place_by_outline(
@@ -176,7 +178,6 @@ def _accept(
         outline_rival=round(rival, 3),
         outline_photos=best.photos,
         outline_rms_mm=best.rms * 1e3,
-        inside_share=best.inside,
         uncertainty_mm=sigma * 1e3,
     )
     hint = "show more of the bare mannequin (neck, arms, stand) on several sides, before a backdrop of another colour"
@@ -197,4 +198,5 @@ def _accept(
             f"{config.worst_sigma_mm:g} mm is allowed",
             hint=hint,
         )
-    return OutlinePlacement(_inverse(best.scan_from_form), best, sigma, of_scale)
+    depth = INSIDE_REACH * FINEST_PX * _pixel(best.scan_from_form, photos, mesh)
+    return OutlinePlacement(_inverse(best.scan_from_form), best, sigma, of_scale, depth)

@@ -41,13 +41,24 @@ def _lying(surface: TriangleMesh, job: Job) -> NDArray[np.bool_]:
     lying = np.zeros(len(surface.vertices), dtype=bool)
     for k in np.flatnonzero(np.arange(len(area)) != np.argmax(area)):
         one, source = submesh(surface, piece == k)
-        upward = face_area_vectors(one)
-        size = np.linalg.norm(upward, axis=1)
-        height = one.vertices[one.faces, 1].mean(axis=1)
-        middle = np.average(height, weights=size)
-        rough = np.sqrt(np.average(np.square(height - middle), weights=size))
-        if rough < ROUGH * np.sqrt(area[k]) and abs(upward[:, 1].sum()) > LEVEL * size.sum():
-            lying[source] = True
-            what = f"a level piece of {1e4 * area[k]:.0f} cm² at a height of {1e3 * middle:.0f} mm"
-            job.note(f"left out {what}: cloth that is worn hangs")
+        lying[source] = is_level(one, job)
     return lying
+
+
+def is_level(piece: TriangleMesh, job: Job) -> bool:
+    """Return whether a piece of a scan lies level, as nothing does that is worn, and note it.
+
+    Args:
+        piece: +Y up [m].
+        job: Receives its area and height.
+    """
+    upward = face_area_vectors(piece)
+    size = np.linalg.norm(upward, axis=1)
+    height = piece.vertices[piece.faces, 1].mean(axis=1)
+    middle = np.average(height, weights=size)
+    rough = np.sqrt(np.average(np.square(height - middle), weights=size))
+    level = bool(rough < ROUGH * np.sqrt(size.sum()) and abs(upward[:, 1].sum()) > LEVEL * size.sum())
+    if level:
+        what = f"a level piece of {1e4 * size.sum():.0f} cm² at a height of {1e3 * middle:.0f} mm"
+        job.note(f"left out {what}: cloth that is worn hangs")
+    return level

@@ -8,7 +8,7 @@ from pydantic import Field
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.robust_icp import scan_noise
 from vto_pipeline.garment.subtraction.color_model import cielab, color_evidence
-from vto_pipeline.garment.subtraction.floor import not_worn
+from vto_pipeline.garment.subtraction.floor import is_level, not_worn
 from vto_pipeline.garment.subtraction.graph_cut import minimum_cut
 from vto_pipeline.geometry.remeshing.clip import clip_to_positive
 from vto_pipeline.geometry.remeshing.repair import RepairConfig, repair
@@ -36,8 +36,6 @@ LEAST_SIGMA = 1e-4
 MOST_SIGMA = 5e-3
 FLOOR_REACH = 0.01
 """A board on the floor may lie so much higher than the lowest point of the mannequin [m]."""
-LARGE = 0.1
-"""With pieces of a larger share of the garment it was torn, and they are cloth that will be missing."""
 
 
 class SubtractConfig(Config):
@@ -97,7 +95,7 @@ def label_garment(surface: TriangleMesh, mannequin: TriangleMesh, config: Subtra
 def extract_garment(surface: TriangleMesh, labels: SurfaceLabels, config: SubtractConfig, job: Job) -> TriangleMesh:
     """Return the garment as an open shell: cut smoothly along the label boundary, repaired, small pieces dropped.
 
-    A piece stays if it is larger than the limit and touches the mannequin's part of the scan; of these the largest.
+    So are those that lie level, as cloth does not that is worn. Which of the others are worn, their openings tell.
 
     Raises:
         GarmentError: no piece is left.
@@ -108,15 +106,14 @@ def extract_garment(surface: TriangleMesh, labels: SurfaceLabels, config: Subtra
     piece, area = component_areas(shell)
     if area.max() < config.smallest_piece_cm2 * 1e-4:
         raise GarmentError(f"the largest piece of garment has only {area.max() * 1e4:.1f} cm²")
-    if len(area) > 1:
-        dropped = float(area.sum() - area.max())
-        what = f"dropped {len(area) - 1} smaller pieces of {dropped * 1e4:.1f} cm² in all"
-        if dropped > LARGE * area.sum():
-            job.warn(f"{what}, {100 * dropped / area.sum():.0f} % of the garment: what connects them was not seen")
-        else:
-            job.note(what)
-    job.measure(area_cm2=float(area.max() * 1e4), dropped_pieces=len(area) - 1)
-    return submesh(shell, piece == int(np.argmax(area)))[0]
+    keep = area >= config.smallest_piece_cm2 * 1e-4
+    small = ~keep
+    for k in np.flatnonzero(keep & (area < area.max())):
+        keep[k] = not is_level(submesh(shell, piece == k)[0], job)
+    if small.any():
+        job.note(f"dropped {int(small.sum())} small pieces of {1e4 * float(area[small].sum()):.1f} cm² in all")
+    job.measure(area_cm2=1e4 * float(area[keep].sum()), pieces=int(keep.sum()), dropped_pieces=int((~keep).sum()))
+    return submesh(shell, keep[piece])[0]
 
 
 def _distance_evidence(distance: FloatArray, sigma: float, thickness: float) -> FloatArray:
