@@ -191,8 +191,8 @@ def _worn_faces(
 ) -> NDArray[np.bool_]:
     """Return which faces belong to the largest piece or to one that is worn by itself, shape (F,).
 
-    The mannequin passes through two openings of that, or through one that goes round it, as into a sock. What hangs
-    beyond it is held by what is worn. Without a mannequin, shape alone tells.
+    The mannequin passes through two openings of that, or through one that goes round it, as into a sock. Without a
+    mannequin, shape alone tells.
     """
     piece, area = component_areas(mesh)
     passed = np.where(area == area.max(), 2, 0)
@@ -203,7 +203,7 @@ def _worn_faces(
     )
     for shape, real in zip(shapes, is_opening, strict=True):
         rim = mesh.vertices[shape.loop]
-        if real and (distance is None or encloses(rim, distance, 1e-3 * config.reach_mm)):
+        if real:
             passed[piece[shape.walk[0] // 3]] += 2 if distance is None or goes_round(rim, distance) else 1
     return np.asarray(((passed >= 2) & (area >= LEAST * area.max()))[piece])
 
