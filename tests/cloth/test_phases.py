@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from cloth_scenes import ball, fabric, moved, sheet
 
+import vto_pipeline.cloth.placement.collision_free_start as start_module
 import vto_pipeline.cloth.rest.phases as module
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.model.build import at_rest, build_cloth
@@ -158,7 +159,7 @@ def test_the_body_grows_closely_where_cloth_is_not_freed_of_it(monkeypatch, plac
 
     monkeypatch.setattr(Phases, "_grown", grown)
     monkeypatch.setattr(
-        module, "find_collision_free_start", lambda x, *given: Start(x, 3, left, np.zeros(len(x), bool))
+        start_module, "find_collision_free_start", lambda x, *given: Start(x, 3, left, np.zeros(len(x), bool))
     )
     phases = Phases(build_cloth(mesh, rest, fabric()), rest, fabric(), DrapeConfig(), Job())
     found = phases._grown_clear(None, body)
