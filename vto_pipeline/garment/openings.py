@@ -87,8 +87,8 @@ def close_scan_holes(
     it, when the loop is long and the cloth runs across its plane like the end of a tube; that is a guess, and said so.
     A filling that a part of the mannequin comes through is opened there once, with a warning.
 
-    A garment may have several pieces, as a jacket and trousers. The largest is one; another is if by that evidence it
-    has an opening. The others are left out, and what of them is cloth counts as not seen.
+    A garment may have several pieces, as a jacket and trousers. The largest is one. Another is if the mannequin passes
+    through two openings of it, or one that goes round it. The others are left out; cloth among them counts as not seen.
 
     Args:
         shell: The garment cut out of the scan, oriented outward.

@@ -11,6 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from vto_pipeline.geometry.topology import half_edges
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -29,25 +30,25 @@ def solid_cubes(mesh: TriangleMesh, low: FloatArray, cube: float) -> NDArray[np.
 
     counts = np.ceil((mesh.vertices.max(axis=0) - low) / cube).astype(np.int64) + 1
     cut = np.zeros(counts, np.bool_)
-    if _is_closed(mesh.faces):
+    if _is_closed(mesh):
         _mark_boxes((mesh.vertices - low) / cube, mesh.faces, cut)
     else:
         cut[:] = True
-    regions, _ = ndimage.label(~cut)
-    _, first, of_cube = np.unique(regions, return_index=True, return_inverse=True)  # 0: those cut
-    asked = np.union1d(np.nonzero(cut.reshape(-1))[0], first)
+    regions, count = ndimage.label(~cut)  # 0: those cut
+    one_of = np.zeros(count + 1, np.int64)
+    one_of[regions.reshape(-1)] = np.arange(cut.size)
+    asked = np.union1d(np.flatnonzero(cut), one_of)
     centres = low + cube * (np.column_stack(np.unravel_index(asked, counts)) + 0.5)
     inside = np.zeros(cut.size, np.bool_)
     inside[asked] = np.abs(igl.fast_winding_number(mesh.vertices, mesh.faces.astype(np.int64), centres)) > 0.5
-    return np.where(cut, inside.reshape(counts), inside[first][of_cube].reshape(counts))
+    return np.where(cut, inside.reshape(counts), inside[one_of][regions])
 
 
-def _is_closed(faces: NDArray[np.int32]) -> bool:
-    """Return whether the sides of these triangles cancel: each is gone along as often one way as the other."""
-    ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2).astype(np.int64)
-    low, high = ends.min(axis=1), ends.max(axis=1)
-    _, side = np.unique(low * (faces.max(initial=0) + 1) + high, return_inverse=True)
-    return not np.bincount(side, np.where(ends[:, 0] == low, 1.0, -1.0)).any()
+def _is_closed(mesh: TriangleMesh) -> bool:
+    """Return whether the sides of its triangles cancel: each is gone along as often one way as the other."""
+    start, end = half_edges(mesh).T.astype(np.int64)
+    size = len(mesh.vertices)
+    return np.array_equal(np.sort(start * size + end), np.sort(end * size + start))
 
 
 @njit(cache=True)

@@ -155,17 +155,16 @@ class _CoarseToFine:
             level, garment, body, deadline, fresh: See `_rest_on`.
         """
         told = len(self._job.warnings)
-        for closely in (False, True):
+        for closely in (False,) if self._config.body_features else (False, True):
+            if closely and not self._may_try_again(garment, deadline):
+                break
             found = self._rest_on(level, garment, body, deadline, fresh=fresh, closely=closely)
             if isinstance(found, _TooCoarse):
                 return found
             finer = self._finer_start(level, found.settling.state.positions, body.final)
             if finer is not None:
                 return found, finer
-            if self._config.body_features:
-                break
-            if not closely:
-                self._tell_once_more(garment, told)
+            del self._job.warnings[told:]
         return _TooCoarse("parts of the body go through the cloth", len(garment.mesh.vertices))
 
     def _finer_start(self, level: int, positions: FloatArray, body: TriangleMesh) -> Garment | None:
@@ -204,18 +203,20 @@ class _CoarseToFine:
         if config.body_features or not config.self_collision or settling.caught or settling.jammed:
             return found
         lies = TriangleMesh(settling.state.positions, garment.mesh.faces)
-        if len(intersecting_faces(lies, body.final)) == 0:
+        if len(intersecting_faces(lies, body.final)) == 0 or not self._may_try_again(garment, deadline):
             return found
-        self._tell_once_more(garment, told)
+        del self._job.warnings[told:]
         again = self._rest_on(0, garment, body, deadline, fresh=fresh, closely=True)
         assert isinstance(again, RestOnMesh)
         return again
 
-    def _tell_once_more(self, garment: Garment, told: int) -> None:
-        """Say that a mesh is gone through once more, in place of the warnings from so many on."""
-        count = len(garment.mesh.vertices)
-        self._job.note(f"parts of the body came between {count} vertices: once more, so that they cannot")
-        del self._job.warnings[told:]
+    def _may_try_again(self, garment: Garment, deadline: float) -> bool:
+        """Return whether there is time to go through a mesh once more, and say that it is done."""
+        in_time = time.perf_counter() < deadline
+        if in_time:
+            count = len(garment.mesh.vertices)
+            self._job.note(f"parts of the body came between {count} vertices: once more, so that they cannot")
+        return in_time
 
     def _rest_on(
         self, level: int, garment: Garment, body: MovingBody, deadline: float, *, fresh: bool, closely: bool = False
