@@ -219,3 +219,11 @@ def test_a_thorn_that_comes_between_the_vertices_stays_out_of_the_cloth(size, co
     assert ("1089 vertices" in between[0]) is not coarse
     assert found.audit["body_intersections"] == found.audit["self_intersections"] == 0
     assert found.mesh.vertices[:, 1].max() > top - 1e-3  # it hangs over the tip
+
+
+@pytest.mark.parametrize(("budget", "times"), [(None, 1), (1e-3, 0)])
+def test_a_mesh_is_gone_through_once_more_while_there_is_time(budget, times, monkeypatch):
+    monkeypatch.setattr(levels_module, "intersecting_faces", lambda *_: np.zeros((7, 2), np.int32))
+    job = Job()
+    drape(vest(), pear(), fabric(), {"settle_seconds": 0.1, "time_budget_s": budget}, job)
+    assert sum("parts of the body came between" in note for note in job.notes) == times
