@@ -1,12 +1,14 @@
 """Where compiled kernels are kept: by their sources, and never where the user said otherwise."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
 import threading
 from contextlib import suppress
 from pathlib import Path
+from types import FunctionType
 
 import numba
 import pytest
@@ -132,6 +134,31 @@ def test_two_that_compile_at_the_same_time_never_load_each_others_code(tmp_path,
         thread.join()
     assert meeting.broken is safe
     assert all(files[0].load(k) == f"code {k}" for k in (0, 1)) is safe
+
+
+def c_entries(kernel):
+    return sum(len(re.findall(r"^define .*@cfunc\.", text, re.MULTILINE)) for text in kernel.inspect_llvm().values())
+
+
+def twice(value):
+    return 2.0 * value
+
+
+@pytest.mark.filterwarnings("ignore:First-class function type feature is experimental")
+def test_only_kernels_of_others_have_an_entry_for_c():
+    """It is what Numba calls where a function is passed by its address."""
+    theirs = numba.njit(twice)
+    ours = numba.njit(FunctionType(twice.__code__, {"__name__": "vto_pipeline.numerics.vector"}))
+    assert theirs(3.0) == ours(3.0) == 6.0
+    assert (c_entries(theirs), c_entries(ours)) == (1, 0)
+
+    number = numba.types.float64
+
+    @numba.njit([number(numba.types.FunctionType(number(number)), number)])
+    def applied(function, value):
+        return function(value)
+
+    assert applied(theirs, 2.0) == 4.0
 
 
 _ALONE = """
