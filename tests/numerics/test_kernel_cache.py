@@ -1,12 +1,14 @@
 """Where compiled kernels are kept: by their sources, and never where the user said otherwise."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
 import threading
 from contextlib import suppress
 from pathlib import Path
+from types import FunctionType
 
 import numba
 import pytest
@@ -132,6 +134,103 @@ def test_two_that_compile_at_the_same_time_never_load_each_others_code(tmp_path,
         thread.join()
     assert meeting.broken is safe
     assert all(files[0].load(k) == f"code {k}" for k in (0, 1)) is safe
+
+
+# Whoever compiles it waits for another to compile it, too.
+MEETING = """
+import os, time
+from pathlib import Path
+from numba import njit
+from numba.extending import overload
+
+HERE = Path(__file__).parent
+
+def one():
+    raise NotImplementedError
+
+@overload(one)
+def _one():
+    (HERE / f"{os.getpid()}.compiles").touch()
+    until = time.monotonic() + float(os.environ["PATIENCE"])
+    while len(list(HERE.glob("*.compiles"))) < 2 and time.monotonic() < until:
+        time.sleep(0.01)
+    return lambda: 1
+
+@njit(cache=True)
+def two():
+    return 2 * one()
+
+@njit(cache=True)
+def four():
+    return two() + two()
+"""
+TOGETHER = """
+import sys
+from toy.numerics.meeting import four, two
+print("ready", flush=True)
+sys.stdin.readline()
+print({"two": two, "four": four}[sys.argv[1]](), flush=True)
+"""
+
+
+@pytest.mark.parametrize(("turns", "patience", "compile"), [(False, 60, 2), (True, 2, 1)])
+@pytest.mark.parametrize("kernels", [("two", "two"), ("four", "two"), ("four", "four")])
+def test_two_that_need_a_kernel_at_the_same_time_compile_it_once(toy, kernels, turns, patience, compile):
+    """The first case shows that Numba alone compiles it twice; once it does not, `take_turns_compiling` may go."""
+    room = toy / "toy" / "numerics"
+    (room / "meeting.py").write_text(MEETING)
+    calls = ["use_kernel_cache", "serialise_cache_writes"] + turns * ["take_turns_compiling"]
+    lines = [f"from toy.numerics.kernel_cache import {', '.join(calls)}", *(f"{name}()" for name in calls)]
+    (room / "__init__.py").write_text("\n".join(lines) + "\n")
+    clean = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
+    environment = {**clean, "PYTHONPATH": str(toy), "PYTHONDONTWRITEBYTECODE": "1", "PATIENCE": str(patience)}
+    both = [
+        subprocess.Popen([sys.executable, "-c", TOGETHER, kernel], stdin=-1, stdout=-1, text=True, env=environment)
+        for kernel in kernels
+    ]
+    for one in both:
+        assert one.stdout.readline() == "ready\n"
+    for one in both:
+        one.stdin.write("go\n")
+        one.stdin.flush()
+    answers = [one.communicate(timeout=120)[0].strip() for one in both]
+    assert answers == [{"two": "2", "four": "4"}[kernel] for kernel in kernels]
+    assert len(list(room.glob("*.compiles"))) == compile
+
+
+def test_a_turn_that_never_ends_is_not_waited_for_without_end(tmp_path, monkeypatch):
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    kernel = numba.njit(cache=True)(twice)
+    with kernel_cache._turn(kernel), kernel_cache._turn(kernel):  # its own is not waited for
+        assert kernel_cache._turns == {str(path) for path in tmp_path.rglob("*.turn")}
+        monkeypatch.setattr(kernel_cache, "_turns", set())  # now it is as another's
+        monkeypatch.setattr(kernel_cache, "_PATIENCE", 0.2)
+        assert kernel(3.0) == 6.0
+
+
+def c_entries(kernel):
+    return sum(len(re.findall(r"^define .*@cfunc\.", text, re.MULTILINE)) for text in kernel.inspect_llvm().values())
+
+
+def twice(value):
+    return 2.0 * value
+
+
+@pytest.mark.filterwarnings("ignore:First-class function type feature is experimental")
+def test_only_kernels_of_others_have_an_entry_for_c():
+    """It is what Numba calls where a function is passed by its address."""
+    theirs = numba.njit(twice)
+    ours = numba.njit(FunctionType(twice.__code__, {"__name__": "vto_pipeline.numerics.vector"}))
+    assert theirs(3.0) == ours(3.0) == 6.0
+    assert (c_entries(theirs), c_entries(ours)) == (1, 0)
+
+    number = numba.types.float64
+
+    @numba.njit([number(numba.types.FunctionType(number(number)), number)])
+    def applied(function, value):
+        return function(value)
+
+    assert applied(theirs, 2.0) == 4.0
 
 
 _ALONE = """

@@ -15,8 +15,15 @@ cpu_threads, kernel_cache: threads of the processor; where compiled kernels are 
 from __future__ import annotations
 
 from vto_pipeline.numerics.cpu_threads import load_tbb
-from vto_pipeline.numerics.kernel_cache import serialise_cache_writes, use_kernel_cache
+from vto_pipeline.numerics.kernel_cache import (
+    leave_out_c_entries,
+    serialise_cache_writes,
+    take_turns_compiling,
+    use_kernel_cache,
+)
 
 use_kernel_cache()
 serialise_cache_writes()
+take_turns_compiling()
+leave_out_c_entries()
 load_tbb()

@@ -304,7 +304,7 @@ def _linearised(x, data):
     values, gradients = np.empty((count, rows)), np.empty((count, rows, corners, 3))
     compliance = np.empty((count, rows, rows))
     for i in prange(count):
-        linearise_one(i, x, data, values[i], gradients[i], compliance[i])
+        linearise_one(np.int64(i), x, data, values[i], gradients[i], compliance[i])
     return values, gradients, compliance
 
 

@@ -94,7 +94,7 @@ def _flood(sheet, edge, crossing, contour, vertices):  # type: ignore[no-untyped
                 best, chosen, smaller = score, side, part
         if best > _CLEAR:
             decided[c] = True
-            _directions(crossing, contour, c, chosen, smaller, push)
+            _directions(crossing, contour, c, np.int64(chosen), np.int64(smaller), push)
     return push, decided
 
 

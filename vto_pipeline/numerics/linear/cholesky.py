@@ -62,22 +62,21 @@ def factorise(plan, starts, blocks, weights, between, out):
     threaded = plan.flops >= _SIDE_BY_SIDE
     if threaded:
         _bins_parallel(plan, starts, blocks, weights, between, out)
-    else:
-        for b in range(BINS):
-            _bin(b, plan, starts, blocks, weights, between, out, False)
-    _bin(BINS, plan, starts, blocks, weights, between, out, threaded)
+    for b in range(BINS if threaded else 0, BINS + 1):
+        _bin(b, plan, starts, blocks, weights, between, out)
     return out.good.all()
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
 def _bins_parallel(plan, starts, blocks, weights, between, out):
     for b in prange(BINS):
-        _bin(b, plan, starts, blocks, weights, between, out, False)
+        _bin(np.int64(b), plan, starts, blocks, weights, between, out)
 
 
 @njit(cache=True, error_model="numpy")
-def _bin(b, plan, starts, blocks, weights, between, out, threaded):
+def _bin(b, plan, starts, blocks, weights, between, out):
     """Factor the supernodes of a bin, children first, up to where one has no positive pivot."""
+    threaded = b == BINS and plan.flops >= _SIDE_BY_SIDE  # the last bin comes alone
     for n in range(plan.bin_starts[b], plan.bin_starts[b + 1]):
         s = plan.binned[n]
         children = plan.children[plan.child_starts[s] : plan.child_starts[s + 1]]
@@ -140,14 +139,14 @@ def _extend_add(c, plan, passed, panel, rest, threaded):
     if threaded and given.size >= _TAKEN:
         _extend_add_rows_parallel(given, within, run, panel, rest)
     else:
-        _extend_add_rows(given, within, run, panel, rest, 0, count)
+        _extend_add_rows(given, within, run, panel, rest, np.int64(0), count)
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
 def _extend_add_rows_parallel(given, within, run, panel, rest):
     strips = (len(within) + _STRIP - 1) // _STRIP
     for k in prange(strips):
-        first = _STRIP * _balanced_strip(k, strips)
+        first = _STRIP * _balanced_strip(np.int64(k), strips)
         _extend_add_rows(given, within, run, panel, rest, first, min(len(within), first + _STRIP))
 
 
@@ -193,7 +192,7 @@ def _eliminate(panel, threaded):
             _divide_three(panel, begin, begin + 3, alone)
         if shared:
             _divide_parallel(panel, first, last, alone)
-        _subtract_all(panel[first:last], panel, last, wide, 0, threaded)
+        _subtract_all(panel[first:last], panel, last, wide, np.int64(0), threaded)
     return True
 
 
@@ -259,7 +258,7 @@ def _update_schur_complement(panel, rest, threaded):
     """Subtract from what is passed on the products of the eliminated columns."""
     wide, tall = len(panel), len(rest)
     for first in range(0, wide, _PIVOTS):
-        _subtract_all(panel[first : first + _PIVOTS], rest, 0, tall, wide, threaded)
+        _subtract_all(panel[first : first + _PIVOTS], rest, np.int64(0), tall, wide, threaded)
 
 
 @njit(cache=True, error_model="numpy")
@@ -309,7 +308,7 @@ def _tiles(pivots, shift, width, begin):
 def _subtract_parallel(pivots, beside, rows, begin, end, shift):
     strips = (end - begin + _STRIP - 1) // _STRIP
     for k in prange(strips):
-        first = begin + _STRIP * _balanced_strip(k, strips)
+        first = begin + _STRIP * _balanced_strip(np.int64(k), strips)
         _subtract(pivots, beside, rows, first, min(end, first + _STRIP), shift)
 
 

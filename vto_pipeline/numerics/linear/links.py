@@ -130,7 +130,7 @@ def apply_links(links, level, x):
     if count >= PARALLEL_FROM:
         _pull_parallel(links, level, x)
     elif count > 0:
-        _pull_some(links, level, x, 0, count)
+        _pull_some(links, level, x, np.int64(0), count)
 
 
 @njit(cache=True, error_model="numpy", parallel=True)

@@ -23,16 +23,13 @@ def solve(plan, factor, right, x):
     threaded = plan.panels[-1] >= _SIDE_BY_SIDE
     if threaded:
         _forward_parallel(plan, factor, y, passed)
-    else:
-        for b in range(BINS):
-            _forward_bin(b, plan, factor, y, passed)
-    _forward_bin(BINS, plan, factor, y, passed)
-    _backward_bin(BINS, plan, factor, y)
+    alone = BINS if threaded else 0
+    for b in range(alone, BINS + 1):
+        _forward_bin(b, plan, factor, y, passed)
+    for b in range(BINS, alone - 1, -1):
+        _backward_bin(b, plan, factor, y)
     if threaded:
         _backward_parallel(plan, factor, y)
-    else:
-        for b in range(BINS):
-            _backward_bin(b, plan, factor, y)
     for j in range(len(plan.order)):
         for k in range(3):
             x[plan.order[j], k] = y[3 * j + k]
@@ -41,13 +38,13 @@ def solve(plan, factor, right, x):
 @njit(cache=True, error_model="numpy", parallel=True)
 def _forward_parallel(plan, factor, y, passed):
     for b in prange(BINS):
-        _forward_bin(b, plan, factor, y, passed)
+        _forward_bin(np.int64(b), plan, factor, y, passed)
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
 def _backward_parallel(plan, factor, y):
     for b in prange(BINS):
-        _backward_bin(b, plan, factor, y)
+        _backward_bin(np.int64(b), plan, factor, y)
 
 
 @njit(cache=True, error_model="numpy")

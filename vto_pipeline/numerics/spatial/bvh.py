@@ -154,11 +154,13 @@ def closest_triangles(tree, vertices, faces, points, reach, guess=None):
     """
     if guess is None:
         guess = np.full(len(points), -1, np.int32)
-    search = _closest_serial if len(points) < _SERIAL_BELOW else _closest_parallel
     triangle = np.empty(len(points), np.int32)
     weights = np.empty((len(points), 3))
     feature = np.empty(len(points), np.int8)
-    search(tree, vertices, faces, points, reach, guess, triangle, weights, feature)
+    if len(points) < _SERIAL_BELOW:
+        _closest_range(tree, vertices, faces, points, reach, guess, 0, len(points), triangle, weights, feature)
+    else:
+        _closest_parallel(tree, vertices, faces, points, reach, guess, triangle, weights, feature)
     return triangle, weights, feature
 
 
@@ -168,11 +170,6 @@ def _closest_parallel(tree, vertices, faces, points, reach, guess, triangle, wei
     for chunk in prange(chunks):
         first, last = 64 * chunk, min(64 * chunk + 64, len(points))
         _closest_range(tree, vertices, faces, points, reach, guess, first, last, triangle, weights, feature)
-
-
-@njit(cache=True)
-def _closest_serial(tree, vertices, faces, points, reach, guess, triangle, weights, feature):
-    _closest_range(tree, vertices, faces, points, reach, guess, 0, len(points), triangle, weights, feature)
 
 
 @njit(cache=True)

@@ -38,7 +38,7 @@ def _pairs(tree: Bvh, other: Bvh, same: bool) -> NDArray[np.int32]:
 @njit(cache=True, error_model="numpy", parallel=True)
 def _search_parallel(tree, other, same, starts, found, counts):
     for chunk in prange(len(counts)):
-        counts[chunk] = _search_chunk(tree, other, same, chunk, starts, found)
+        counts[chunk] = _search_chunk(tree, other, same, np.int64(chunk), starts, found)
 
 
 @njit(cache=True, error_model="numpy")

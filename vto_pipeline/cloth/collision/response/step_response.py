@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit, prange
 
 from vto_pipeline.cloth.collision.response.plane_motion import plane_at
@@ -30,7 +31,7 @@ def resolve_plane_contacts(x, v, start, inverse_mass, contacts, t0, t1, h, longe
     if threaded:
         _resolve_parallel(x, v, start, inverse_mass, contacts, t0, t1, h, longest, finish)
     else:
-        _resolve(x, v, start, inverse_mass, contacts, t0, t1, h, longest, finish, 0, len(x))
+        _resolve(x, v, start, inverse_mass, contacts, t0, t1, h, longest, finish, np.int64(0), len(x))
 
 
 @njit(cache=True, error_model="numpy", parallel=True)

@@ -145,13 +145,13 @@ def _prepare_rates(x, v, data, lacking):
 @njit(cache=True, error_model="numpy", parallel=True)
 def _bend_threaded(x, data):
     for i in prange(len(data.vertices)):
-        _bend(i, x, data)
+        _bend(np.int64(i), x, data)
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
 def _sum_moments_threaded(data):
     for i in prange(len(data.vertices)):
-        _sum_moment(i, data)
+        _sum_moment(np.int64(i), data)
 
 
 @njit(cache=True, error_model="numpy")
