@@ -8,7 +8,7 @@ Nor does Numba keep two processes from choosing the same file for two kernels th
 could later load the other's machine code. So one process saves at a time. And one that needs what another compiles just
 now waits for it.
 
-What nobody calls is not compiled: Numba's entries for C.
+Numba's entries for C, which are never called, are not compiled.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def serialise_cache_writes() -> None:
 def take_turns_compiling() -> None:
     """Let one process at a time compile a kernel; those that waited for it load what it has saved. Once.
 
-    A turn lasts while the kernels that it calls are compiled. Nobody waits in a circle, as none calls its caller.
+    A turn lasts while the kernels that it calls are compiled. No two wait for each other, as no kernel calls its caller.
     """
     compile_kernel = Dispatcher.compile
 
