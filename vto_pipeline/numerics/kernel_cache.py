@@ -70,7 +70,7 @@ def serialise_cache_writes() -> None:
 def take_turns_compiling() -> None:
     """Let one process at a time compile a kernel; those that waited for it load what it has saved. Once.
 
-    A turn lasts while the kernels that it calls are compiled. No two wait for each other, as no kernel calls its caller.
+    A turn lasts while the kernels that it calls are compiled. No two wait for each other: no kernel calls its caller.
     """
     compile_kernel = Dispatcher.compile
 
