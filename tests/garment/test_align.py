@@ -14,6 +14,7 @@ from vto_pipeline.garment.outline.inside import inside_share
 from vto_pipeline.geometry.rigid import transform_mesh
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.geometry.topology import vertex_normals
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -68,6 +69,23 @@ def test_something_else_than_the_mannequin_is_refused(scene):
     with pytest.raises(GarmentError) as caught:
         align_to_mannequin(TriangleMesh(crate.vertices, crate.faces), scene.form, AlignConfig(samples=1000), Job())
     assert "right mannequin" in caught.value.hint
+
+
+@pytest.mark.parametrize("size", [0.97, 1.015, 1.03])
+def test_a_scan_of_another_size_than_its_mannequin_is_refused(scene, size):
+    mannequin, job = TriangleMesh(size * scene.form.vertices, scene.form.faces), Job()
+    with pytest.raises(GarmentError, match=f"only if it is made .* {'larger' if size > 1 else 'smaller'}") as caught:
+        align_to_mannequin(scene.scan, mannequin, QUICK, job)
+    assert "printed in its full size" in caught.value.hint
+    assert_allclose(job.metrics["size_on_mannequin"], size, rtol=2e-3)
+
+
+@pytest.mark.parametrize("off", [-1.5e-3, 1.5e-3])
+def test_a_scan_a_little_too_thick_or_thin_is_not(scene, off):
+    swollen = TriangleMesh(scene.scan.vertices + off * vertex_normals(scene.scan), scene.scan.faces)
+    job = Job()
+    align_to_mannequin(swollen, scene.form, QUICK, job)
+    assert abs(job.metrics["size_on_mannequin"] - 1.0) < 0.01
 
 
 def test_a_mannequin_that_looks_alike_all_round_is_refused():

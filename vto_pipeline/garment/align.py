@@ -37,6 +37,8 @@ FEW = 2000
 """Scan points that rank the starts."""
 SAME_SCALE = 0.02
 """Placements whose scales differ by no more than this share are one."""
+SIZE_OFF, SIZE_SIGMAS = 0.01, 4.0
+"""A scan in metres may fit the mannequin better in a size that differs by this share, or by so many standard errors."""
 SPACING = 0.01
 """Scan noise is taken as independent from one such square to the next when the uncertainty is estimated [m]."""
 
@@ -86,18 +88,20 @@ def align_to_mannequin(
     cloth that lies close passes for bare mannequin of another size.
 
     Raises:
-        GarmentError: neither settles the placement, and why.
+        GarmentError: neither settles the placement, and why; or scan and mannequin differ in size.
     """
     scan = _Scan(surface, mannequin, config, job)
     if photos is None:
-        return scan.on_bare_parts(config.enough_bare, tilted=True)
+        return scan.of_same_size(scan.on_bare_parts(config.enough_bare, tilted=True))
     if scan.free:
         reason = "the scan has no scale of its own, and in another size close cloth may pass for bare mannequin"
     else:
         try:
-            return scan.on_bare_parts(config.upright_bare, tilted=False)
+            found = scan.on_bare_parts(config.upright_bare, tilted=False)
         except GarmentError as error:
             reason = error.problem
+        else:
+            return scan.of_same_size(found)
     try:
         found = scan.by_outline(photos)
     except GarmentError as error:
@@ -184,6 +188,34 @@ class _Scan:
         _check_inside(inside, config)
         if self.free:
             _tell_scale(scale_of(placement), found.scale_error, job)
+        return placement
+
+    def of_same_size(self, placement: FloatArray) -> FloatArray:
+        """Return the placement, by bare parts, of a scan in metres; refuse one that they fit better in another size.
+
+        A few per cent are easily overlooked: half of the bare parts still lie near the mannequin, and little inside.
+        They come of a board that was printed to fit a page, or of another size of the same form.
+
+        Raises:
+            GarmentError: one of the two has a wrong size.
+        """
+        if self.free:
+            return placement
+        bands = np.geomspace(COARSE_BANDS[0], self.config.widest_band_mm * 1e-3, FINE_BANDS)
+        here, sized = (
+            robust_icp(self.points, self.normals, self.distance, self.normals_there, placement, bands, free_scale)
+            for free_scale in (False, True)
+        )
+        error = _uncertainty(sized, self.surface, self.config.samples)[1]
+        self.job.measure(size_on_mannequin=sized.scale)
+        off = sized.scale - 1.0
+        told = sized.bare.mean() >= self.config.upright_bare and abs(off) > max(SIZE_OFF, SIZE_SIGMAS * error)
+        if told and _worth(here) < self.config.rival_merit * _worth(sized):
+            other = f"{abs(off):.1%} {'larger' if off > 0 else 'smaller'}"
+            raise GarmentError(
+                f"the scan lies on the mannequin only if it is made {other}",
+                hint="is it the mannequin that was scanned, and in its unit? was the board printed in its full size?",
+            )
         return placement
 
     def _starts(self, rotations: list[FloatArray]) -> list[FloatArray]:
