@@ -122,6 +122,11 @@ class StalledFolder:
         """Let it answer nothing any more."""
         self._server.send_signal(signal.SIGUSR1)
 
+    def end(self) -> None:
+        """End its server: all that waits for it gets an error."""
+        self._server.kill()
+        self._server.wait()
+
 
 @contextmanager
 def stalled_folder(path: Path, files: dict[str, bytes], stall_at: int | None = None) -> Iterator[StalledFolder]:
@@ -139,11 +144,11 @@ def stalled_folder(path: Path, files: dict[str, bytes], stall_at: int | None = N
         server.stdin.flush()
         if not server.stdout.readline():
             pytest.skip(f"no folder of FUSE can be mounted here: {server.stderr.read().splitlines()[-1:]}")
+        folder = StalledFolder(path, server)
         try:
-            yield StalledFolder(path, server)
+            yield folder
         finally:
-            server.kill()
-            server.wait()
+            folder.end()
             ctypes.CDLL(None).umount2(os.fsencode(path), _DETACH)
 
 
