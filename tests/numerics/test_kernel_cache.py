@@ -1,5 +1,6 @@
 """Where compiled kernels are kept: by their sources, and never where the user said otherwise."""
 
+import fcntl
 import os
 import re
 import shutil
@@ -200,12 +201,29 @@ def test_two_that_need_a_kernel_at_the_same_time_compile_it_once(toy, kernels, t
 
 def test_a_turn_that_never_ends_is_not_waited_for_without_end(tmp_path, monkeypatch):
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(kernel_cache, "_turns", set())
     kernel = numba.njit(cache=True)(twice)
     with kernel_cache._turn(kernel), kernel_cache._turn(kernel):  # its own is not waited for
-        assert kernel_cache._turns == {str(path) for path in tmp_path.rglob("*.turn")}
+        assert kernel_cache._turns == {str(path) for path in tmp_path.rglob("*.turn")} != set()
         monkeypatch.setattr(kernel_cache, "_turns", set())  # now it is as another's
         monkeypatch.setattr(kernel_cache, "_PATIENCE", 0.2)
         assert kernel(3.0) == 6.0
+
+
+def test_a_turn_ends_though_a_child_has_inherited_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(kernel_cache, "_turns", set())
+    kernel = numba.njit(cache=True)(twice)
+    with kernel_cache._turn(kernel):
+        (path,) = kernel_cache._turns
+        open_files = {os.path.realpath(one): int(one.name) for one in Path("/proc/self/fd").iterdir()}
+        child = subprocess.Popen(["sleep", "60"], pass_fds=[open_files[os.path.realpath(path)]])
+    try:
+        with open(path) as again:
+            fcntl.flock(again, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    finally:
+        child.kill()
+        child.wait()
 
 
 def c_entries(kernel):

@@ -19,7 +19,7 @@ import os
 import shutil
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import wraps
 from pathlib import Path
 from typing import Any
@@ -103,7 +103,9 @@ def _turn(kernel: Any) -> Iterator[None]:
         yield
     finally:
         _turns.discard(path)
-        os.close(lock)  # which ends the turn, as the end of the process does
+        with suppress(OSError):  # closing it, or the end of the process, would not do if a child has inherited it
+            fcntl.flock(lock, fcntl.LOCK_UN)
+        os.close(lock)
 
 
 def _wait_for(lock: int) -> None:
