@@ -86,6 +86,9 @@ class Standing:
     def prepare(self, positions):
         pass
 
+    def accelerate(self, on):
+        pass
+
     def use_exact_stiffness(self, on):
         pass
 

@@ -28,6 +28,9 @@ class Steps:
     def prepare(self, positions):
         pass
 
+    def accelerate(self, on):
+        pass
+
     def use_exact_stiffness(self, on):
         self.exact = on
 
@@ -76,60 +79,80 @@ MOVED = 1e-4  # m: far from standing still
 def test_steps_grow_while_the_force_falls():
     stepper = Steps()
     polish = StableNewtonSteps(stepper, enough=0.01)
-    polish.choose(True, 5e-3, MOVED)
+    polish.choose(True, False, 5e-3, MOVED)
     assert stepper.exact
     stepper.was_positive_definite = True
     lengths, residual = [], 5e-3
     while not polish.took_full_step:
         assert not polish.diverged(residual, MOVED)
-        polish.choose(True, residual, MOVED)
+        polish.choose(True, False, residual, MOVED)
         lengths.append(stepper.step)
         residual *= 0.5
     assert_allclose(lengths, [4 / 30, 16 / 30, LONGEST])
 
 
+@pytest.mark.parametrize("stuck", [False, True])
+def test_where_cloth_is_about_to_buckle_exact_steps_are_shorter_only_if_the_usual_ones_lead_nowhere(stuck):
+    stepper = Steps()
+    polish = StableNewtonSteps(stepper, enough=0.01)
+    polish.choose(True, stuck, 0.1, MOVED)
+    assert stepper.exact
+    polish.choose(False, stuck, 0.1, MOVED)
+    assert stepper.exact is stuck
+    assert stepper.substeps == (2.0 if stuck else 0.5)
+    polish.choose(True, False, 0.1, MOVED)
+    assert not stepper.exact  # the usual ones have a few looks' time first
+
+
+def test_what_is_left_is_told_roughly_after_two_looks_and_well_after_four():
+    for error, looks in ((4e-3, 2), (2e-3, 4)):
+        found = relax_to_rest(Straying(), at_rest(np.array([[1e-3, 0, 0]])), SettleLimits(error, 1.0, 4.0, 160))
+        errors = np.array([row.error_mm for row in found.trace])
+        assert np.flatnonzero(np.isfinite(errors))[0] == looks - 1
+
+
 def test_what_leaves_more_force_is_tried_in_shorter_steps_until_they_are_as_usual():
     stepper = Steps()
     polish = StableNewtonSteps(stepper, enough=0.01)
-    polish.choose(True, 5e-3, MOVED)
+    polish.choose(True, False, 5e-3, MOVED)
     stepper.was_positive_definite = True
     assert not polish.diverged(0.04, MOVED)  # what is soft comes first
-    polish.choose(True, 0.04, MOVED)
+    polish.choose(True, False, 0.04, MOVED)
     assert stepper.step == pytest.approx(1 / 30)  # no longer steps before forces are all but in balance
-    polish.choose(True, 5e-3, MOVED)
+    polish.choose(True, False, 5e-3, MOVED)
     assert stepper.step == pytest.approx(4 / 30)
     assert polish.diverged(0.04, MOVED)  # but it has to fall
     assert stepper.exact
     assert stepper.step == pytest.approx(1 / 30)
     assert not polish.diverged(0.4, MOVED)
-    polish.choose(True, 0.4, MOVED)
+    polish.choose(True, False, 0.4, MOVED)
     assert stepper.exact
     assert stepper.step == pytest.approx(1 / 30)  # it is on its way: no longer steps yet
     assert not polish.diverged(5e-3, MOVED)
-    polish.choose(True, 5e-3, MOVED)
+    polish.choose(True, False, 5e-3, MOVED)
     assert stepper.step == pytest.approx(np.sqrt(8) / 30)  # between what did and twice what did not
 
 
 def test_where_cloth_all_but_stands_still_steps_grow_whatever_force_a_micrometre_of_stretch_makes():
     stepper = Steps()
     polish = StableNewtonSteps(stepper, enough=0.01)
-    polish.choose(True, 0.1, 1e-6)
+    polish.choose(True, False, 0.1, 1e-6)
     stepper.was_positive_definite = True
     lengths = []
     for residual in (2.4, 0.02, 3.2):
         assert not polish.diverged(residual, 1e-6)
-        polish.choose(True, residual, 1e-6)
+        polish.choose(True, False, residual, 1e-6)
         lengths.append(stepper.step)
     assert_allclose(lengths, [4 / 30, 16 / 30, LONGEST])
     assert polish.diverged(3.2, MOVED)  # it went somewhere
     while not polish.took_full_step:
-        polish.choose(True, 0.1, 1e-6)
-    polish.choose(True, 0.1, 1e-6)  # all the way, and still out of balance
+        polish.choose(True, False, 0.1, 1e-6)
+    polish.choose(True, False, 0.1, 1e-6)  # all the way, and still out of balance
     assert stepper.step < LONGEST
     for _ in range(3):
-        polish.choose(True, 0.1, 1e-6)
+        polish.choose(True, False, 0.1, 1e-6)
     assert stepper.step == pytest.approx(1 / 30)  # so it is the force that counts
-    polish.choose(True, 0.1, 1e-6)
+    polish.choose(True, False, 0.1, 1e-6)
     assert stepper.step == pytest.approx(4 / 30)  # for a while
 
 
@@ -137,16 +160,16 @@ def test_short_steps_that_tear_cloth_are_taken_back_and_the_usual_ones_go_on():
     stepper = Steps()
     polish = StableNewtonSteps(stepper, enough=0.01)
     assert not polish.diverged(0.17, MOVED)
-    polish.choose(True, 0.17, MOVED)
-    polish.choose(True, 0.17, MOVED)
+    polish.choose(True, True, 0.17, MOVED)
+    polish.choose(True, True, 0.17, MOVED)
     assert stepper.substeps > 0.5
     assert not polish.diverged(50.0, MOVED)  # cloth that snaps has forces above its weight for a while
     assert polish.diverged(1000.0, MOVED)
     assert stepper.substeps == 0.5
     assert not stepper.exact
-    polish.choose(True, 0.17, MOVED)
+    polish.choose(True, True, 0.17, MOVED)
     assert not stepper.exact  # and no other try at once
-    polish.choose(True, 0.009, MOVED)
+    polish.choose(True, True, 0.009, MOVED)
     assert stepper.exact  # but in balance there is nothing to be torn out of
 
 
@@ -317,7 +340,7 @@ class Indefinite(Steps):
         """Steps per frame and whether they are exact, in so many looks, the cloth all but still."""
         chooser, chosen = StableNewtonSteps(self, 0.01), []
         for _ in range(count):
-            chooser.choose(near=True, residual=1.0, moved=MOVED)
+            chooser.choose(near=True, stuck=True, residual=1.0, moved=MOVED)
             chosen.append((self.substeps, self.exact))
         return chosen
 

@@ -265,6 +265,11 @@ class Stepper:
             self._method.exact = on
             self._method.limits = Limits(iterations=1) if on else Limits()
 
+    def accelerate(self, on: bool) -> None:
+        """Let the method carry moves on from now on, where only the end matters, or no longer; after `prepare`."""
+        if isinstance(self._method, Newton):
+            self._method.accelerated = on
+
     @property
     def was_positive_definite(self) -> bool:
         """Whether the last step did throughout: at no point was the cloth about to buckle."""

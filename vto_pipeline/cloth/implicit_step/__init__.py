@@ -9,6 +9,7 @@ geometric_stiffness: how gradients turn while multipliers grow
 iterated: what methods share that iterate on one step at a time
 line_search: how far a descent step may go
 plane_multiplier: contact inside an iteration, remembered
+dissipation: what dampers take out of a step
 momentum: kept to the last bit where nothing holds the cloth
 frozen_step: one step as a fixed problem, for comparing solvers
 """

@@ -18,6 +18,7 @@ from vto_pipeline.model.cloth import TraceRow
 _QUIET = 3  # looks in a row under the bound: an oscillating cloth stands still for an instant at each turn
 _COARSE = 2.0  # times the bound: waiting longer for a coarse answer, itself in error by more, is waste
 _STILL, _LONG = 1e-4, 10  # m, looks in a row: what stays within that is waited for no longer, in balance or not
+_STANDS = 1e-6  # m a look: not even what is about to buckle gets anywhere
 _VAGUE = 3e-3  # m: what is not known to be stable may still buckle by as much, as dresses of `vto bench drape` do
 _FOLDS, _THERE = 16.0, 0.1  # times e, from rounding to this share of the bound, grows what leaves an unstable place
 _NEAR = 1e-3  # m a look: slow enough to ask whether it is
@@ -106,6 +107,8 @@ def relax_to_rest(
     only in part, as one sweep of Gauss-Seidel does, leaves an error of order h² in the state of rest, so halving h
     shows three quarters of it (Richardson) and a third of that is left.
 
+    A method that can be accelerated is: only the end matters, not the way.
+
     Cloth that buckles slowly hardly moves for a long while, so being quiet does not prove much. A method that knows the
     exact stiffness goes on in steps that grow as long as the system is positive definite (`cloth.rest.stable_newton`):
     one of these goes all the way that was to come, and where it goes nowhere, the cloth is at rest, and stable. Where
@@ -131,9 +134,10 @@ def relax_to_rest(
     drifts: list[float] = []
     earlier = state.positions
     coarse: FloatArray | None = None
-    quiet, still, stood, stood_at = 0, 0, 0.0, state.positions
+    quiet, still, slow, stuck, stood, stood_at = 0, 0, 0, False, 0.0, state.positions
     stepper.prepare(state.positions)
     stepper.deadline = limits.deadline
+    stepper.accelerate(True)
     exact, newton_steps = stepper.has_exact_rest, StableNewtonSteps(stepper, limits.residual)
     looks, taken, share = 0, 0, 0.0
     while share < 1.0 and not stepper.out_of_time:
@@ -167,7 +171,7 @@ def relax_to_rest(
             earlier = before
             whole = newton_steps.took_full_step and len(moves) > 1
             stable = whole or stood >= _FOLDS * newton_steps.indefinite_step
-            to_come = max(moves[-2:]) if whole else max(moved, _still_to_come(drifts))
+            to_come = max(moves[-2:]) if whole else max(moved, _still_to_come(drifts, limits.error >= _VAGUE))
             result.error = max(to_come, _VAGUE) if stepper.can_use_exact_stiffness and not stable else to_come
             if not exact:
                 result.error += np.inf if coarse is None else rms(after.positions - coarse) / 3.0
@@ -181,16 +185,18 @@ def relax_to_rest(
         if result.caught or result.jammed:
             break
         if brief:
-            newton_steps.choose(moved < _STILL, residual, moved)
+            newton_steps.choose(False, stuck, residual, moved)
             continue
         first = coarse is None and not exact
         bound = _COARSE * limits.error if first else (1.0 if exact else 0.5) * limits.error
         still = still + 1 if to_come < _STILL else 0
+        slow = slow + 1 if moved < _STILL else 0
         balanced = result.residual < limits.residual or not exact
         over = balanced or still >= _LONG
+        stuck = slow >= (2 * _LONG if balanced else _LONG) or (balanced and moved <= _STANDS)
         quiet = quiet + 1 if to_come < bound and over and (stable or not stepper.was_positive_definite) else 0
         if stepper.can_use_exact_stiffness and limits.error < _VAGUE:
-            newton_steps.choose(moved < (_NEAR if over else _STILL), residual, moved)
+            newton_steps.choose(over and moved < _NEAR, stuck, residual, moved)
         if quiet < (1 if exact and residual < limits.residual else _QUIET):  # at a turn of its way forces are large
             continue
         if result.error <= limits.error:
@@ -204,6 +210,7 @@ def relax_to_rest(
         stepper.substeps *= 2
     if exact:
         newton_steps.end()
+    stepper.accelerate(False)
     stepper.deadline = np.inf
     return result
 
@@ -221,10 +228,13 @@ def _is_jammed(residuals: list[float]) -> bool:
     return last > max(_JAMMED, _JAM_FALL * before)
 
 
-def _still_to_come(drifts: list[float]) -> float:
-    """Return the sum of the moves to come if they go on shrinking as the last four did [m]."""
-    if len(drifts) < 4:
+def _still_to_come(drifts: list[float], roughly: bool) -> float:
+    """Return the sum of the moves to come if they go on shrinking as the last four did, or roughly the last two [m]."""
+    if len(drifts) >= 4:
+        last, before, looks = max(drifts[-2:]), max(drifts[-4:-2]), 2
+    elif roughly and len(drifts) >= 2:
+        last, before, looks = drifts[-1], drifts[-2], 1
+    else:
         return np.inf
-    last, before = max(drifts[-2:]), max(drifts[-4:-2])
-    shrink = min(np.sqrt(last / before), _SLOWEST) if before > 0.0 else 0.0
+    shrink = min((last / before) ** (1.0 / looks), _SLOWEST) if before > 0.0 else 0.0
     return float(last * max(shrink / (1.0 - shrink), 1.0))

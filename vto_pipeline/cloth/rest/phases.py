@@ -34,7 +34,7 @@ from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
-PLACED, ROUGH, REST = (5e-3, 1000.0), (5e-3, 10.0), (0.0, 1.0)
+PLACED, ROUGH, REST = (5e-3, 1000.0), (5e-3, 100.0), (0.0, 1.0)
 """How nearly cloth comes to rest: the error at least [m], and times the left-over force that are enough.
 
 In place, to see where it lies across the body before it goes on; roughly, for a finer mesh to go on; and as is asked.

@@ -30,9 +30,10 @@ class StableNewtonSteps:
     a step that leaves more is not taken, unless it is as short as usual: that is no guess, but cloth on its way. Forces
     grow so where it falls out of a place it was not stable in, and stays at, all but still, with the usual stiffness.
 
-    Where the system is not positive definite in steps as long as usual, they are shorter until it is. The usual
-    stiffness leaves out what makes cloth buckle: with it, a fold that is about to only creeps, and may even come to
-    stand on its saddle. The nearer a step is to the length from which on there is no definite system, the farther it
+    Where the system is not positive definite in steps as long as usual, cloth is about to buckle, and in the usual
+    ones, which are accelerated, it mostly does. Where these lead nowhere, the exact ones are shorter until it is. For
+    the usual stiffness leaves out what makes cloth buckle: with it, a fold may even come to stand on its saddle. The
+    nearer a step is to the length from which on there is no definite system, the farther it
     goes along the mode that buckles. So that length is bracketed: each try is the geometric mean of what did and did
     not, and what did is kept meanwhile. A step that fails is not taken, and costs little.
     Where it is not in the shortest ones either, as in cloth that buckles within an edge, time would stand still: so the
@@ -93,11 +94,12 @@ class StableNewtonSteps:
             self._before = residual
         return strays or tears
 
-    def choose(self, near: bool, residual: float, moved: float) -> None:
-        """Choose the next steps: with the exact stiffness, longer while that will do, else shorter.
+    def choose(self, near: bool, stuck: bool, residual: float, moved: float) -> None:
+        """Choose the next steps: with the exact stiffness, longer while that will do, else the usual ones.
 
         Args:
-            near: Whether it is worth trying.
+            near: Whether the exact stiffness is worth trying.
+            stuck: Whether the usual steps have long led hardly anywhere: then it is, and in short steps, too.
             residual: Left-over force now.
             moved: How far the last look's steps went, rms over vertices [m].
         """
@@ -118,15 +120,13 @@ class StableNewtonSteps:
             self._shorten(self._usual)
         else:
             self._most = _ASIDE * max(residual, _SLIGHT * self._enough)
-            if self._tried and stepper.substeps >= _SHORTER * self._usual:  # not even so: there is no end to that way
-                self._give_up()
-            near = near and (self._wait == 0 or residual < self._enough)
-            if not near:
-                stepper.substeps = self._usual
-            elif self._tried:
+            if self._tried and stuck and stepper.substeps < _SHORTER * self._usual:
                 self._shorten(_SHORTER * self._usual)
-            self._tried = near
-            stepper.use_exact_stiffness(near)
+            elif self._tried:  # what is about to buckle does so sooner in usual steps, or there is no end to that way
+                self._give_up()
+            elif (near or stuck) and (self._wait == 0 or residual < self._enough):
+                self._tried = True
+                stepper.use_exact_stiffness(True)
 
     def _stands(self, moved: float) -> bool:
         """Return whether that is no move, and long steps have not just shown that force is left all the same."""

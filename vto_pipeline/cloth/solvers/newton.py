@@ -5,6 +5,10 @@ Each step minimises ½ |y - x̃|²_M / h² + E(y) over the positions y, x̃ bein
 is enough while the objective falls as a parabola does; where cloth turns, or is thrown about, more are made. The
 stiffness is positive semidefinite (`cloth.stiffness`), the systems are solved by `linear_system`, and contacts are part
 of them. Near rest, where what is left out to keep it so is what cloth waits for, it may be exact.
+
+On the way to rest each step takes a share off what is left: a small one of folds, for which that stiffness is far too
+large, however long the step. So moves are carried on (Nesterov 1983): an iteration begins where the last one leads.
+What would take 1/λ steps then takes 1/√λ.
 """
 
 from __future__ import annotations
@@ -33,6 +37,7 @@ from vto_pipeline.cloth.collision.self_collision.self_contact import SelfContact
 from vto_pipeline.cloth.constraints.bending.hinge_moments import by_hinges
 from vto_pipeline.cloth.constraints.rigid import refuse_rigid
 from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM, add_damping_forces, add_forces, add_lacking, has_lacking
+from vto_pipeline.cloth.implicit_step.dissipation import dissipated
 from vto_pipeline.cloth.implicit_step.lacking import complete
 from vto_pipeline.cloth.implicit_step.linear_system import LinearSystem
 from vto_pipeline.cloth.implicit_step.momentum import free_components, keep_momentum
@@ -53,6 +58,9 @@ _ROUNDING = 1e-9  # relative change of the objective that is no change
 _CHANGED = 0.05  # of the contact forces: amiss by less, their set is good enough
 _FEW = 4.0  # contacts' mean force, amiss: with more, what lies on a fine mesh breaks loose in the next step
 _HARDLY = 0.4  # the same with the exact stiffness: a tight garment's contacts bear a hundred times its weight
+_CARRIED = 0.92  # of the last move: from there on, shares λ of 0.002 and more come to rest as fast as can be
+_CALM = 2  # solutions in a step that contacts were known in: what meets others at each step is not carried on
+_ON_THE_WAY = 5  # rounds, where only the end matters: what is still amiss is put right in the next step
 _IN_CIRCLES = 8  # rounds: with the exact stiffness, contacts that take more push and let go in turn
 _CROSSED = 0.01  # of an edge: how far a plane may be crossed without solving again
 
@@ -105,6 +113,7 @@ class Newton:
         definite: Whether all systems of the last step were and did, with the exact stiffness.
         active: The contacts of the last step, and the forces they bore.
         limits: Of a step; may be lowered where its time is short.
+        accelerated: Whether the end matters, not the way there: then moves are carried on, where calm; may be set.
     """
 
     def __init__(self, model: ClothModel, *, sweeps: int = 1, damping: float = 0.0, max_speed: float = np.inf) -> None:
@@ -115,7 +124,9 @@ class Newton:
         self._max_speed = max_speed
         self.self_contact: SelfContact | None = None
         self.limits = Limits()
-        self.exact = self.definite = False
+        self.exact = self.definite = self.accelerated = False
+        self._solved, self._calm = 0, 0.0  # solutions in this step; s: length of the last step, if it was calm
+        self._firm = False  # whether this step's contacts push only where cloth came through, and then firmly
         self._checked = False
         self._held = model.inverse_mass == 0.0
         self._lacks = has_lacking(model.constraints)
@@ -170,14 +181,19 @@ class Newton:
         target = x + move + (~held)[:, None] * (h * h * model.gravity)
         itself = self.self_contact
         pairs = no_pairs() if itself is None else itself.find_pairs(start, target, h, move)
-        lying = 0.0 if self.exact else LYING
+        carries = self.accelerated and h == self._calm and not led.any()
+        self._firm, self._calm, self._solved = self.exact or carries, 0.0, 0
+        lying = 0.0 if self._firm else LYING
         self.active = active_set(contacts, pairs, t0, t1, model.inverse_mass, start, move, self.active, lying)
         if led.any():  # what they pull at their neighbours by being led is no measure
             forces = model.mass[:, None] * model.gravity
             add_forces(start, model.constraints, forces)
             self._whole = self._unbalanced(forces)
         self._allowed = _BENT * h * self._inertia(x, target, h)
-        first = self._iterate(x, x, target, move, h, measured=bool(led.any()))
+        begin = x + _CARRIED * h * v if carries and not self.exact else x
+        first = self._iterate(x, begin, target, x + move - begin, h, begins=True, measured=bool(led.any()))
+        if first.share < 1.0 and begin is not x:
+            first = self._iterate(x, x, target, move, h, begins=True)
         if not led.any():  # else it is mostly what the led vertices have pulled at their neighbours
             self._allowed = max(self._allowed, _BENT * h * first.fall)
         if first.share == 1.0 or first.foreseen < _SLIGHT * self._allowed or self.exact:
@@ -189,6 +205,7 @@ class Newton:
         if self.exact and not self.definite:
             x[:], self.active = start, known
             return False
+        self._calm = h if self._solved <= _CALM else 0.0
         x[:] = done.y
         longest = self._max_speed * h
         resolve_plane_contacts(
@@ -241,6 +258,7 @@ class Newton:
         h: float,
         *,
         exactly: bool = False,
+        begins: bool = False,
         measured: bool = False,
     ) -> _Iteration:
         """Take a Newton iteration from y, of a step of time from x.
@@ -251,6 +269,7 @@ class Newton:
             guess: Of the move from y [m], shape (V, 3).
             h: Step [s].
             exactly: Whether its system is to be solved to rounding.
+            begins: Whether it is the first of its step.
             measured: Whether it is known what residuals are measured against.
         """
         model, system = self._model, self._system
@@ -263,7 +282,7 @@ class Newton:
             add_damping_forces(y, (y - x) / h, model.constraints, drag)
         forces += drag
         forces[self._held] = 0.0
-        if y is x:
+        if begins:
             if not measured:  # in the cloth's own frame: speed is no force
                 self._whole = self._unbalanced(forces - (model.mass / (h * h))[:, None] * guess)
             fallen = guess + (~self._held)[:, None] * (h * h * model.gravity)
@@ -274,14 +293,14 @@ class Newton:
         good = _CHANGED
         move, pushes, changed = guess.copy(), (0.0, 0.0, 0.0), 0.0
         _, rounds, extensions = self.limits
-        rounds = min(rounds, _IN_CIRCLES) if self.definite else rounds
+        rounds = min(rounds, _IN_CIRCLES if self.definite else _ON_THE_WAY if self.accelerated else rounds)
         while True:
             right = forces.copy()
             touches = len(self.active.key) > 0
             if touches:
                 matrix.blocks[matrix.diagonal] = bare
                 between = system.couple(*linked_contacts(self.active, self._held))
-                add_contacts(self.active, model.mass, self._held, h, x, y, matrix, right, between, self.definite)
+                add_contacts(self.active, model.mass, self._held, h, x, y, matrix, right, between, self._firm)
                 project_to_contacts(self.active, model.inverse_mass, x, y, move)
             if self.definite:
                 self.definite = system.eliminated(right, move)
@@ -292,6 +311,7 @@ class Newton:
             else:
                 system.solve(right, move, self._whole, _LEFT * h, exactly=exactly or touches)
             rounds -= 1
+            self._solved += 1
             self._keep_momentum(move, target - y)
             if touches:
                 pushes = tuple(contact_energy(self.active, x, y + share * move) for share in (0.0, 0.5, 1.0))
@@ -309,7 +329,7 @@ class Newton:
         foreseen = -system.parabola(right, move)
         if self._lacks:
             foreseen -= 0.5 * float(np.vdot(move, self._lacking(y, h, move)))
-        lost = self._dissipated(y, move, h, drag)
+        lost = dissipated(model.constraints, y, move, h, drag)
         parabola = tuple(push + loss for push, loss in zip(pushes, lost, strict=True))
         return self._shortened(y, target, move, h, energy, parabola, foreseen)
 
@@ -319,19 +339,6 @@ class Newton:
         add_lacking(y, move, self._model.constraints, h, found)
         found[self._held] = 0.0
         return found
-
-    def _dissipated(self, y: FloatArray, move: FloatArray, h: float, drag: FloatArray) -> tuple[float, float, float]:
-        """Return what dampers add to the objective after a share of 0, ½ and 1 of a move: a parabola [J].
-
-        Args:
-            y, move: [m], shape (V, 3).
-            h: Step [s].
-            drag: Their forces at y [N], shape (V, 3).
-        """
-        more = np.zeros_like(y)
-        add_damping_forces(y, move / h, self._model.constraints, more)
-        slope, bend = -float(np.vdot(drag, move)), -float(np.vdot(more, move))
-        return 0.0, 0.5 * slope + 0.125 * bend, slope + 0.5 * bend
 
     def _assembled(self, y: FloatArray, h: float) -> BlockMatrix:
         """Return the matrix of a step of h [s] at positions y [m], without contacts."""
