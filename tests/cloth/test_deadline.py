@@ -67,6 +67,7 @@ def test_a_look_that_is_cut_short_is_kept_and_tells_no_error(clock):
     assert found.trace[-1].error_mm == found.trace[-2].error_mm
     assert stepper.deadline == np.inf
     free = hanging()
+    free.accelerate(True)
     assert np.array_equal(free.run(at_rest(MESH.vertices), looks * 6 * free.step).positions, found.state.positions)
     assert len(relax_to_rest(hanging(), at_rest(MESH.vertices), limits).trace) > 4
 

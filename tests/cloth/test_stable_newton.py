@@ -104,8 +104,8 @@ def test_where_cloth_is_about_to_buckle_exact_steps_are_shorter_only_if_the_usua
     assert not stepper.exact  # the usual ones have a few looks' time first
 
 
-def test_what_is_left_is_told_roughly_after_two_looks_and_well_after_four():
-    for error, looks in ((4e-3, 2), (2e-3, 4)):
+def test_what_is_left_is_told_roughly_after_three_looks_and_well_after_four():
+    for error, looks in ((4e-3, 3), (2e-3, 4)):
         found = relax_to_rest(Straying(), at_rest(np.array([[1e-3, 0, 0]])), SettleLimits(error, 1.0, 4.0, 160))
         errors = np.array([row.error_mm for row in found.trace])
         assert np.flatnonzero(np.isfinite(errors))[0] == looks - 1

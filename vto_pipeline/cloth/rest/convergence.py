@@ -229,10 +229,10 @@ def _is_jammed(residuals: list[float]) -> bool:
 
 
 def _still_to_come(drifts: list[float], roughly: bool) -> float:
-    """Return the sum of the moves to come if they go on shrinking as the last four did, or roughly the last two [m]."""
+    """Return the sum of the moves to come if they go on shrinking as the last four did, or roughly the last three [m]."""
     if len(drifts) >= 4:
         last, before, looks = max(drifts[-2:]), max(drifts[-4:-2]), 2
-    elif roughly and len(drifts) >= 2:
+    elif roughly and len(drifts) == 3:
         last, before, looks = drifts[-1], drifts[-2], 1
     else:
         return np.inf
