@@ -229,7 +229,7 @@ def _is_jammed(residuals: list[float]) -> bool:
 
 
 def _still_to_come(drifts: list[float], roughly: bool) -> float:
-    """Return the sum of the moves to come if they go on shrinking as the last four did, or roughly the last three [m]."""
+    """Return the sum of the moves to come if these go on to shrink as the last four did, or roughly three [m]."""
     if len(drifts) >= 4:
         last, before, looks = max(drifts[-2:]), max(drifts[-4:-2]), 2
     elif roughly and len(drifts) == 3:
