@@ -183,6 +183,8 @@ class Phases:
         state = self.resolve_crossings(at_rest(growth.garment.vertices), thin)
         collider = self.collider(growth.body, growth.garment)
         stepper = self.stepper(without_gravity(self._model), collider, _CALM, config)
+        stepper.prepare(state.positions)
+        stepper.accelerate(True)
         grown = run_body_motion(
             stepper,
             state,
