@@ -165,3 +165,18 @@ def test_the_body_grows_closely_where_cloth_is_not_freed_of_it(monkeypatch, plac
     found = phases._grown_clear(None, body)
     assert asked == [False, True][: 1 + closely]
     assert (found.positions == mesh.vertices + 2.0 * closely).all()
+
+
+def test_a_body_grows_in_accelerated_steps(monkeypatch):
+    mesh, small, asked = moved(sheet(4, 4, 0.4, 0.4), 1.0, 0.0, 0.0), ball(0.05, levels=1), []
+    body = MovingBody(np.stack([small.vertices, 2.0 * small.vertices]), small.faces)
+
+    def moves_on(stepper, state, *given, only_grows):
+        asked.append((stepper._method.accelerated, only_grows))
+        return state
+
+    monkeypatch.setattr(module, "run_body_motion", moves_on)
+    rest = RestShape(mesh.vertices)
+    phases = Phases(build_cloth(mesh, rest, fabric()), rest, fabric(), DrapeConfig(), Job())
+    phases._grown(BodyGrowth(mesh, body, 0, 0, 0, [], None), DrapeConfig())
+    assert asked == [(True, True)]
