@@ -104,6 +104,33 @@ def test_where_cloth_is_about_to_buckle_exact_steps_are_shorter_only_if_the_usua
     assert not stepper.exact  # the usual ones have a few looks' time first
 
 
+class Restless(Steps):
+    """It goes to and fro by 50 µm (rms) from look to look, and no exact step is definite."""
+
+    usual = 0
+
+    def __init__(self, residual):
+        super().__init__()
+        self.left, self.short = residual, []
+
+    def run(self, state, seconds):
+        if self.exact:
+            self.short += [self.usual] * (self.substeps > 0.5)
+            return state
+        self.usual += 1
+        return ClothState(np.full((1, 3), 3e-5 * (self.usual % 2)), np.zeros((1, 3)), state.time + seconds)
+
+    def residual(self, state):
+        return self.left
+
+
+@pytest.mark.parametrize(("residual", "looks"), [(1.0, 10), (1e-3, 20)])
+def test_short_exact_steps_wait_until_the_usual_ones_have_long_led_hardly_anywhere(residual, looks):
+    stepper = Restless(residual)
+    relax_to_rest(stepper, at_rest(np.zeros((1, 3))), SettleLimits(1e-5, 0.01, 12.0, 160))
+    assert stepper.short[0] == looks
+
+
 def test_what_is_left_is_told_roughly_after_three_looks_and_well_after_four():
     for error, looks in ((4e-3, 3), (2e-3, 4)):
         found = relax_to_rest(Straying(), at_rest(np.array([[1e-3, 0, 0]])), SettleLimits(error, 1.0, 4.0, 160))

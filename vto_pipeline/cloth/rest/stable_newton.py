@@ -33,9 +33,9 @@ class StableNewtonSteps:
     Where the system is not positive definite in steps as long as usual, cloth is about to buckle, and in the usual
     ones, which are accelerated, it mostly does. Where these lead nowhere, the exact ones are shorter until it is. For
     the usual stiffness leaves out what makes cloth buckle: with it, a fold may even come to stand on its saddle. The
-    nearer a step is to the length from which on there is no definite system, the farther it
-    goes along the mode that buckles. So that length is bracketed: each try is the geometric mean of what did and did
-    not, and what did is kept meanwhile. A step that fails is not taken, and costs little.
+    nearer a step is to the length from which on there is no definite system, the farther it goes along the mode that
+    buckles. So that length is bracketed: each try is the geometric mean of what did and did not, and what did is kept
+    meanwhile. A step that fails is not taken, and costs little.
     Where it is not in the shortest ones either, as in cloth that buckles within an edge, time would stand still: so the
     usual stiffness goes on for a while. So it does where short steps snap cloth into a place that it is torn out of.
 
