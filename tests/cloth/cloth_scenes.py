@@ -3,6 +3,9 @@
 import numpy as np
 import trimesh
 
+from vto_pipeline.cloth.collision.contacts import ContactSpan, gather_contacts
+from vto_pipeline.cloth.collision.shapes.colliders import Plane
+from vto_pipeline.cloth.model.build import ClothState, model_of
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -57,3 +60,11 @@ def box(size, center=(0.0, 0.0, 0.0)):
 def moved(mesh, x, y, z):
     """The same mesh elsewhere."""
     return TriangleMesh(mesh.vertices + np.array([x, y, z]), mesh.faces)
+
+
+def bead_on_floor(height, velocity):
+    """A bead over a floor with friction, and their contact: model, state and contacts."""
+    floor = Plane((0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.3)
+    state = ClothState(np.array([[0.0, height, 0.0]]), np.array([velocity]))
+    contacts = gather_contacts([floor], state.positions, ContactSpan(0.0, 0.1, 0.1, np.full(1, 1e-3), 0.5))
+    return model_of((), np.full(1, 0.01)), state, contacts

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from cloth_scenes import fabric, sheet
+from cloth_scenes import bead_on_floor, fabric, sheet
 from numpy.testing import assert_allclose, assert_array_equal
 
 from vto_pipeline.cloth.collision.contacts import ContactSpan, empty_contacts, gather_contacts
@@ -97,18 +97,9 @@ def test_the_last_move_is_carried_on_only_in_steps_of_one_length(monkeypatch):
     assert_array_equal(found[0], 0.0)
 
 
-def bead_on_floor():
-    """A bead that slides along a floor."""
-    model = model_of((), np.full(1, 0.01))
-    floor = Plane((0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.1)
-    state = ClothState(np.array([[0.0, 1e-3, 0.0]]), np.array([[1.0, 0.0, 0.0]]))
-    contacts = gather_contacts([floor], state.positions, ContactSpan(0.0, 2 * H, 0.1, np.full(1, 1e-3), 0.5))
-    return model, state, contacts
-
-
 @pytest.mark.parametrize("calm", [True, False])
 def test_what_meets_other_contacts_is_not_carried_on(monkeypatch, calm):
-    model, state, contacts = bead_on_floor()
+    model, state, contacts = bead_on_floor(1e-3, [1.0, 0.0, 0.0])
     method, asked = Newton(model), []
     method.accelerated = True
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from cloth_scenes import fabric, sheet
+from cloth_scenes import bead_on_floor, fabric, sheet
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize, root
@@ -67,19 +67,10 @@ def test_a_step_with_the_exact_stiffness_is_taken_where_its_system_is_positive_d
             assert method.active is known
 
 
-def bead_on_floor():
-    """A bead that presses on a floor."""
-    model = model_of((), np.full(1, 0.01))
-    floor = Plane((0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.3)
-    state = ClothState(np.array([[0.0, 2e-3, 0.0]]), np.array([[0.0, -0.1, 0.0]]))
-    contacts = gather_contacts([floor], state.positions, ContactSpan(0.0, FRAME, 0.02, np.full(1, 1e-3), 0.5))
-    return model, state, contacts
-
-
 @pytest.mark.parametrize("circles", [False, True])
 def test_a_step_with_the_exact_stiffness_is_taken_where_its_contacts_come_to_an_end(monkeypatch, circles):
     """A bead presses on a floor; where contacts would go on changing, it is left where it was, and that soon."""
-    model, state, contacts = bead_on_floor()
+    model, state, contacts = bead_on_floor(2e-3, [0.0, -0.1, 0.0])
     asked = []
 
     def changed(*args):
@@ -98,7 +89,7 @@ def test_a_step_with_the_exact_stiffness_is_taken_where_its_contacts_come_to_an_
 
 @pytest.mark.parametrize("exact", [False, True])
 def test_pairs_are_as_stiff_as_the_cloth_in_steps_with_the_exact_stiffness(monkeypatch, exact):
-    model, state, contacts = bead_on_floor()
+    model, state, contacts = bead_on_floor(2e-3, [0.0, -0.1, 0.0])
     firm = []
     monkeypatch.setattr(newton, "add_contacts", lambda *args: firm.append(args[-1]) or add_contacts(*args))
     method = Newton(model)
