@@ -131,6 +131,14 @@ def test_short_exact_steps_wait_until_the_usual_ones_have_long_led_hardly_anywhe
     assert stepper.short[0] == looks
 
 
+def test_what_goes_to_and_fro_is_waited_for_no_longer_than_a_vague_answer_takes():
+    looks = []
+    for error in (5e-3, 1e-3):
+        limits = SettleLimits(error, 1.0, 12.0, 160)
+        looks.append(len(relax_to_rest(Restless(2.0), at_rest(np.zeros((1, 3))), limits).trace))
+    assert looks[0] <= 6 < 12 <= looks[1]
+
+
 def test_what_is_left_is_told_roughly_after_three_looks_and_well_after_four():
     for error, looks in ((4e-3, 3), (2e-3, 4)):
         found = relax_to_rest(Straying(), at_rest(np.array([[1e-3, 0, 0]])), SettleLimits(error, 1.0, 4.0, 160))

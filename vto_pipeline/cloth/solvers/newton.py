@@ -60,7 +60,7 @@ _FEW = 4.0  # contacts' mean force, amiss: with more, what lies on a fine mesh b
 _HARDLY = 0.4  # the same with the exact stiffness: a tight garment's contacts bear a hundred times its weight
 _CARRIED = 0.92  # of the last move: from there on, shares λ of 0.002 and more come to rest as fast as can be
 _CALM = 2  # solutions in a step that contacts were known in: what meets others at each step is not carried on
-_ON_THE_WAY = 5  # rounds, where only the end matters: what is still amiss is put right in the next step
+_ON_THE_WAY = 2  # rounds, where only the end matters: what is still amiss is put right in the next step
 _IN_CIRCLES = 8  # rounds: with the exact stiffness, contacts that take more push and let go in turn
 _CROSSED = 0.01  # of an edge: how far a plane may be crossed without solving again
 
@@ -290,8 +290,7 @@ class Newton:
         elif self._sweeps > 1:  # who asks for more wants to get to the end
             self._whole = forces
         bare = matrix.blocks[matrix.diagonal]
-        good = _CHANGED
-        move, pushes, changed = guess.copy(), (0.0, 0.0, 0.0), 0.0
+        move, pushes, changed, good = guess.copy(), (0.0, 0.0, 0.0), 0.0, _CHANGED
         _, rounds, extensions = self.limits
         rounds = min(rounds, _IN_CIRCLES if self.definite else _ON_THE_WAY if self.accelerated else rounds)
         while True:
@@ -323,6 +322,8 @@ class Newton:
                 break
             extensions -= 1
             rounds = max(rounds, 1)
+        if changed >= good:
+            self._solved += _CALM  # no calm step: contacts are still not known
         if self.definite and changed >= good:
             self.definite = False
             return _Iteration(y, 0.0, 0.0, 0.0, np.inf)
