@@ -60,7 +60,7 @@ _FEW = 4.0  # contacts' mean force, amiss: with more, what lies on a fine mesh b
 _HARDLY = 0.4  # the same with the exact stiffness: a tight garment's contacts bear a hundred times its weight
 _CARRIED = 0.92  # of the last move: from there on, shares λ of 0.002 and more come to rest as fast as can be
 _CALM = 2  # solutions in a step that contacts were known in: what meets others at each step is not carried on
-_ON_THE_WAY = 2  # rounds, where only the end matters: what is still amiss is put right in the next step
+_ON_THE_WAY, _NEARLY = 5, 0.25  # rounds, and amiss, where only the end matters: the next step puts that right
 _IN_CIRCLES = 8  # rounds: with the exact stiffness, contacts that take more push and let go in turn
 _CROSSED = 0.01  # of an edge: how far a plane may be crossed without solving again
 
@@ -207,10 +207,8 @@ class Newton:
             return False
         self._calm = h if self._solved <= _CALM else 0.0
         x[:] = done.y
-        longest = self._max_speed * h
-        resolve_plane_contacts(
-            x, v, start, model.inverse_mass, contacts, t0, t1, h, longest, True, len(x) >= PARALLEL_FROM
-        )
+        longest, many = self._max_speed * h, len(x) >= PARALLEL_FROM
+        resolve_plane_contacts(x, v, start, model.inverse_mass, contacts, t0, t1, h, longest, True, many)
         if itself is not None:
             x[:], _ = itself.collision_free(start, x, displacement_by_planes(self.active, start))
             v[:] = (x - start) / h
@@ -292,7 +290,8 @@ class Newton:
         bare = matrix.blocks[matrix.diagonal]
         move, pushes, changed, good = guess.copy(), (0.0, 0.0, 0.0), 0.0, _CHANGED
         _, rounds, extensions = self.limits
-        rounds = min(rounds, _IN_CIRCLES if self.definite else _ON_THE_WAY if self.accelerated else rounds)
+        on_the_way, few = self.accelerated and not self.definite, _HARDLY if self.definite else _FEW
+        rounds = min(rounds, _IN_CIRCLES if self.definite else _ON_THE_WAY if on_the_way else rounds)
         while True:
             right = forces.copy()
             touches = len(self.active.key) > 0
@@ -315,7 +314,7 @@ class Newton:
             if touches:
                 pushes = tuple(contact_energy(self.active, x, y + share * move) for share in (0.0, 0.5, 1.0))
                 changed = update_active_set(self.active, x, y + move, _CROSSED * model.edge_length)
-                good = min(_CHANGED, (_HARDLY if self.definite else _FEW) / max(self.pushing_contacts, 1))
+                good = _NEARLY if on_the_way else min(_CHANGED, few / max(self.pushing_contacts, 1))
             if changed >= good and rounds > 0:
                 continue
             if changed >= good or extensions == 0 or not self._add_contacts_on_path(x, y + move):
