@@ -49,6 +49,15 @@ def test_rooms_within_shells_that_pass_through_each_other_are_told_apart():
     assert (found == (winding(mesh, low, found.shape) > 0.5)).all()
 
 
+@pytest.mark.parametrize("turn", [1, -1])
+def test_a_ray_through_an_edge_meets_one_of_its_triangles(turn):
+    """The diagonals of a box of whole cubes lie above their centres."""
+    box = trimesh.creation.box((8 * CUBE, 8 * CUBE, 5 * CUBE))
+    mesh = TriangleMesh(box.vertices + np.array([4, 4, 2.5]) * CUBE, box.faces[:, ::turn].astype(np.int32))
+    found = solid_cubes(mesh, np.zeros(3), CUBE)
+    assert found.sum() == found[:8, :8, :5].sum() == 8 * 8 * 5
+
+
 def test_what_is_open_is_solid_where_it_winds_around_more_than_half():
     ball = as_mesh(trimesh.creation.icosphere(4, 0.31))
     below = (ball.vertices[ball.faces, 1] < 0.1).all(axis=1)

@@ -1,7 +1,7 @@
 """A mesh as a solid of cubes: those whose centre it winds around.
 
-Off a closed surface the winding number is the same all about a point, and from cube to cube where none is cut. So it is
-computed for the cubes that the surface may cut, and for one of each region that these leave.
+How often a closed surface winds around a point is how often a ray from there leaves it, less how often it enters. So
+each triangle counts in the columns of cubes that it is above.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from vto_pipeline.geometry.topology import half_edges
 from vto_pipeline.model.arrays import FloatArray
@@ -19,29 +18,24 @@ from vto_pipeline.model.mesh import TriangleMesh
 def solid_cubes(mesh: TriangleMesh, low: FloatArray, cube: float) -> NDArray[np.bool_]:
     """Return which cubes have their centre inside a mesh, whichever way it is oriented, shape (X, Y, Z).
 
-    After Barill, Dickson, Schmidt, Levin & Jacobson 2018, "Fast winding numbers for soups and clouds".
+    Of one that is not closed, by Barill, Dickson, Schmidt, Levin & Jacobson 2018, "Fast winding numbers for soups and
+    clouds".
 
     Args:
         mesh: The surface [m]; of one that is not closed, what it winds around more than half.
         low: Where the cubes begin [m], shape (3,), not above the mesh.
         cube: Their sides [m].
     """
+    counts = np.ceil((mesh.vertices.max(axis=0) - low) / cube).astype(np.int64) + 1
+    if _is_closed(mesh):
+        left = np.zeros(counts, np.int32)
+        _count_above((mesh.vertices - low) / cube - 0.5, mesh.faces, left)
+        return np.cumsum(left[:, :, ::-1], axis=2)[:, :, ::-1] != 0
     import igl
 
-    counts = np.ceil((mesh.vertices.max(axis=0) - low) / cube).astype(np.int64) + 1
-    cut = np.zeros(counts, np.bool_)
-    if _is_closed(mesh):
-        _mark_boxes((mesh.vertices - low) / cube, mesh.faces, cut)
-    else:
-        cut[:] = True
-    regions, count = ndimage.label(~cut)  # 0: those cut
-    one_of = np.zeros(count + 1, np.int64)
-    one_of[regions.reshape(-1)] = np.arange(cut.size)
-    asked = np.union1d(np.flatnonzero(cut), one_of)
-    centres = low + cube * (np.column_stack(np.unravel_index(asked, counts)) + 0.5)
-    inside = np.zeros(cut.size, np.bool_)
-    inside[asked] = np.abs(igl.fast_winding_number(mesh.vertices, mesh.faces.astype(np.int64), centres)) > 0.5
-    return np.where(cut, inside.reshape(counts), inside[one_of][regions])
+    centres = low + cube * (np.stack(np.indices(counts), axis=-1).reshape(-1, 3) + 0.5)
+    around = igl.fast_winding_number(mesh.vertices, mesh.faces.astype(np.int64), centres)
+    return np.abs(around).reshape(counts) > 0.5
 
 
 def _is_closed(mesh: TriangleMesh) -> bool:
@@ -51,12 +45,41 @@ def _is_closed(mesh: TriangleMesh) -> bool:
     return np.array_equal(np.sort(start * size + end), np.sort(end * size + start))
 
 
-@njit(cache=True)
-def _mark_boxes(vertices, faces, cut):  # type: ignore[no-untyped-def]
-    """Mark the cubes that a triangle's box meets; vertices in sides of cubes, shape (V, 3)."""
+@njit(cache=True, error_model="numpy")
+def _count_above(vertices, faces, left):  # type: ignore[no-untyped-def]
+    """Count the triangles above each centre, in the highest one below: 1 those that a ray leaves through, -1 others.
+
+    Args:
+        vertices: In sides of cubes from the first centre, shape (V, 3).
+        faces: Shape (F, 3).
+        left: Changed in place, shape (X, Y, Z).
+    """
     for f in range(len(faces)):
-        a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]
-        x0, x1 = int(min(a[0], b[0], c[0])), int(max(a[0], b[0], c[0]))
-        y0, y1 = int(min(a[1], b[1], c[1])), int(max(a[1], b[1], c[1]))
-        z0, z1 = int(min(a[2], b[2], c[2])), int(max(a[2], b[2], c[2]))
-        cut[x0 : x1 + 1, y0 : y1 + 1, z0 : z1 + 1] = True
+        i, j, k = faces[f]
+        a, b, c = vertices[i], vertices[j], vertices[k]
+        x0, x1 = max(np.ceil(min(a[0], b[0], c[0])), 0.0), np.floor(max(a[0], b[0], c[0]))
+        y0, y1 = max(np.ceil(min(a[1], b[1], c[1])), 0.0), np.floor(max(a[1], b[1], c[1]))
+        for x in range(int(x0), int(x1) + 1):
+            for y in range(int(y0), int(y1) + 1):
+                of_c, side_c = _side(vertices, i, j, x, y)
+                of_a, side_a = _side(vertices, j, k, x, y)
+                of_b, side_b = _side(vertices, k, i, x, y)
+                area = of_a + of_b + of_c
+                if side_a == side_b == side_c and area != 0.0:
+                    z = min(np.ceil((of_a * a[2] + of_b * b[2] + of_c * c[2]) / area) - 1.0, left.shape[2] - 1.0)
+                    if z >= 0.0:
+                        left[x, y, int(z)] += side_a
+
+
+@njit(cache=True, error_model="numpy")
+def _side(vertices, i, j, x, y):
+    """Return twice the area of (x, y) with an edge seen from above, and the side of the edge that it is on, -1 or 1.
+
+    On the edge, the side is that of a place beside it, the same for both triangles: the ray meets one of them.
+    """
+    first, last = min(i, j), max(i, j)
+    along_x, along_y = vertices[last, 0] - vertices[first, 0], vertices[last, 1] - vertices[first, 1]
+    area = along_x * (y - vertices[first, 1]) - along_y * (x - vertices[first, 0])
+    beside = area if area != 0.0 else -along_y if along_y != 0.0 else along_x
+    turn = 1 if i == first else -1
+    return turn * area, turn if beside > 0.0 else -turn
