@@ -50,12 +50,12 @@ def test_rooms_within_shells_that_pass_through_each_other_are_told_apart():
 
 
 @pytest.mark.parametrize("turn", [1, -1])
-def test_a_ray_through_an_edge_meets_one_of_its_triangles(turn):
-    """The diagonals of a box of whole cubes lie above their centres."""
-    box = trimesh.creation.box((8 * CUBE, 8 * CUBE, 5 * CUBE))
-    mesh = TriangleMesh(box.vertices + np.array([4, 4, 2.5]) * CUBE, box.faces[:, ::turn].astype(np.int32))
+def test_a_ray_through_an_edge_or_a_corner_meets_one_triangle_there(turn):
+    """The diagonals of a box, and the middles of its sides, lie above centres of cubes."""
+    box = trimesh.creation.box((9 * CUBE, 9 * CUBE, 5 * CUBE)).subdivide()
+    mesh = TriangleMesh(box.vertices + np.array([4.5, 4.5, 2.5]) * CUBE, box.faces[:, ::turn].astype(np.int32))
     found = solid_cubes(mesh, np.zeros(3), CUBE)
-    assert found.sum() == found[:8, :8, :5].sum() == 8 * 8 * 5
+    assert found.sum() == found[:9, :9, :5].sum() == 9 * 9 * 5
 
 
 def test_what_is_open_is_solid_where_it_winds_around_more_than_half():

@@ -33,7 +33,7 @@ def solid_cubes(mesh: TriangleMesh, low: FloatArray, cube: float) -> NDArray[np.
         return np.cumsum(left[:, :, ::-1], axis=2)[:, :, ::-1] != 0
     import igl
 
-    centres = low + cube * (np.stack(np.indices(counts), axis=-1).reshape(-1, 3) + 0.5)
+    centres = low + cube * (np.indices(counts).reshape(3, -1).T + 0.5)
     around = igl.fast_winding_number(mesh.vertices, mesh.faces.astype(np.int64), centres)
     return np.abs(around).reshape(counts) > 0.5
 
@@ -72,7 +72,7 @@ def _count_above(vertices, faces, left):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _side(vertices, i, j, x, y):
+def _side(vertices, i, j, x, y):  # type: ignore[no-untyped-def]
     """Return twice the area of (x, y) with an edge seen from above, and the side of the edge that it is on, -1 or 1.
 
     On the edge, the side is that of a place beside it, the same for both triangles: the ray meets one of them.
