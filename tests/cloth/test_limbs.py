@@ -14,7 +14,7 @@ from vto_pipeline.cloth.placement.limbs.openings import pieces_with_limbs
 from vto_pipeline.cloth.placement.thinning import Thinning
 from vto_pipeline.errors import IntersectingError
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import boundary_loops
+from vto_pipeline.geometry.topology import boundary_loops, submesh
 from vto_pipeline.model.body import Measurements
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -68,6 +68,27 @@ def test_each_limb_has_its_opening_and_an_arm_in_a_panel_is_seen():
         assert middle["left arm"][0] > 0.3
         assert middle["right arm"][0] < -0.3
         assert {names[k] for k in piece.astray()} == expected
+
+
+def vest():
+    """The tunic without its sleeves, open in front."""
+    whole = tunic(0.7)
+    middle = whole.vertices[whole.faces].mean(axis=1)
+    in_front = (np.abs(middle[:, 0]) < 0.02) & (middle[:, 2] > 0.0)
+    return submesh(whole, (np.abs(middle[:, 0]) < 0.24) & ~in_front)[0]
+
+
+def test_the_head_goes_through_an_open_front_though_armholes_are_nearer_than_its_middle():
+    thinning = Thinning(figure(0.7))
+    (piece,) = pieces_with_limbs(vest(), thinning.limbs, thinning.after(0))
+    meant = dict(zip([limb.name for limb in thinning.limbs.limbs], piece.meant, strict=True))
+    assert meant["head"] == meant["left leg"] == meant["right leg"]
+    assert len({meant["left arm"], meant["right arm"], meant["head"]}) == 3
+
+
+@pytest.mark.parametrize(("lower", "misplaced"), [(0.0, 0), (0.1, 0), (0.3, 1), (0.5, 1)])
+def test_a_vest_is_not_worn_at_the_hips(lower, misplaced):
+    assert Thinning(figure(0.7)).limbs_out_of_place(moved(vest(), [0.0, -lower, 0.0])) == misplaced
 
 
 @pytest.mark.parametrize(("made_for", "worn_by"), [(0.0, 1.1), (0.9, 0.0)])

@@ -182,17 +182,19 @@ class Thinning:
         """Return how many limbs tell that a garment is not worn at this height.
 
         These are arms in the way of what hangs: they go through its cloth, or join the body below its upper opening.
-        And a head whose own opening is far from the neck.
+        And a head whose own opening is far from the neck, or all under it where arms have theirs: an open front is a
+        part of the opening for the head.
         """
         count = 0
         for piece in pieces_with_limbs(garment, self.limbs, self.after(LINES)):
-            above = self._hangs_from(piece)
+            above, alone = self._hangs_from(piece), piece.alone()
+            armed = any(self.limbs.limbs[number].name.endswith("arm") for number in alone)
             for number, limb in enumerate(self.limbs.limbs):
                 if above is not None and limb.name.endswith("arm"):
                     count += len(piece.pierced[number]) > 0 or self._over_nearest(piece, above, limb) > _UNDER_ARMS
-                elif limb.name == "head" and number in piece.alone():
+                elif limb.name == "head" and (number in alone or armed):
                     over = self._over(piece, piece.meant[number], limb)
-                    count += over.min() > _OVER or over.max() < -_UNDER
+                    count += over.max() < -_UNDER or (number in alone and over.min() > _OVER)
         return count
 
     def hangs(self, garment: TriangleMesh) -> bool:

@@ -24,6 +24,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 _MOST_OPENINGS = 7  # of a piece: more are slits and lace, and which limb is whose is anybody's guess
 _PASSES = 0.1  # m: round an opening that a hand gets through
 _BESIDE = 1e-9  # m: where a line meets a face is known to no better
+_SPOKES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the way from the middle of a lid to its rim
 _IDLE = 10.0  # m: as far as that may a limb be from an opening that had none
 
 
@@ -131,13 +132,19 @@ def _nearest_ways(mesh: TriangleMesh, openings: Sequence[IntArray], limbs: Seque
     ]
     if not wide or len(wide) > _MOST_OPENINGS or not limbs:
         return [-1] * len(limbs)
-    middles = np.array([loops[k].mean(axis=0) for k in wide])
+    lids = [_lid(loops[k]) for k in wide]
     outside = [limb.axis[limb.along <= limb.joins] for limb in limbs]
-    far = np.array([cdist(line, middles).min(axis=0) for line in outside])
+    far = np.array([[cdist(line, lid).min() for lid in lids] for line in outside])
     ways = np.array(list(product(range(len(wide)), repeat=len(limbs))), np.int64)
     idle = len(wide) - np.array([(ways == k).any(axis=1) for k in range(len(wide))]).sum(axis=0)
     best = ways[int(np.argmin(far[range(len(limbs)), ways].sum(axis=1) + _IDLE * idle))]
     return [wide[k] for k in best]
+
+
+def _lid(loop: FloatArray) -> FloatArray:
+    """Return points all over the fan that closes an opening [m], shape (N, 3)."""
+    middle = loop.mean(axis=0)
+    return np.vstack([middle + share * (loop - middle) for share in _SPOKES])
 
 
 def _crossings(line: FloatArray, mesh: TriangleMesh) -> tuple[FloatArray, IntArray]:
