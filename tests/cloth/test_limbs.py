@@ -88,7 +88,7 @@ def test_the_head_goes_through_an_open_front_though_armholes_are_nearer_than_its
 
 @pytest.mark.parametrize(("lower", "misplaced"), [(0.0, 0), (0.1, 0), (0.3, 1), (0.5, 1)])
 def test_a_vest_is_not_worn_at_the_hips(lower, misplaced):
-    assert Thinning(figure(0.7)).limbs_out_of_place(moved(vest(), [0.0, -lower, 0.0])) == misplaced
+    assert Thinning(figure(0.7)).limbs_out_of_place(moved(vest(), 0.0, -lower, 0.0)) == misplaced
 
 
 @pytest.mark.parametrize(("made_for", "worn_by"), [(0.0, 1.1), (0.9, 0.0)])
