@@ -139,6 +139,11 @@ def test_what_goes_to_and_fro_is_waited_for_no_longer_than_a_vague_answer_takes(
     assert looks[0] <= 6 < 12 <= looks[1]
 
 
+def test_who_asks_for_little_balance_but_a_near_answer_gets_it():
+    limits = SettleLimits(3e-3, 1.0, 12.0, 160)
+    assert len(relax_to_rest(Restless(2.0), at_rest(np.zeros((1, 3))), limits).trace) > 10
+
+
 def test_what_is_left_is_told_roughly_after_three_looks_and_well_after_four():
     for error, looks in ((4e-3, 3), (2e-3, 4)):
         found = relax_to_rest(Straying(), at_rest(np.array([[1e-3, 0, 0]])), SettleLimits(error, 1.0, 4.0, 160))

@@ -18,7 +18,7 @@ from vto_pipeline.model.cloth import TraceRow
 _QUIET = 3  # looks in a row under the bound: an oscillating cloth stands still for an instant at each turn
 _COARSE = 2.0  # times the bound: waiting longer for a coarse answer, itself in error by more, is waste
 _STILL, _LONG = 1e-4, 10  # m, looks in a row: what stays within that is waited for no longer, in balance or not
-_ROUGH, _HARDLY = 1.0, 0.2  # weights that may be left over; with so little of the bound to come, more may, too
+_ROUGH, _HARDLY = 1.0, 0.2  # weights, on the way; with so little of the bound to come, more may be left over
 _STANDS = 1e-6  # m a look: not even what is about to buckle gets anywhere
 _VAGUE = 3e-3  # m: what is not known to be stable may still buckle by as much, as dresses of `vto bench drape` do
 _FOLDS, _THERE = 16.0, 0.1  # times e, from rounding to this share of the bound, grows what leaves an unstable place
@@ -193,7 +193,7 @@ def relax_to_rest(
         still = still + 1 if to_come < _STILL else 0
         slow = slow + 1 if moved < _STILL else 0
         balanced = result.residual < limits.residual or not exact
-        hardly = limits.residual >= _ROUGH and to_come < _HARDLY * limits.error
+        hardly = limits.error > _VAGUE and limits.residual >= _ROUGH and to_come < _HARDLY * limits.error
         over = balanced or still >= _LONG or hardly
         stuck = slow >= (2 * _LONG if balanced else _LONG) or (balanced and moved <= _STANDS)
         quiet = quiet + 1 if to_come < bound and over and (stable or not stepper.was_positive_definite) else 0
