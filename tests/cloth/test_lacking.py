@@ -39,7 +39,7 @@ def test_what_is_lacking_is_made_up_for():
     inverse = np.linalg.inv(factored)
     x = times(inverse, right)
     first = x.copy()
-    assert complete(x, right, partial(times, inverse), partial(times, lacking))
+    assert complete(x, right, partial(times, inverse), partial(times, lacking)) is None
     wanted = times(np.linalg.inv(factored + lacking), right)
 
     def size(d):
@@ -56,7 +56,9 @@ def test_a_system_that_is_not_positive_is_found_out_though_its_factored_part_is(
     values, vectors = np.linalg.eigh(factored + lacking)
     assert values[0] < 0.0 < values[1]
     right = right + 10.0 * times(factored, vectors[:, 0].reshape(-1, 3))  # pulled the way it gives
-    assert not complete(times(inverse, right), right, partial(times, inverse), partial(times, lacking))
+    found = complete(times(inverse, right), right, partial(times, inverse), partial(times, lacking))
+    assert found.curvature < 0.0
+    assert_allclose(np.vdot(found.direction, times(factored + lacking, found.direction)), found.curvature, rtol=1e-6)
 
 
 def test_matrix_and_what_it_lacks_are_the_slope_of_the_forces():

@@ -34,6 +34,9 @@ class Steps:
     def use_exact_stiffness(self, on):
         self.exact = on
 
+    def rest_ahead(self, state, seconds):
+        return None
+
 
 class Straying(Steps):
     """One coordinate x [mm] with the force -x; steps as long as usual halve it, longer ones go far away.

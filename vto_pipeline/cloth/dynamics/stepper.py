@@ -28,6 +28,7 @@ from vto_pipeline.cloth.collision.self_collision.self_contact import SelfContact
 from vto_pipeline.cloth.collision.shapes.moving import Moving
 from vto_pipeline.cloth.dynamics.methods import FRAME, METHODS, Method, MethodChoice, choose_method
 from vto_pipeline.cloth.dynamics.residual import relative_residual
+from vto_pipeline.cloth.implicit_step.rest_ahead import RestAhead
 from vto_pipeline.cloth.integrators import INTEGRATORS
 from vto_pipeline.cloth.integrators.integrator import Integrator
 from vto_pipeline.cloth.model.build import ClothModel, ClothState
@@ -196,11 +197,15 @@ class Stepper:
 
     def residual(self, state: ClothState) -> float:
         """Return the residual force; see `residual.relative_residual`."""
+        return relative_residual(self._model, state.positions, self._touched(state, LYING))
+
+    def _touched(self, state: ClothState, lying: float) -> ActiveSet:
+        """Return the contacts where the cloth is; what is nearer than `lying` [m] pushes, beside what did."""
         x, still = state.positions, np.zeros_like(state.positions)
         pairs = no_pairs() if self.self_contact is None else self.self_contact.find_pairs(x, x, FRAME)
-        mass = self._model.inverse_mass
-        touched = active_set(self._contacts, pairs, 0.0, 1.0, mass, x, still, self.contact_memory, LYING)
-        return relative_residual(self._model, x, touched)
+        return active_set(
+            self._contacts, pairs, 0.0, 1.0, self._model.inverse_mass, x, still, self.contact_memory, lying
+        )
 
     @property
     def faces(self) -> NDArray[np.int32]:
@@ -264,6 +269,16 @@ class Stepper:
         if isinstance(self._method, Newton):
             self._method.exact = on
             self._method.limits = Limits(iterations=1) if on else Limits()
+
+    def rest_ahead(self, state: ClothState, seconds: float) -> RestAhead | None:
+        """Return where the cloth would come to rest within that time [s], were its contacts to stay.
+
+        Returns:
+            None where that is not known.
+        """
+        if not isinstance(self._method, Newton):
+            return None
+        return self._method.rest_ahead(state, self._touched(state, 0.0), seconds)
 
     def accelerate(self, on: bool) -> None:
         """Let the method carry moves on from now on, where only the end matters, or no longer; after `prepare`."""

@@ -7,12 +7,27 @@ times as long; what stands for it has the pattern of plain hinges and is never o
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from vto_pipeline.cloth.constraints.sweep import add_lacking
 from vto_pipeline.model.arrays import FloatArray
 
 _LEFT, _MOST = 0.03, 12  # of the solution, by energy, that may be left; iterations
+
+
+class Buckling(NamedTuple):
+    """A direction along which a system is not positive definite.
+
+    Args:
+        direction: Shape (V, 3).
+        curvature: Of the system along it, zero or less.
+    """
+
+    direction: FloatArray
+    curvature: float
 
 
 def complete(
@@ -20,8 +35,8 @@ def complete(
     right: FloatArray,
     substitute: Callable[[FloatArray], FloatArray],
     lacking: Callable[[FloatArray], FloatArray],
-) -> bool:
-    """Let x, the solution of P x = right, be that of (P + N) x = right, nearly; return whether P + N is found positive.
+) -> Buckling | None:
+    """Let x, the solution of P x = right, be that of (P + N) x = right, nearly.
 
     Products with P are not needed: P z = r for what the preconditioner makes of a residual r (Hestenes & Stiefel 1952).
 
@@ -30,10 +45,14 @@ def complete(
         right: Shape (V, 3).
         substitute: Returns P⁻¹ of a residual.
         lacking: Returns N times a move.
+
+    Returns:
+        Where P + N is found not to be positive definite; x is of no use then.
     """
     energy, residual = float(np.vdot(x, right)), -lacking(x)
-    if energy - float(np.vdot(x, residual)) <= 0.0 < energy:
-        return False
+    curvature = energy - float(np.vdot(x, residual))
+    if curvature <= 0.0 < energy:
+        return Buckling(x.copy(), curvature)
     along = substitute(residual)
     size, by_matrix = float(np.vdot(residual, along)), residual.copy()
     for _ in range(_MOST):
@@ -42,7 +61,7 @@ def complete(
         product = by_matrix + lacking(along)
         curvature = float(np.vdot(along, product))
         if curvature <= 0.0:
-            return False
+            return Buckling(along, curvature)
         step = size / curvature
         x += step * along
         residual -= step * product
@@ -50,4 +69,14 @@ def complete(
         before, size = size, float(np.vdot(residual, turned))
         along = turned + size / before * along
         by_matrix = residual + size / before * by_matrix
-    return True
+    return None
+
+
+def times_lacking(
+    constraints: tuple[Any, ...], held: NDArray[np.bool_], y: FloatArray, h: float, move: FloatArray
+) -> FloatArray:
+    """Return what the matrix at positions y of a step of h [s] lacks, times a move [N], shape (V, 3)."""
+    found = np.zeros_like(move)
+    add_lacking(y, move, constraints, h, found)
+    found[held] = 0.0
+    return found

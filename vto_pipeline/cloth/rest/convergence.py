@@ -10,6 +10,7 @@ import numpy as np
 
 from vto_pipeline.cloth.dynamics.stepper import Stepper
 from vto_pipeline.cloth.model.build import ClothState
+from vto_pipeline.cloth.rest.foresight import VAGUE, Foresight, rms
 from vto_pipeline.cloth.rest.stable_newton import LOOK, StableNewtonSteps
 from vto_pipeline.errors import FallenError
 from vto_pipeline.model.arrays import FloatArray
@@ -20,7 +21,6 @@ _COARSE = 2.0  # times the bound: waiting longer for a coarse answer, itself in 
 _STILL, _LONG = 1e-4, 10  # m, looks in a row: what stays within that is waited for no longer, in balance or not
 _ROUGH, _HARDLY = 1.0, 0.2  # weights, on the way; with so little of the bound to come, more may be left over
 _STANDS = 1e-6  # m a look: not even what is about to buckle gets anywhere
-_VAGUE = 3e-3  # m: what is not known to be stable may still buckle by as much, as dresses of `vto bench drape` do
 _FOLDS, _THERE = 16.0, 0.1  # times e, from rounding to this share of the bound, grows what leaves an unstable place
 _NEAR = 1e-3  # m a look: slow enough to ask whether it is
 _JAMMED = 100.0  # weights left over: cloth on its way to rest has forces of the order of its weight
@@ -140,6 +140,7 @@ def relax_to_rest(
     stepper.deadline = limits.deadline
     stepper.accelerate(True)
     exact, newton_steps = stepper.has_exact_rest, StableNewtonSteps(stepper, limits.residual)
+    foresight = Foresight(stepper) if stepper.can_use_exact_stiffness and limits.error < VAGUE else None
     looks, taken, share = 0, 0, 0.0
     while share < 1.0 and not stepper.out_of_time:
         before, known = result.state.positions, stepper.contact_memory
@@ -166,14 +167,18 @@ def relax_to_rest(
             newton_steps.indefinite_step = np.inf
         elif stepper.was_positive_definite:
             stood += span
+        balanced = result.residual < limits.residual or not exact
         if not brief:  # a shorter time tells nothing about rest
             moves.append(moved)
             drifts.append(0.5 * rms(after.positions - earlier) if len(moves) > 1 else moved)
             earlier = before
             whole = newton_steps.took_full_step and len(moves) > 1
             stable = whole or stood >= _FOLDS * newton_steps.indefinite_step
-            to_come = max(moves[-2:]) if whole else max(moved, _still_to_come(drifts, limits.error >= _VAGUE))
-            result.error = max(to_come, _VAGUE) if stepper.can_use_exact_stiffness and not stable else to_come
+            to_come = max(moves[-2:]) if whole else max(moved, _still_to_come(drifts, limits.error >= VAGUE))
+            result.error = max(to_come, VAGUE) if stepper.can_use_exact_stiffness and not stable else to_come
+            if foresight is not None and not stable:
+                result.error = foresight.error(after, to_come, ends=balanced and to_come <= limits.error)
+            proven = stable or foresight is None or (balanced and result.error <= limits.error)
             if not exact:
                 result.error += np.inf if coarse is None else rms(after.positions - coarse) / 3.0
         seconds = time.perf_counter() - began
@@ -192,16 +197,15 @@ def relax_to_rest(
         bound = _COARSE * limits.error if first else (1.0 if exact else 0.5) * limits.error
         still = still + 1 if to_come < _STILL else 0
         slow = slow + 1 if moved < _STILL else 0
-        balanced = result.residual < limits.residual or not exact
-        hardly = limits.error > _VAGUE and limits.residual >= _ROUGH and to_come < _HARDLY * limits.error
+        hardly = limits.error > VAGUE and limits.residual >= _ROUGH and to_come < _HARDLY * limits.error
         over = balanced or still >= _LONG or hardly
         stuck = slow >= (2 * _LONG if balanced else _LONG) or (balanced and moved <= _STANDS)
-        quiet = quiet + 1 if to_come < bound and over and (stable or not stepper.was_positive_definite) else 0
-        if stepper.can_use_exact_stiffness and limits.error < _VAGUE:
+        quiet = quiet + 1 if to_come < bound and over and (proven or not stepper.was_positive_definite) else 0
+        if stepper.can_use_exact_stiffness and limits.error < VAGUE:
             newton_steps.choose(over and moved < _NEAR, stuck, residual, moved)
         if quiet < (1 if exact and residual < limits.residual else _QUIET):  # at a turn of its way forces are large
             continue
-        if result.error <= limits.error:
+        if result.error <= limits.error and proven:
             result.settled = balanced
             break
         if exact:
@@ -215,11 +219,6 @@ def relax_to_rest(
     stepper.accelerate(False)
     stepper.deadline = np.inf
     return result
-
-
-def rms(moves: FloatArray) -> float:
-    """Return the root mean square length of these vectors, shape (V, 3)."""
-    return float(np.sqrt((moves**2).sum(axis=1).mean()))
 
 
 def _is_jammed(residuals: list[float]) -> bool:

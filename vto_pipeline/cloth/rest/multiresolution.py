@@ -23,7 +23,8 @@ from vto_pipeline.cloth.model.build import ClothModel, ClothState, at_rest, buil
 from vto_pipeline.cloth.model.coarsening import CoarseGarment, coarsen
 from vto_pipeline.cloth.placement.clear_body import edge_stretches
 from vto_pipeline.cloth.placement.collision_free_start import freed_of_body
-from vto_pipeline.cloth.rest.convergence import SettlingResult, rms
+from vto_pipeline.cloth.rest.convergence import SettlingResult
+from vto_pipeline.cloth.rest.foresight import rms
 from vto_pipeline.cloth.rest.phases import ENLARGED, ROUGH, Phases
 from vto_pipeline.cloth.rest.softened import softened
 from vto_pipeline.cloth.rest.true_distance import some_positions, with_true_distances

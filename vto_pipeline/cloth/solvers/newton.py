@@ -36,11 +36,12 @@ from vto_pipeline.cloth.collision.self_collision.pairs import no_pairs
 from vto_pipeline.cloth.collision.self_collision.self_contact import SelfContact
 from vto_pipeline.cloth.constraints.bending.hinge_moments import by_hinges
 from vto_pipeline.cloth.constraints.rigid import refuse_rigid
-from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM, add_damping_forces, add_forces, add_lacking, has_lacking
+from vto_pipeline.cloth.constraints.sweep import PARALLEL_FROM, add_damping_forces, add_forces, has_lacking
 from vto_pipeline.cloth.implicit_step.dissipation import dissipated
-from vto_pipeline.cloth.implicit_step.lacking import complete
+from vto_pipeline.cloth.implicit_step.lacking import complete, times_lacking
 from vto_pipeline.cloth.implicit_step.linear_system import LinearSystem
 from vto_pipeline.cloth.implicit_step.momentum import free_components, keep_momentum
+from vto_pipeline.cloth.implicit_step.rest_ahead import RestAhead, rest_ahead
 from vto_pipeline.cloth.implicit_step.stiffness import Stiffness
 from vto_pipeline.cloth.model.build import ClothModel, ClothState
 from vto_pipeline.cloth.model.internal_friction import copy_sliders, restore_sliders, slip, with_own_sliders
@@ -169,6 +170,11 @@ class Newton:
         """How many contacts pushed in the last step."""
         return int(self.active.pushing.sum())
 
+    def rest_ahead(self, state: ClothState, active: ActiveSet, h: float) -> RestAhead | None:
+        """Return where the cloth would come to rest within h [s], were these contacts to stay."""
+        restore_sliders(self._model, state.sliders)
+        return rest_ahead(self._model, self._stiffness, self._system, self._held, active, state.positions, h)
+
     def _step(self, x: FloatArray, v: FloatArray, contacts: Contacts, t0: float, t1: float, h: float) -> bool:
         """Take a step, in place; return whether it was taken, else all is as it was."""
         model, held = self._model, self._held
@@ -287,6 +293,7 @@ class Newton:
             guess = min(guess, fallen, key=lambda move: system.parabola(forces, move))
         elif self._sweeps > 1:  # who asks for more wants to get to the end
             self._whole = forces
+        lacking = partial(times_lacking, model.constraints, self._held, y, h)
         bare = matrix.blocks[matrix.diagonal]
         move, pushes, changed, good = guess.copy(), (0.0, 0.0, 0.0), 0.0, _CHANGED
         _, rounds, extensions = self.limits
@@ -303,7 +310,7 @@ class Newton:
             if self.definite:
                 self.definite = system.eliminated(right, move)
                 if self.definite and self._lacks:
-                    self.definite = complete(move, right, system.substitute, partial(self._lacking, y, h))
+                    self.definite = complete(move, right, system.substitute, lacking) is None
                 if not self.definite:
                     return _Iteration(y, 0.0, 0.0, 0.0, np.inf)
             else:
@@ -328,17 +335,10 @@ class Newton:
             return _Iteration(y, 0.0, 0.0, 0.0, np.inf)
         foreseen = -system.parabola(right, move)
         if self._lacks:
-            foreseen -= 0.5 * float(np.vdot(move, self._lacking(y, h, move)))
+            foreseen -= 0.5 * float(np.vdot(move, lacking(move)))
         lost = dissipated(model.constraints, y, move, h, drag)
         parabola = tuple(push + loss for push, loss in zip(pushes, lost, strict=True))
         return self._shortened(y, target, move, h, energy, parabola, foreseen)
-
-    def _lacking(self, y: FloatArray, h: float, move: FloatArray) -> FloatArray:
-        """Return what the matrix at positions y of a step of h [s] lacks, times a move [N], shape (V, 3)."""
-        found = np.zeros_like(move)
-        add_lacking(y, move, self._model.constraints, h, found)
-        found[self._held] = 0.0
-        return found
 
     def _assembled(self, y: FloatArray, h: float) -> BlockMatrix:
         """Return the matrix of a step of h [s] at positions y [m], without contacts."""
