@@ -111,10 +111,12 @@ def relax_to_rest(
     A method that can be accelerated is: only the end matters, not the way.
 
     Cloth that buckles slowly hardly moves for a long while, so being quiet does not prove much. A method that knows the
-    exact stiffness goes on in steps that grow as long as the system is positive definite (`cloth.rest.stable_newton`):
-    one of these goes all the way that was to come, and where it goes nowhere, the cloth is at rest, and stable. Where
-    contacts change within such a step there may be none. But shorter ones with the exact stiffness hold nothing back:
-    were the place unstable where a step of h was not definite, it would be left by a factor of e in each h.
+    exact stiffness is asked by it what is stable and how far it has to go (`cloth.rest.foresight`); where that is near
+    enough and forces are in balance, it is at rest. Else it goes on in steps that grow as long as the system is
+    positive definite (`cloth.rest.stable_newton`): one of these goes all the way that was to come, and where it goes
+    nowhere, the cloth is at rest, and stable. Where contacts change within such a step there may be none. But shorter
+    ones with the exact stiffness hold nothing back: were the place unstable where a step of h was not definite, it
+    would be left by a factor of e in each h.
 
     Args:
         stepper: The cloth among its colliders; its steps are changed, and as they were at the end if the rest does not
