@@ -1,8 +1,8 @@
 """How far rest is: one long Newton step with the exact stiffness, which is looked at and not taken.
 
 Where cloth is about to buckle there is no such step. But what buckles is mostly a few vertices of one wrinkle. So along
-each direction of negative curvature that the solution meets, the vertices that bear it are held back by springs, and
-the others are told how far they have to go (Levenberg 1944, where it is needed alone).
+each direction of negative curvature that the solution meets, springs hold back the vertices that bear it, as Levenberg
+1944 does everywhere. The solution then says how far all others have to go.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """How far cloth that hardly moves is from rest, by its exact stiffness: small moves alone tell little.
 
-Cloth about to buckle hardly moves for long, and then far. It is told by its stiffness, which is not positive definite
-there. Elsewhere a Newton step with the contacts of now tells how far rest is, but for what contacts will change.
+Cloth about to buckle hardly moves for long, and then far. Its stiffness is not positive definite there. Elsewhere a
+Newton step with the contacts of now says how far rest is, but for what contacts will change.
 """
 
 from __future__ import annotations
