@@ -64,6 +64,20 @@ def test_the_board_is_no_garment(scene, placed):
     assert not labels.garment[placed.vertices[:, 1] < -0.001].any()
 
 
+def test_a_floor_that_a_depth_camera_saw_is_no_garment(scene, placed):
+    """It has grown together with the stand, and the camera's noise is so large that hardly a triangle of it is level."""
+    vertices, floor = placed.vertices.copy(), placed.vertices[:, 1] < 0.001
+    vertices[floor, 1] += np.random.default_rng(0).normal(0.0, 0.003, floor.sum())
+    surface, job = TriangleMesh(vertices, placed.faces, placed.colors), Job()
+    upright = np.abs(face_normals(surface)[floor[placed.faces].all(axis=1), 1]) > 0.98
+    assert upright.mean() < 0.5
+    labels = label_garment(surface, scene.form, SubtractConfig(), job)
+    assert labels.garment[floor].mean() < 0.005  # single vertices in the tail of the noise
+    assert_allclose(job.metrics["floor_mm"], 0.0, rtol=0, atol=0.3)
+    right = (labels.garment == scene.is_shirt)[~scene.on_ledge & ~floor].mean()
+    assert right > 0.98
+
+
 def beside(scene, turned, noise):
     """A rough plate of 20 by 20 cm, 30 cm from the form and as high as its chest; lying, or turned upright."""
     x, z = np.meshgrid(np.arange(41) * 0.005, np.arange(41) * 0.005, indexing="ij")
