@@ -104,6 +104,8 @@ def align_to_mannequin(
             return scan.of_same_size(found)
     try:
         found = scan.by_outline(photos)
+    except _OtherSizeError:
+        raise
     except GarmentError as error:
         no_outline = error
     else:
@@ -170,7 +172,8 @@ class _Scan:
         """Place the scan by the mannequin's outline in its photos.
 
         Raises:
-            GarmentError: the outline does not settle the placement, or too much of the scan lies inside.
+            GarmentError: the outline does not settle the placement, fits better in another size, or too much of the
+                scan lies inside.
         """
         config, job = self.config, self.job
         job.progress(0.3, "the mannequin's outline in the photos")
@@ -183,6 +186,10 @@ class _Scan:
         edges = load_edges(photos.paths, photos.cameras, self.surface)
         found = place_by_outline(self.mannequin, self.points[self.few], edges, starts, self.free, config.outline, job)
         placement = found.mannequin_from_scan
+        if not self.free:
+            job.measure(size_on_mannequin=found.size)
+            if found.size_merit * config.rival_merit > 1.0:
+                _refuse_size(found.size, found.size_error)
         inside = inside_share(transform_mesh(self.surface, placement), self.mannequin, found.depth, job.seed)
         job.measure(placed_by="outline", inside_share=inside)
         _check_inside(inside, config)
@@ -208,14 +215,9 @@ class _Scan:
         )
         error = _uncertainty(sized, self.surface, self.config.samples)[1]
         self.job.measure(size_on_mannequin=sized.scale)
-        off = sized.scale - 1.0
-        told = sized.bare.mean() >= self.config.upright_bare and abs(off) > max(SIZE_OFF, SIZE_SIGMAS * error)
+        told = sized.bare.mean() >= self.config.upright_bare
         if told and _worth(here) < self.config.rival_merit * _worth(sized):
-            other = f"{abs(off):.1%} {'larger' if off > 0 else 'smaller'}"
-            raise GarmentError(
-                f"the scan lies on the mannequin only if it is made {other}",
-                hint="is it the mannequin that was scanned, and in its unit? was the board printed in its full size?",
-            )
+            _refuse_size(sized.scale, error)
         return placement
 
     def _starts(self, rotations: list[FloatArray]) -> list[FloatArray]:
@@ -283,6 +285,28 @@ def _accept(
             hint="leave more of the mannequin uncovered, on several sides",
         )
     return placed.mannequin_from_surface
+
+
+class _OtherSizeError(GarmentError):
+    """Scan and mannequin differ in size: no other way to place one on the other is right."""
+
+
+def _refuse_size(size: float, error: float) -> None:
+    """Refuse a scan in metres that fits the mannequin better in another size, if that is certain.
+
+    Args:
+        size: By what the scan is to be multiplied.
+        error: Standard error of it.
+
+    Raises:
+        _OtherSizeError: it is.
+    """
+    off = size - 1.0
+    if abs(off) > max(SIZE_OFF, SIZE_SIGMAS * error):
+        raise _OtherSizeError(
+            f"the scan lies on the mannequin only if it is made {abs(off):.1%} {'larger' if off > 0 else 'smaller'}",
+            hint="is it the mannequin that was scanned, and in its unit? was the board printed in its full size?",
+        )
 
 
 def _of_unplaced(cameras: CameraSet) -> str:
