@@ -79,7 +79,7 @@ def test_the_board_is_no_garment(scene, placed):
 
 
 def test_a_floor_that_a_depth_camera_saw_is_no_garment(scene, placed):
-    """It has grown together with the stand, and the camera's noise is so large that hardly a triangle of it is level."""
+    """It has grown together with the stand, and the camera's noise leaves hardly a triangle of it level."""
     vertices, floor = placed.vertices.copy(), placed.vertices[:, 1] < 0.001
     vertices[floor, 1] += np.random.default_rng(0).normal(0.0, 0.003, floor.sum())
     surface, job = TriangleMesh(vertices, placed.faces, placed.colors), Job()

@@ -102,15 +102,11 @@ def align_to_mannequin(
             reason = error.problem
         else:
             return scan.of_same_size(found)
-    try:
-        found = scan.by_outline(photos)
-    except _OtherSizeError:
-        raise
-    except GarmentError as error:
-        no_outline = error
-    else:
+    outlined = scan.by_outline(photos)
+    if not isinstance(outlined, GarmentError):
         job.note(f"the mannequin is placed by its outline in the photos: {reason}")
-        return found
+        return outlined
+    no_outline = outlined
     if scan.free:
         hint = f"{_of_unplaced(photos.cameras)}{no_outline.hint}; or {GIVE_A_SCALE}"
         raise GarmentError(no_outline.problem, hint=hint) from no_outline
@@ -168,12 +164,11 @@ class _Scan:
             placed = max((placed, self._best_of(tilts)), key=_worth)
         return _accept(placed, self.surface, least, config, job)
 
-    def by_outline(self, photos: PosedPhotos) -> FloatArray:
-        """Place the scan by the mannequin's outline in its photos.
+    def by_outline(self, photos: PosedPhotos) -> FloatArray | GarmentError:
+        """Place the scan by the mannequin's outline in its photos; where it does not settle the placement, return why.
 
         Raises:
-            GarmentError: the outline does not settle the placement, fits better in another size, or too much of the
-                scan lies inside.
+            GarmentError: the outline fits better in another size: no other placement is right then.
         """
         config, job = self.config, self.job
         job.progress(0.3, "the mannequin's outline in the photos")
@@ -182,9 +177,13 @@ class _Scan:
         else:
             starts = self._starts(upright_rotations(config.yaw_starts))
         if not starts:
-            raise GarmentError("the scan fits the mannequin in no size", hint="is it the right mannequin?")
+            return GarmentError("the scan fits the mannequin in no size", hint="is it the right mannequin?")
         edges = load_edges(photos.paths, photos.cameras, self.surface)
-        found = place_by_outline(self.mannequin, self.points[self.few], edges, starts, self.free, config.outline, job)
+        some = self.points[self.few]
+        try:
+            found = place_by_outline(self.mannequin, some, edges, starts, self.free, config.outline, job)
+        except GarmentError as error:
+            return error
         placement = found.mannequin_from_scan
         if not self.free:
             job.measure(size_on_mannequin=found.size)
@@ -192,7 +191,10 @@ class _Scan:
                 _refuse_size(found.size, found.size_error)
         inside = inside_share(transform_mesh(self.surface, placement), self.mannequin, found.depth, job.seed)
         job.measure(placed_by="outline", inside_share=inside)
-        _check_inside(inside, config)
+        try:
+            _check_inside(inside, config)
+        except GarmentError as error:
+            return error
         if self.free:
             _tell_scale(scale_of(placement), found.scale_error, job)
         return placement
@@ -287,10 +289,6 @@ def _accept(
     return placed.mannequin_from_surface
 
 
-class _OtherSizeError(GarmentError):
-    """Scan and mannequin differ in size: no other way to place one on the other is right."""
-
-
 def _refuse_size(size: float, error: float) -> None:
     """Refuse a scan in metres that fits the mannequin better in another size, if that is certain.
 
@@ -299,11 +297,11 @@ def _refuse_size(size: float, error: float) -> None:
         error: Standard error of it.
 
     Raises:
-        _OtherSizeError: it is.
+        GarmentError: it is.
     """
     off = size - 1.0
     if abs(off) > max(SIZE_OFF, SIZE_SIGMAS * error):
-        raise _OtherSizeError(
+        raise GarmentError(
             f"the scan lies on the mannequin only if it is made {abs(off):.1%} {'larger' if off > 0 else 'smaller'}",
             hint="is it the mannequin that was scanned, and in its unit? was the board printed in its full size?",
         )

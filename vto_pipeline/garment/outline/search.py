@@ -131,9 +131,9 @@ def place_by_outline(
     return found if free_scale else _sized(found, every, photos, mesh)
 
 
-def _sized(found: OutlinePlacement, every: OutlineProblem, photos: Sequence[EdgePhoto], mesh: ContourMesh) -> (
-    OutlinePlacement
-):
+def _sized(
+    found: OutlinePlacement, every: OutlineProblem, photos: Sequence[EdgePhoto], mesh: ContourMesh
+) -> OutlinePlacement:
     """Return a rigid placement with the size in which the outline would fit best."""
     placement, free = found.fit.scan_from_form, tuple(range(7))
     pixel = _pixel(placement, photos, mesh)

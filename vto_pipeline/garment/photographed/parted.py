@@ -108,7 +108,8 @@ def _refuse(
     tree = cKDTree(parted.cloth)
     opening = min(openings, key=lambda one: float(np.median(tree.query(garment.vertices[one.loop])[0])))
     over = parted.cloth[int(tree.query(parted.cloth.mean(axis=0))[1])]
-    problem = f"the opening of {opening.perimeter * 1e3:.0f} mm at {_place(opening.center)} {why}, as over {_place(over)}"
+    what = f"the opening of {opening.perimeter * 1e3:.0f} mm at {_place(opening.center)}"
+    problem = f"{what} {why}, as over {_place(over)}"
     if answered:
         job.warn(problem)
         return
@@ -139,8 +140,8 @@ def unseen_openings(
 ) -> list[Parted]:
     """Return where unseen places divide what the garment leaves bare of the mannequin, as `parted_openings` does.
 
-    Only parts that come near a rim leave through an opening of their own. The foot of a stand does not, though nobody
-    sees the underside of the form between it and the hem.
+    Only parts that come near a rim leave through an opening of their own. The foot of a stand does not, though the
+    underside of the form between it and the hem is hidden.
 
     Args:
         garment, mannequin, bare, sightings: As in `refuse_unseen`.
