@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from dressed_form import HIGH, LOW, form_distance, largest, level_set, outward
+from dressed_form import HIGH, LOW, capsule, form_distance, largest, level_set, outward, smooth_min
 from test_parted import CELL, STRAPS, form
 
 from vto_pipeline.errors import GarmentError
@@ -97,3 +97,30 @@ def test_the_unseen_underside_of_a_form_parts_nothing(dressed):
     stand = body.vertices[:, 1] < 0.07
     assert stand.any()
     assert unseen_openings(long, body, seen_bare(body, ~hidden), None, 0) == []
+
+
+CROTCH, HEM = 0.40, 0.50
+
+
+def on_legs(points):
+    """Distance of a trunk on two legs that part at `CROTCH`."""
+    trunk = capsule(points, (0, 0.52, 0), (0, 0.80, 0), 0.10)
+    legs = [capsule(points, (side * 0.11, 0.10, 0), (side * 0.07, 0.52, 0), 0.055) for side in (-1, 1)]
+    return smooth_min(trunk, np.minimum(*legs), 0.01)
+
+
+def test_a_hem_that_hides_the_crotch_from_above_is_a_warning():
+    """The legs are seen bare up to the hem outside, and nothing of what joins them: shorts are unlikely."""
+    low, high = (-0.2, 0.0, -0.16), (0.2, 0.95, 0.16)
+    body = outward(*level_set(on_legs, low, high, CELL))
+    cloth = outward(*level_set(lambda p: on_legs(p) - 0.008, low, high, CELL))
+    y = cloth.vertices[cloth.faces].mean(axis=1)[:, 1]
+    tunic = largest(submesh(cloth, (y > HEM) & (y < 0.85))[0])
+    x, y, _ = body.vertices.T
+    bare = seen_bare(body, (y < CROTCH - 0.03) | ((np.abs(x) > 0.095) & (y < HEM - 0.02)) | (y > 0.85))
+    assert unseen_openings(tunic, body, bare, None, 0) == []
+    assert len(list_openings(tunic)) == 2
+    job = Job()
+    refuse_unseen(tunic, list_openings(tunic), body, bare, None, False, job)
+    assert len(job.warnings) == 1
+    assert "may be 2 or more" in job.warnings[0]

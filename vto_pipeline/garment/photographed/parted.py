@@ -31,6 +31,8 @@ LEAST_CLOTH = 0.001
 """Less cloth is within the error of a rim: a strap of 2 cm by 5 [m²]."""
 AT_RIM = 0.05
 """Cloth that stands off from the mannequin ends within this of what was lost [m]."""
+STRAP = 0.08
+"""A strap that was not seen leaves no place of the mannequin farther than this from its ends [m]."""
 BRIDGING = 0.7
 """Lost cloth hangs on the garment at its ends: these are so far apart, as a share of its own size. A shadow on an arm
 begins at the cuff and runs away from it."""
@@ -81,8 +83,8 @@ def refuse_unseen(
 ) -> None:
     """Refuse a garment of which an opening may be several: what would part it was seen neither bare nor clothed.
 
-    So it is where a camera looked over no shoulder: neck and armholes are then one opening, whether cloth lies there or
-    not.
+    So it is where a camera looked over no shoulder: neck and armholes are then one opening, whether a strap lies there
+    or not. Farther from the rims, as between the legs under a hem, cloth is less likely: that is a warning.
 
     Args:
         garment: The finished garment.
@@ -96,9 +98,14 @@ def refuse_unseen(
     Raises:
         GarmentError: too little was seen to tell.
     """
-    for parted in unseen_openings(garment, mannequin, bare, sightings, job.seed):
-        lacks = f"{parted.area * 1e4:.0f} cm² of the mannequin there were seen neither bare nor clothed"
-        _refuse(parted, f"may be {parted.parts} or more: {lacks}", garment, openings, answered, job)
+    for reach in (STRAP, np.inf):
+        found = unseen_openings(garment, mannequin, bare, sightings, job.seed, reach)
+        for parted in found:
+            lacks = f"{parted.area * 1e4:.0f} cm² of the mannequin there were seen neither bare nor clothed"
+            warns = answered or reach > STRAP
+            _refuse(parted, f"may be {parted.parts} or more: {lacks}", garment, openings, warns, job)
+        if found:
+            return
 
 
 def _refuse(
@@ -136,7 +143,12 @@ def parted_openings(sightings: Sightings, cloth_points: FloatArray) -> list[Part
 
 
 def unseen_openings(
-    garment: TriangleMesh, mannequin: TriangleMesh, bare: BareParts, sightings: Sightings | None, seed: int
+    garment: TriangleMesh,
+    mannequin: TriangleMesh,
+    bare: BareParts,
+    sightings: Sightings | None,
+    seed: int,
+    reach: float = STRAP,
 ) -> list[Parted]:
     """Return where unseen places divide what the garment leaves bare of the mannequin, as `parted_openings` does.
 
@@ -146,6 +158,7 @@ def unseen_openings(
     Args:
         garment, mannequin, bare, sightings: As in `refuse_unseen`.
         seed: Of the points of the mannequin that are asked for.
+        reach: Places farther than this from the garment are taken for bare [m].
     """
     area = surface_area(mannequin)
     count = max(int(area / SPACING**2), 1)
@@ -155,6 +168,7 @@ def unseen_openings(
     if sightings is not None and not sightings.cloth.all():
         shown_bare = cKDTree(sightings.points[~sightings.cloth])
         shown |= np.isfinite(shown_bare.query(points, distance_upper_bound=BESIDE * SPACING)[0])
+    shown |= cKDTree(garment.vertices).query(points)[0] > reach
     what = Sightings(points, ~shown, area / count)
     rim = garment.vertices[np.concatenate(boundary_loops(garment))]
     near = np.isfinite(cKDTree(rim).query(points, distance_upper_bound=AT_RIM)[0])
