@@ -59,9 +59,37 @@ def test_colour_saves_cloth_that_lies_on_the_form(scene, placed):
     assert blind < 0.4
 
 
+@pytest.mark.parametrize("thick", [0.0015, 0.0025])
+def test_bare_arms_that_were_scanned_too_thick_are_the_forms_by_their_colour(scene, placed, thick):
+    """They lie as far from the form as tight cloth, many times its noise; the shirt's sleeves are where they were."""
+    vertices = placed.vertices.copy()
+    arms = ~scene.is_shirt & ~scene.on_ledge & (np.abs(vertices[:, 0]) > 0.2) & (vertices[:, 1] > 0.3)
+    assert arms.sum() > 500
+    on = SurfaceDistance(scene.form).nearest(vertices[arms])
+    vertices[arms] += thick * face_normals(scene.form)[on.face]
+    labels = label_garment(TriangleMesh(vertices, placed.faces, placed.colors), scene.form, SubtractConfig(), Job())
+    assert labels.garment[arms].mean() < 0.03  # those at the cuffs
+    right = (labels.garment == scene.is_shirt)[~scene.on_ledge & ~arms].mean()
+    assert right > 0.985
+
+
 def test_the_board_is_no_garment(scene, placed):
     labels = label_garment(placed, scene.form, SubtractConfig(), Job())
     assert not labels.garment[placed.vertices[:, 1] < -0.001].any()
+
+
+def test_a_floor_that_a_depth_camera_saw_is_no_garment(scene, placed):
+    """It has grown together with the stand, and the camera's noise leaves hardly a triangle of it level."""
+    vertices, floor = placed.vertices.copy(), placed.vertices[:, 1] < 0.001
+    vertices[floor, 1] += np.random.default_rng(0).normal(0.0, 0.003, floor.sum())
+    surface, job = TriangleMesh(vertices, placed.faces, placed.colors), Job()
+    upright = np.abs(face_normals(surface)[floor[placed.faces].all(axis=1), 1]) > 0.98
+    assert upright.mean() < 0.5
+    labels = label_garment(surface, scene.form, SubtractConfig(), job)
+    assert labels.garment[floor].mean() < 0.005  # single vertices in the tail of the noise
+    assert_allclose(job.metrics["floor_mm"], 0.0, rtol=0, atol=0.3)
+    right = (labels.garment == scene.is_shirt)[~scene.on_ledge & ~floor].mean()
+    assert right > 0.98
 
 
 def beside(scene, turned, noise):

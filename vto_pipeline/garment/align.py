@@ -102,13 +102,11 @@ def align_to_mannequin(
             reason = error.problem
         else:
             return scan.of_same_size(found)
-    try:
-        found = scan.by_outline(photos)
-    except GarmentError as error:
-        no_outline = error
-    else:
+    outlined = scan.by_outline(photos)
+    if not isinstance(outlined, GarmentError):
         job.note(f"the mannequin is placed by its outline in the photos: {reason}")
-        return found
+        return outlined
+    no_outline = outlined
     if scan.free:
         hint = f"{_of_unplaced(photos.cameras)}{no_outline.hint}; or {GIVE_A_SCALE}"
         raise GarmentError(no_outline.problem, hint=hint) from no_outline
@@ -166,11 +164,11 @@ class _Scan:
             placed = max((placed, self._best_of(tilts)), key=_worth)
         return _accept(placed, self.surface, least, config, job)
 
-    def by_outline(self, photos: PosedPhotos) -> FloatArray:
-        """Place the scan by the mannequin's outline in its photos.
+    def by_outline(self, photos: PosedPhotos) -> FloatArray | GarmentError:
+        """Place the scan by the mannequin's outline in its photos; where it does not settle the placement, return why.
 
         Raises:
-            GarmentError: the outline does not settle the placement, or too much of the scan lies inside.
+            GarmentError: the outline fits better in another size: no other placement is right then.
         """
         config, job = self.config, self.job
         job.progress(0.3, "the mannequin's outline in the photos")
@@ -179,13 +177,24 @@ class _Scan:
         else:
             starts = self._starts(upright_rotations(config.yaw_starts))
         if not starts:
-            raise GarmentError("the scan fits the mannequin in no size", hint="is it the right mannequin?")
+            return GarmentError("the scan fits the mannequin in no size", hint="is it the right mannequin?")
         edges = load_edges(photos.paths, photos.cameras, self.surface)
-        found = place_by_outline(self.mannequin, self.points[self.few], edges, starts, self.free, config.outline, job)
+        some = self.points[self.few]
+        try:
+            found = place_by_outline(self.mannequin, some, edges, starts, self.free, config.outline, job)
+        except GarmentError as error:
+            return error
         placement = found.mannequin_from_scan
+        if not self.free:
+            job.measure(size_on_mannequin=found.size)
+            if found.size_merit * config.rival_merit > 1.0:
+                _refuse_size(found.size, found.size_error)
         inside = inside_share(transform_mesh(self.surface, placement), self.mannequin, found.depth, job.seed)
         job.measure(placed_by="outline", inside_share=inside)
-        _check_inside(inside, config)
+        try:
+            _check_inside(inside, config)
+        except GarmentError as error:
+            return error
         if self.free:
             _tell_scale(scale_of(placement), found.scale_error, job)
         return placement
@@ -208,14 +217,9 @@ class _Scan:
         )
         error = _uncertainty(sized, self.surface, self.config.samples)[1]
         self.job.measure(size_on_mannequin=sized.scale)
-        off = sized.scale - 1.0
-        told = sized.bare.mean() >= self.config.upright_bare and abs(off) > max(SIZE_OFF, SIZE_SIGMAS * error)
+        told = sized.bare.mean() >= self.config.upright_bare
         if told and _worth(here) < self.config.rival_merit * _worth(sized):
-            other = f"{abs(off):.1%} {'larger' if off > 0 else 'smaller'}"
-            raise GarmentError(
-                f"the scan lies on the mannequin only if it is made {other}",
-                hint="is it the mannequin that was scanned, and in its unit? was the board printed in its full size?",
-            )
+            _refuse_size(sized.scale, error)
         return placement
 
     def _starts(self, rotations: list[FloatArray]) -> list[FloatArray]:
@@ -283,6 +287,24 @@ def _accept(
             hint="leave more of the mannequin uncovered, on several sides",
         )
     return placed.mannequin_from_surface
+
+
+def _refuse_size(size: float, error: float) -> None:
+    """Refuse a scan in metres that fits the mannequin better in another size, if that is certain.
+
+    Args:
+        size: By what the scan is to be multiplied.
+        error: Standard error of it.
+
+    Raises:
+        GarmentError: it is.
+    """
+    off = size - 1.0
+    if abs(off) > max(SIZE_OFF, SIZE_SIGMAS * error):
+        raise GarmentError(
+            f"the scan lies on the mannequin only if it is made {abs(off):.1%} {'larger' if off > 0 else 'smaller'}",
+            hint="is it the mannequin that was scanned, and in its unit? was the board printed in its full size?",
+        )
 
 
 def _of_unplaced(cameras: CameraSet) -> str:

@@ -15,7 +15,7 @@ from vto_pipeline.garment.notches import close_notches
 from vto_pipeline.garment.photographed.carved import carve_fillings
 from vto_pipeline.garment.photographed.confirmed import LookAgain, confirm_fillings
 from vto_pipeline.garment.photographed.covered import covered_loops
-from vto_pipeline.garment.photographed.parted import refuse_parted
+from vto_pipeline.garment.photographed.parted import refuse_parted, refuse_unseen
 from vto_pipeline.garment.photographed.sightings import look_at_mannequin
 from vto_pipeline.garment.pierced import open_pierced
 from vto_pipeline.garment.rims import drop_flaps, fair_rims, trim_ledges
@@ -171,10 +171,13 @@ def close_scan_holes(
         unobserved_share=1.0 - seen,
     )
     _check_seen(seen, final, config, job)
-    if mannequin is not None and photos is not None and found:
-        sightings = look_at_mannequin(final, observed, mannequin, photos, job)
+    if mannequin is not None and found:
+        sightings = None if photos is None else look_at_mannequin(final, observed, mannequin, photos, job)
         if sightings is not None:
             refuse_parted(sightings, final, found, config.keep is not None, job)
+        if bare is not None and (photos is None or sightings is not None):
+            answered = config.keep is not None or config.expected is not None
+            refuse_unseen(final, found, mannequin, bare, sightings, answered, job)
     warn_of_filled_rims(found, observed, job)
     if bare is not None and pieces > 1:
         warn_of_torn(final, bare, job)

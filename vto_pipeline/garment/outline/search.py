@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydantic import Field
@@ -23,7 +23,7 @@ FEW_PHOTOS = 12
 """So many, from all sides, tell good starts from bad ones."""
 WIDEST, COARSE = 0.06, 0.012
 """Reach of the first step and of the steps that rank the starts [share of the form's size]."""
-COARSE_STEPS, FINE_STEPS = 8, 12
+COARSE_STEPS, FINE_STEPS, SIZE_STEPS = 8, 12, 8
 FINEST_PX = 3.0
 """Reach of the last steps, in pixels on the form."""
 UPRIGHT = (1, 3, 4, 5)
@@ -62,6 +62,9 @@ class OutlinePlacement:
         sigma: Standard error of the least certain point [m].
         scale_error: Standard error of the scale [share]; 0 where it was known.
         depth: So far inside the form is inside by more than the photos' pixels explain [m].
+        size: By what the scan would have to be multiplied for the outline to fit best; 1 where its scale was free.
+        size_error: Standard error of that [share].
+        size_merit: How much better than now the outline then fits the photos, as a ratio.
     """
 
     mannequin_from_scan: FloatArray
@@ -69,6 +72,9 @@ class OutlinePlacement:
     sigma: float
     scale_error: float
     depth: float
+    size: float = 1.0
+    size_error: float = 0.0
+    size_merit: float = 1.0
 
 
 def place_by_outline(
@@ -121,7 +127,24 @@ def place_by_outline(
         fits.append(every.step(placement, last, free, move=False))
         job.progress(0.7 + 0.3 * (number + 1) / len(chosen), f"outline: placement {number + 1} of {len(chosen)}")
     fits = _distinct(sorted(fits, key=_worth, reverse=True), mesh)
-    return _accept(fits, mesh, photos, free_scale, config, job)
+    found = _accept(fits, mesh, photos, free_scale, config, job)
+    return found if free_scale else _sized(found, every, photos, mesh)
+
+
+def _sized(
+    found: OutlinePlacement, every: OutlineProblem, photos: Sequence[EdgePhoto], mesh: ContourMesh
+) -> OutlinePlacement:
+    """Return a rigid placement with the size in which the outline would fit best."""
+    placement, free = found.fit.scan_from_form, tuple(range(7))
+    pixel = _pixel(placement, photos, mesh)
+    last = FINEST_PX * pixel
+    for reach in np.geomspace(2 * COARSE * mesh.size, last, SIZE_STEPS):
+        placement = every.step(placement, max(reach, last), free).scan_from_form
+    sized = every.step(placement, last, free, move=False)
+    error = np.hypot(np.sqrt(sized.covariance[6, 6]), SHARED_PX * pixel / (0.5 * mesh.size))
+    size = float(np.cbrt(np.linalg.det(_inverse(sized.scan_from_form)[:3, :3])))
+    merit = _worth(sized) / max(_worth(found.fit), 1e-9)
+    return replace(found, size=size, size_error=float(error), size_merit=merit)
 
 
 def _inverse(transform: FloatArray) -> FloatArray:

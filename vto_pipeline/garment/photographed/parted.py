@@ -1,4 +1,4 @@
-"""Openings that are several: cloth in the photos parts them, and the garment lacks that cloth."""
+"""Openings that are several: cloth that the garment lacks parts them. Photos show it, or nothing was seen there."""
 
 from __future__ import annotations
 
@@ -12,7 +12,11 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from vto_pipeline.errors import GarmentError
-from vto_pipeline.garment.photographed.sightings import Sightings
+from vto_pipeline.garment.bare_parts import BareParts
+from vto_pipeline.garment.photographed.sightings import SPACING, Sightings
+from vto_pipeline.geometry.sampling import sample_surface
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.geometry.topology import boundary_loops, surface_area
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.garment import Opening
 from vto_pipeline.model.job import Job
@@ -27,6 +31,8 @@ LEAST_CLOTH = 0.001
 """Less cloth is within the error of a rim: a strap of 2 cm by 5 [m²]."""
 AT_RIM = 0.05
 """Cloth that stands off from the mannequin ends within this of what was lost [m]."""
+STRAP = 0.08
+"""A strap that was not seen leaves no place of the mannequin farther than this from its ends [m]."""
 BRIDGING = 0.7
 """Lost cloth hangs on the garment at its ends: these are so far apart, as a share of its own size. A shadow on an arm
 begins at the cuff and runs away from it."""
@@ -62,21 +68,64 @@ def refuse_parted(
         GarmentError: it lacks cloth that parts an opening.
     """
     for parted in parted_openings(sightings, garment.vertices):
-        tree = cKDTree(parted.cloth)
-        opening = min(openings, key=lambda one: float(np.median(tree.query(garment.vertices[one.loop])[0])))
-        over = parted.cloth[int(tree.query(parted.cloth.mean(axis=0))[1])]
-        what = f"the opening of {opening.perimeter * 1e3:.0f} mm at {_place(opening.center)}"
         lacks = f"the photos show {parted.area * 1e4:.0f} cm² of cloth there that the garment lacks"
-        problem = f"{what} should be at least {parted.parts}: {lacks}, as over {_place(over)}"
-        if answered:
-            job.warn(problem)
-            continue
-        raise GarmentError(
-            problem,
-            hint="take more photos of that place, often the shoulders, from above and 10 to 15 degrees apart. "
-            "Or look at it, and set openings.keep to the number of openings",
-            partial={"garment": garment},
-        )
+        _refuse(parted, f"should be at least {parted.parts}: {lacks}", garment, openings, answered, job)
+
+
+def refuse_unseen(
+    garment: TriangleMesh,
+    openings: Sequence[Opening],
+    mannequin: TriangleMesh,
+    bare: BareParts,
+    sightings: Sightings | None,
+    answered: bool,
+    job: Job,
+) -> None:
+    """Refuse a garment of which an opening may be several: what would part it was seen neither bare nor clothed.
+
+    So it is where a camera looked over no shoulder: neck and armholes are then one opening, whether a strap lies there
+    or not. Farther from the rims, as between the legs under a hem, cloth is less likely: that is a warning.
+
+    Args:
+        garment: The finished garment.
+        openings: Of it; at least one.
+        mannequin: In the same frame.
+        bare: What was scanned of the bare mannequin.
+        sightings: What photos show of it, too; None where there are none that tell.
+        answered: Who gave the number of openings answers for it: then it is a warning.
+        job: Receives the warnings.
+
+    Raises:
+        GarmentError: too little was seen to tell.
+    """
+    for reach in (STRAP, np.inf):
+        found = unseen_openings(garment, mannequin, bare, sightings, job.seed, reach)
+        for parted in found:
+            lacks = f"{parted.area * 1e4:.0f} cm² of the mannequin there were seen neither bare nor clothed"
+            warns = answered or reach > STRAP
+            _refuse(parted, f"may be {parted.parts} or more: {lacks}", garment, openings, warns, job)
+        if found:
+            return
+
+
+def _refuse(
+    parted: Parted, why: str, garment: TriangleMesh, openings: Sequence[Opening], answered: bool, job: Job
+) -> None:
+    """Raise for an opening that is several, or warn where that is answered for."""
+    tree = cKDTree(parted.cloth)
+    opening = min(openings, key=lambda one: float(np.median(tree.query(garment.vertices[one.loop])[0])))
+    over = parted.cloth[int(tree.query(parted.cloth.mean(axis=0))[1])]
+    what = f"the opening of {opening.perimeter * 1e3:.0f} mm at {_place(opening.center)}"
+    problem = f"{what} {why}, as over {_place(over)}"
+    if answered:
+        job.warn(problem)
+        return
+    raise GarmentError(
+        problem,
+        hint="take more photos or frames of that place, often the shoulders, from above and 10 to 15 degrees apart. "
+        "Or look at it, and set openings.keep to the number of openings",
+        partial={"garment": garment},
+    )
 
 
 def parted_openings(sightings: Sightings, cloth_points: FloatArray) -> list[Parted]:
@@ -90,14 +139,64 @@ def parted_openings(sightings: Sightings, cloth_points: FloatArray) -> list[Part
         sightings: What the photos show.
         cloth_points: Of the garment as found [m], shape (V, 3).
     """
-    lost = _hanging_on(sightings, cloth_points)
+    return _parts_of(sightings, _hanging_on(sightings, cloth_points))
+
+
+def unseen_openings(
+    garment: TriangleMesh,
+    mannequin: TriangleMesh,
+    bare: BareParts,
+    sightings: Sightings | None,
+    seed: int,
+    reach: float = STRAP,
+) -> list[Parted]:
+    """Return where unseen places divide what the garment leaves bare of the mannequin, as `parted_openings` does.
+
+    Only parts that come near a rim leave through an opening of their own. The foot of a stand does not, though the
+    underside of the form between it and the hem is hidden.
+
+    Args:
+        garment, mannequin, bare, sightings: As in `refuse_unseen`.
+        seed: Of the points of the mannequin that are asked for.
+        reach: Places farther than this from the garment are taken for bare [m].
+    """
+    area = surface_area(mannequin)
+    count = max(int(area / SPACING**2), 1)
+    points = sample_surface(mannequin, count, seed)[0]
+    points = points[~SurfaceDistance(_capped(garment)).inside(points)]
+    shown = bare.under(points)
+    if sightings is not None and not sightings.cloth.all():
+        shown_bare = cKDTree(sightings.points[~sightings.cloth])
+        shown |= np.isfinite(shown_bare.query(points, distance_upper_bound=BESIDE * SPACING)[0])
+    shown |= cKDTree(garment.vertices).query(points)[0] > reach
+    what = Sightings(points, ~shown, area / count)
+    rim = garment.vertices[np.concatenate(boundary_loops(garment))]
+    near = np.isfinite(cKDTree(rim).query(points, distance_upper_bound=AT_RIM)[0])
+    return _parts_of(what, _hanging_on(what, garment.vertices), near)
+
+
+def _capped(garment: TriangleMesh) -> TriangleMesh:
+    """Return a garment with a fan over each opening: what of the mannequin is inside is under the garment."""
+    vertices, faces = [garment.vertices], [garment.faces]
+    for number, loop in enumerate(boundary_loops(garment)):
+        vertices.append(garment.vertices[loop].mean(axis=0, keepdims=True))
+        middle = np.full(len(loop), len(garment.vertices) + number)
+        faces.append(np.column_stack([np.roll(loop, -1), loop, middle]).astype(np.int32))
+    return TriangleMesh(np.concatenate(vertices), np.concatenate(faces))
+
+
+def _parts_of(sightings: Sightings, lost: NDArray[np.bool_], near: NDArray[np.bool_] | None = None) -> list[Parted]:
+    """Return where lost points (N,) divide a piece of the others; with `near` (N,), only parts that have such count."""
     whole = _pieces(sightings.points, np.ones_like(lost), sightings.area)
     bare = _pieces(sightings.points, ~lost, sightings.area)
     found = []
     for piece in range(whole.max(initial=-1) + 1):
         mine = whole == piece
-        _, size = np.unique(bare[mine & ~lost], return_counts=True)
-        parts = int(np.count_nonzero(size * sightings.area >= LEAST_PART))
+        part, size = np.unique(bare[mine & ~lost], return_counts=True)
+        large = size * sightings.area >= LEAST_PART
+        if near is not None:
+            large &= np.isin(part, bare[mine & near & ~lost])
+        parts = int(np.count_nonzero(large))
         if parts > 1:
             between = sightings.points[mine & lost]
             found.append(Parted(parts, between, len(between) * sightings.area))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from vto_pipeline.geometry.floor import floor_height
+from vto_pipeline.geometry.floor import find_floor
 from vto_pipeline.geometry.topology import component_areas, face_area_vectors, submesh
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -22,16 +22,16 @@ def not_worn(surface: TriangleMesh, below: float, sigma: float, job: Job) -> NDA
     Args:
         surface: The scan, +Y up [m].
         below: Height that the floor is not above [m].
-        sigma: Noise of the scan [m].
+        sigma: Noise of the scan near the mannequin [m]; that of the floor, which lies farther off, is measured.
         job: Receives both.
     """
     lying = _lying(surface, job)
-    floor = floor_height(surface, below)
+    floor = find_floor(surface, below)
     if floor is None:
         job.leave_out("floor", "no level surface lies under the mannequin")
         return lying
-    job.measure(floor_mm=floor * 1e3)
-    return lying | (surface.vertices[:, 1] < floor + 3.0 * sigma)
+    job.measure(floor_mm=floor.height * 1e3, floor_noise_mm=floor.noise * 1e3)
+    return lying | (surface.vertices[:, 1] < floor.height + 3.0 * max(sigma, floor.noise))
 
 
 def _lying(surface: TriangleMesh, job: Job) -> NDArray[np.bool_]:
