@@ -167,6 +167,20 @@ def test_no_move_goes_through_a_tip(speed):
     assert held.counters.shortened == 3
 
 
+@pytest.mark.parametrize("around", np.linspace(0.1, 6.2, 5))
+def test_what_slides_over_a_thorn_from_beside_it_is_not_pierced(around):
+    """Its edge begins a little below the tip and passes over it; the thorn's sides are steeper, so that is outside."""
+    thorn = trimesh.creation.cone(0.006, 0.05, sections=12)
+    thorn = TriangleMesh(thorn.vertices[:, [1, 2, 0]] - [0.0, 0.05, 0.0], thorn.faces)
+    turn = trimesh.transformations.rotation_matrix(around, [0, 1, 0])[:3, :3]
+    x = 1e-3 * np.array([[1.1, -0.05, -8.0], [1.1, -0.05, 8.0], [14.0, -8.5, 0.0]]) @ turn.T
+    wanted = x + 1e-3 * turn @ [-2.6, 0.4, 0.0]
+    assert not crosses(x, [[0, 1, 2]], thorn)
+    assert crosses(wanted, [[0, 1, 2]], thorn)
+    there, _ = contact(TriangleMesh(x, [[0, 1, 2]]), thorn).collision_free(x, wanted)
+    assert not crosses(there, [[0, 1, 2]], thorn)
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_safe_moves_among_many_bodies_cross_nothing(seed):
     random = np.random.default_rng(seed)

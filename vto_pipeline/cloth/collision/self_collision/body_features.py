@@ -78,11 +78,15 @@ class BodyFeatures:
         self.features = features(np.vstack([cloth.faces, faces + np.int32(count)]), count + int(first[-1]))
         self.friction = np.repeat([body.friction for body in bodies], counts)
         self._beside = _adjacent_faces(self._own)
+        corners = np.argsort(faces.ravel(), kind="stable")
+        self._around = corners // 3
+        self._around_starts = np.searchsorted(faces.ravel()[corners], np.arange(int(first[-1]) + 1))
         self._shown = np.empty(0, np.bool_)
         self._shown_vertices = np.empty(0, np.bool_)
         self.begin = self.end = self._places(0.0)
         self._fitted_to = (self.begin, self.end)
         self._normals = pseudonormals(self.begin, faces)
+        self._find_convex()
         self._tree = bvh.build(self.begin, faces)
         self.set_time_span(0.0, 0.0)
 
@@ -93,6 +97,7 @@ class BodyFeatures:
         now = (self.begin, self.end)
         if not all(map(np.array_equal, now, self._fitted_to)):
             update_pseudonormals(self._normals, self.begin, self._own.faces)
+            self._find_convex()
             bvh.refit_swept(self._tree, *now, self._own.faces, np.zeros(len(self.begin)))
             self._fitted_to = now
         shown = np.concatenate([body.touchable_faces for body in self._bodies])
@@ -132,9 +137,9 @@ class BodyFeatures:
     ) -> Candidates:
         """Return those that may come nearer than they may, if the cloth comes from outside: planes lead out the rest.
 
-        A vertex is outside a face before its plane; a face is, where it is nearest, outside a vertex on the side of
-        its pseudonormal; an edge is outside another in the angle between its faces. Where a surface ends there is no
-        inside. What has a vertex inside is on its way out.
+        A vertex is outside a face before its plane; an edge is outside another in the angle between its faces; a face
+        is, where it is nearest, outside a vertex before any of the faces of one that stands out, else on the side of
+        its pseudonormal. Where a surface ends there is no inside. What has a vertex inside is on its way out.
 
         Args:
             candidates: Of `search`.
@@ -172,18 +177,34 @@ class BodyFeatures:
         return np.asarray(self._shown[face] & (_dot(way, self._normals.faces[face]) > 0.0))
 
     def _outside_vertices(self, vertex: IntArray, way: FloatArray) -> NDArray[np.bool_]:
-        out = _dot(way, self._normals.vertices[vertex]) > 0.0
+        """Return whether ways from vertices of the bodies go outside.
+
+        The pseudonormal tells that only of ways to what the vertex is nearest to. What passes a thorn's tip is not.
+        """
+        out: NDArray[np.bool_] = np.asarray(_dot(way, self._normals.vertices[vertex]) > 0.0)
+        asked = np.flatnonzero(~out & self._convex_vertices[vertex])
+        first = self._around_starts[vertex[asked]]
+        count = self._around_starts[vertex[asked] + 1] - first
+        which = np.repeat(asked, count)
+        face = self._around[np.repeat(first - np.cumsum(count) + count, count) + np.arange(len(which))]
+        out[which[_dot(way[which], self._normals.faces[face]) > 0.0]] = True
         return np.asarray(self._shown_vertices[vertex] & (out | self._normals.rim_vertices[vertex]))
 
     def _outside_edges(self, edge: IntArray, way: FloatArray) -> NDArray[np.bool_]:
         """Return whether ways from edges of the bodies go outside."""
         one, other = self._beside[edge].T
-        first, second = self._normals.faces[one], self._normals.faces[other]
-        along = np.diff(self.begin[self._own.edges[edge]], axis=1)[:, 0]
-        convex = _dot(np.cross(first, second), along) >= 0.0
-        before, behind = _dot(first, way) > 0.0, _dot(second, way) > 0.0
-        out = np.where(convex, before | behind, before & behind)
+        before = _dot(self._normals.faces[one], way) > 0.0
+        behind = _dot(self._normals.faces[other], way) > 0.0
+        out = np.where(self._convex[edge], before | behind, before & behind)
         return np.asarray((self._shown[one] | self._shown[other]) & (out | self._normals.rim_edges[edge]))
+
+    def _find_convex(self) -> None:
+        """Find which edges of the bodies stand out, and of which vertices all edges do."""
+        first, second = (self._normals.faces[face] for face in self._beside.T)
+        along = np.diff(self.begin[self._own.edges], axis=1)[:, 0]
+        self._convex = _dot(np.cross(first, second), along) >= 0.0
+        self._convex_vertices = np.ones(len(self.begin), np.bool_)
+        self._convex_vertices[self._own.edges[~self._convex]] = False
 
     def _corners(self, candidates: Candidates) -> IntArray:
         """Return the four vertices of each, shape (N + M, 4)."""
