@@ -60,6 +60,24 @@ def test_what_was_cleared_comes_to_rest_again(monkeypatch):
     assert ended(monkeypatch, [(False, NONE), (True, NONE), (False, NONE)]).settled is True
 
 
+@pytest.mark.parametrize("target", [0.5, 8.0])
+def test_cloth_comes_to_rest_the_same_way_whatever_error_is_asked_for(monkeypatch, target):
+    """Friction keeps it where its way has led it: two dresses came to rest 5 mm apart."""
+    mesh = sheet(4, 4, 0.1, 0.1)
+    model, rest = build_cloth(mesh, RestShape(mesh.vertices), fabric()), RestShape(mesh.vertices)
+    asked = []
+
+    def relax(stepper, state, limits, *given):
+        asked.append(limits.error)
+        return SettlingResult(state, True, 1e-4, 1e-3)
+
+    monkeypatch.setattr(module, "relax_to_rest", relax)
+    monkeypatch.setattr(module, "clear_body_crossings", lambda stepper, state, *given: (state, NONE))
+    phases = Phases(model, rest, fabric(), DrapeConfig(target_error_mm=target), Job())
+    phases.settle_and_clear(at_rest(mesh.vertices), Ready(), ball(0.3, levels=1), np.inf)
+    assert asked == [5e-3, pytest.approx(1e-3 * target)]
+
+
 @pytest.mark.parametrize("pairs", [NONE, ONE], ids=["clear", "still crossing"])
 def test_what_the_last_clearing_moved_is_not_at_rest(monkeypatch, pairs):
     turns = module._TURNS - 1 if len(pairs) == 0 else 0

@@ -34,10 +34,11 @@ from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
-PLACED, ROUGH, REST = (5e-3, 1000.0), (5e-3, 100.0), (0.0, 1.0)
-"""How nearly cloth comes to rest: the error at least [m], and times the left-over force that are enough.
+PLACED, ROUGH, REST = (5e-3, 1000.0), (5e-3, 100.0), (None, 1.0)
+"""How nearly cloth comes to rest: the error [m], and times the left-over force that are enough.
 
 In place, to see where it lies across the body before it goes on; roughly, for a finer mesh to go on; and as is asked.
+The first two do not depend on what is: friction keeps cloth where its way has led it.
 What is in place has forces of ten times its weight while wrinkles snap here and there: the exact stiffness of the last
 steps is faster at ending that."""
 
@@ -222,7 +223,7 @@ class Phases:
         stepper: Stepper,
         body: TriangleMesh,
         deadline: float,
-        nearly: tuple[float, float] = PLACED,
+        nearly: tuple[float | None, float] = PLACED,
     ) -> SettlingResult:
         """Return the cloth at rest, or as near to it as allowed; it may cross the body.
 
@@ -240,7 +241,7 @@ class Phases:
 
         error, times = nearly
         limits = SettleLimits(
-            error=max(error, 1e-3 * self._config.target_error_mm),
+            error=1e-3 * self._config.target_error_mm if error is None else error,
             residual=times * self._config.target_residual,
             seconds=self._config.settle_seconds,
             finest=self._config.finest,
@@ -268,7 +269,7 @@ class Phases:
         stepper: Stepper,
         body: TriangleMesh,
         deadline: float,
-        passes: Sequence[tuple[float, float]] = (PLACED, REST),
+        passes: Sequence[tuple[float | None, float]] = (PLACED, REST),
         *,
         clears: bool = True,
     ) -> SettlingResult:
