@@ -108,6 +108,17 @@ def boundary_loops(mesh: TriangleMesh) -> list[IntArray]:
     return [start[walk] for walk in boundary_walks(mesh)]
 
 
+def close_openings(mesh: TriangleMesh) -> TriangleMesh:
+    """Return a mesh with a fan over each opening."""
+    vertices, faces = [mesh.vertices], [mesh.faces]
+    count = len(mesh.vertices)
+    for loop in boundary_loops(mesh):
+        vertices.append(mesh.vertices[loop].mean(axis=0, keepdims=True))
+        faces.append(np.column_stack([np.roll(loop, -1), loop, np.full(len(loop), count)]).astype(np.int32))
+        count += 1
+    return TriangleMesh(np.vstack(vertices), np.vstack(faces))
+
+
 def hinges(mesh: TriangleMesh) -> IntArray:
     """Return (v0, v1, a, b) for each inner edge, shape (H, 4): face (v0, v1, a) and face (v1, v0, b).
 

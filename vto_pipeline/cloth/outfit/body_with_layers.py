@@ -10,10 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vto_pipeline.cloth.placement.voxel_fit import close_openings
 from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import concatenate, vertex_normals
+from vto_pipeline.geometry.topology import close_openings, concatenate, vertex_normals
 from vto_pipeline.model.mesh import TriangleMesh
 
 _ROOM = 5e-3  # m kept about body and cloth

@@ -20,10 +20,10 @@ from vto_pipeline.cloth.placement.limbs.lead import lead_onto_limbs
 from vto_pipeline.cloth.placement.limbs.openings import Piece, pieces_with_limbs
 from vto_pipeline.cloth.placement.rigid_escape import escape_rigidly
 from vto_pipeline.cloth.placement.thinning import LINES, BodyGrowth, Thinning
-from vto_pipeline.cloth.placement.voxel_fit import close_openings
 from vto_pipeline.errors import GarmentError, InputError
 from vto_pipeline.geometry.laplace import laplacian
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
+from vto_pipeline.geometry.topology import close_openings
 from vto_pipeline.model.garment import Garment, RestShape
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh

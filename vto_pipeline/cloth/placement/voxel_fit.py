@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.fft import irfftn, next_fast_len, rfftn
 
 from vto_pipeline.cloth.placement.voxels import solid_cubes
-from vto_pipeline.geometry.topology import boundary_loops
+from vto_pipeline.geometry.topology import close_openings
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -146,14 +146,3 @@ class VoxelFit:
         back = tuple(axis for axis in range(3) if turn[axis].sum() < 0.0)
         ends = np.stack([self._low, self._low + self._cube * np.array(self._worth.shape)]) @ turn.T
         return np.flip(self._worth.transpose(axes), back), ends.min(axis=0)
-
-
-def close_openings(garment: TriangleMesh) -> TriangleMesh:
-    """Return the garment with a fan over each opening."""
-    vertices, faces = [garment.vertices], [garment.faces]
-    count = len(garment.vertices)
-    for loop in boundary_loops(garment):
-        vertices.append(garment.vertices[loop].mean(axis=0, keepdims=True))
-        faces.append(np.column_stack([np.roll(loop, -1), loop, np.full(len(loop), count)]).astype(np.int32))
-        count += 1
-    return TriangleMesh(np.vstack(vertices), np.vstack(faces))

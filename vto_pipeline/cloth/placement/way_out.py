@@ -12,9 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from vto_pipeline.cloth.placement.voxel_fit import close_openings
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import face_normals, vertex_normals
+from vto_pipeline.geometry.topology import close_openings, face_normals, vertex_normals
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 

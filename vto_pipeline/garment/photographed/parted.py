@@ -16,7 +16,7 @@ from vto_pipeline.garment.bare_parts import BareParts
 from vto_pipeline.garment.photographed.sightings import SPACING, Sightings
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import boundary_loops, surface_area
+from vto_pipeline.geometry.topology import boundary_loops, close_openings, surface_area
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.garment import Opening
 from vto_pipeline.model.job import Job
@@ -163,7 +163,7 @@ def unseen_openings(
     area = surface_area(mannequin)
     count = max(int(area / SPACING**2), 1)
     points = sample_surface(mannequin, count, seed)[0]
-    points = points[~SurfaceDistance(_capped(garment)).inside(points)]
+    points = points[~SurfaceDistance(close_openings(garment)).inside(points)]
     shown = bare.under(points)
     if sightings is not None and not sightings.cloth.all():
         shown_bare = cKDTree(sightings.points[~sightings.cloth])
@@ -173,16 +173,6 @@ def unseen_openings(
     rim = garment.vertices[np.concatenate(boundary_loops(garment))]
     near = np.isfinite(cKDTree(rim).query(points, distance_upper_bound=AT_RIM)[0])
     return _parts_of(what, _hanging_on(what, garment.vertices), near)
-
-
-def _capped(garment: TriangleMesh) -> TriangleMesh:
-    """Return a garment with a fan over each opening: what of the mannequin is inside is under the garment."""
-    vertices, faces = [garment.vertices], [garment.faces]
-    for number, loop in enumerate(boundary_loops(garment)):
-        vertices.append(garment.vertices[loop].mean(axis=0, keepdims=True))
-        middle = np.full(len(loop), len(garment.vertices) + number)
-        faces.append(np.column_stack([np.roll(loop, -1), loop, middle]).astype(np.int32))
-    return TriangleMesh(np.concatenate(vertices), np.concatenate(faces))
 
 
 def _parts_of(sightings: Sightings, lost: NDArray[np.bool_], near: NDArray[np.bool_] | None = None) -> list[Parted]:

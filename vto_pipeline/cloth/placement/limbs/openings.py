@@ -15,9 +15,8 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from vto_pipeline.cloth.placement.limbs.limbs import Limb, Limbs
-from vto_pipeline.cloth.placement.voxel_fit import close_openings
 from vto_pipeline.geometry.geodesic import distance_from
-from vto_pipeline.geometry.topology import boundary_loops, face_components, submesh
+from vto_pipeline.geometry.topology import boundary_loops, close_openings, face_components, submesh
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 
