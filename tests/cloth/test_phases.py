@@ -11,7 +11,7 @@ import vto_pipeline.cloth.rest.phases as module
 from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.model.build import at_rest, build_cloth
 from vto_pipeline.cloth.placement.collision_free_start import Start
-from vto_pipeline.cloth.placement.thinning import BodyGrowth
+from vto_pipeline.cloth.placement.thinning import BodyGrowth, Thinning
 from vto_pipeline.cloth.rest.convergence import SettlingResult
 from vto_pipeline.cloth.rest.phases import Phases
 from vto_pipeline.errors import IntersectingError
@@ -126,13 +126,14 @@ def growing(monkeypatch, jams, size=1.0):
     rest = RestShape(mesh.vertices / size)
     model = build_cloth(mesh, rest, fabric())
     body, begun = ball(0.12, levels=1), []
+    thinning = Thinning(body)
 
     def way(place, otherwise):
         moving = MovingBody(np.stack([body.vertices + place, body.vertices]), body.faces)
-        return BodyGrowth(mesh, moving, 0, 0, 0, [], None, otherwise)
+        return BodyGrowth(mesh, moving, 0, 0, 0, [], thinning, otherwise)
 
     def run(stepper, state, collider, *given, **settings):
-        begun.append(float(np.median(collider.at(0.0) - body.vertices)))
+        begun.append(float(np.median(collider.at(0.0)[: len(body.vertices)] - body.vertices)))
         if len(begun) <= jams:
             raise IntersectingError("jammed")
         return state
@@ -165,24 +166,31 @@ def test_what_is_far_too_small_is_refused_at_its_first_jam(monkeypatch):
     assert growing(monkeypatch, 0, size=1.2) == pytest.approx([0.01], abs=1e-9)
 
 
-@pytest.mark.parametrize(("place", "left", "closely"), [(0.0, 3, True), (0.0, 0, False), (1.0, 3, False)])
-def test_the_body_grows_closely_where_cloth_is_not_freed_of_it(monkeypatch, place, left, closely):
+@pytest.mark.parametrize(
+    ("place", "left", "pushed_off", "closely"),
+    [(0.0, 3, 0.0, True), (0.0, 3, 0.5, False), (0.0, 0, 0.0, False), (1.0, 3, 0.0, False)],
+)
+def test_the_body_grows_closely_where_cloth_does_not_come_off_it(monkeypatch, place, left, pushed_off, closely):
     """Cloth across the ball, or far from it and tangled in itself; it is clear of both where features are kept out."""
     mesh, body, asked = moved(sheet(4, 4, 0.4, 0.4), place, 0.0, 0.0), ball(0.1, levels=1), []
     rest = RestShape(mesh.vertices)
 
     def grown(phases, growth, config):
         asked.append(config.body_features)
-        return at_rest(mesh.vertices + 2.0 * config.body_features)
+        return at_rest(mesh.vertices + 2.0 * config.body_features), None
+
+    def clear(stepper, state, *given):
+        return replace(state, positions=state.positions + pushed_off), NONE if pushed_off else ONE
 
     monkeypatch.setattr(Phases, "_grown", grown)
+    monkeypatch.setattr(module, "clear_body_crossings", clear)
     monkeypatch.setattr(
         start_module, "find_collision_free_start", lambda x, *given: Start(x, 3, left, np.zeros(len(x), bool))
     )
     phases = Phases(build_cloth(mesh, rest, fabric()), rest, fabric(), DrapeConfig(), Job())
     found = phases._grown_clear(None, body)
     assert asked == [False, True][: 1 + closely]
-    assert (found.positions == mesh.vertices + 2.0 * closely).all()
+    assert (found.positions == mesh.vertices + 2.0 * closely + pushed_off).all()
 
 
 def test_a_body_grows_in_accelerated_steps(monkeypatch):
@@ -196,5 +204,5 @@ def test_a_body_grows_in_accelerated_steps(monkeypatch):
     monkeypatch.setattr(module, "run_body_motion", moves_on)
     rest = RestShape(mesh.vertices)
     phases = Phases(build_cloth(mesh, rest, fabric()), rest, fabric(), DrapeConfig(), Job())
-    phases._grown(BodyGrowth(mesh, body, 0, 0, 0, [], None), DrapeConfig())
+    phases._grown(BodyGrowth(mesh, body, 0, 0, 0, [], Thinning(small)), DrapeConfig())
     assert asked == [(True, True)]

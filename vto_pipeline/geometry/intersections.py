@@ -15,6 +15,7 @@ from vto_pipeline.geometry.predicates import orient2d, orient3d
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.numerics.spatial import bvh, bvh_pairs
+from vto_pipeline.numerics.vector import load
 
 
 def intersecting_faces(one: TriangleMesh, other: TriangleMesh) -> IntArray:
@@ -51,9 +52,25 @@ def _triangles_meet(vertices, faces, pairs):  # type: ignore[no-untyped-def]
     """Return whether each pair of faces meets, shape (K,)."""
     meet = np.zeros(len(pairs), np.bool_)
     for i in prange(len(pairs)):
-        one, other = faces[pairs[i, 0]], faces[pairs[i, 1]]
-        meet[i] = _edges_meet(vertices, one, other) or _edges_meet(vertices, other, one)
+        one, other = load(faces, pairs[i, 0]), load(faces, pairs[i, 1])
+        apart = _is_beside(vertices, one, other) or _is_beside(vertices, other, one)
+        meet[i] = not apart and (_edges_meet(vertices, one, other) or _edges_meet(vertices, other, one))
     return meet
+
+
+@njit(cache=True)
+def _is_beside(vertices, one, other):  # type: ignore[no-untyped-def]
+    """Return whether what a face does not share with another lies on one side of its plane: so most pairs are apart."""
+    a, b, c = load(vertices, other[0]), load(vertices, other[1]), load(vertices, other[2])
+    side = 0
+    for k in range(3):
+        if one[k] == other[0] or one[k] == other[1] or one[k] == other[2]:
+            continue
+        here = orient3d(a, b, c, load(vertices, one[k]))
+        if here == 0 or here * side < 0:
+            return False
+        side = here
+    return True
 
 
 @njit(cache=True)
@@ -66,7 +83,7 @@ def _edges_meet(vertices, edges_of, face):  # type: ignore[no-untyped-def]
             if face[m] == p or face[m] == q:
                 shared = True
         if not shared and segment_meets_triangle(
-            vertices[p], vertices[q], vertices[face[0]], vertices[face[1]], vertices[face[2]]
+            load(vertices, p), load(vertices, q), load(vertices, face[0]), load(vertices, face[1]), load(vertices, face[2])
         ):
             return True
     return False

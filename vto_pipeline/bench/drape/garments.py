@@ -59,12 +59,20 @@ def main() -> None:
         "--set", dest="settings", nargs="*", default=[], metavar="STAGE.KEY=VALUE", help="of `vto drape`"
     )
     parser.add_argument(
+        "--sample", type=int, metavar="ROWS", help="run so many, drawn at random, instead of every combination"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of --sample")
+    parser.add_argument(
         "--out", type=Path, default=Path("runs/garments"), metavar="DIR", help="for runs, rows and pictures"
     )
     arguments = parser.parse_args()
     table = LiveRows(arguments.out, _COLUMNS)
     done = {tuple(row[name] for name in _KEY) for row in table.rows}
-    for body, fabric, garment in product(arguments.body, arguments.fabric, arguments.garment):
+    rows = list(product(arguments.body, arguments.fabric, arguments.garment))
+    if arguments.sample is not None:
+        drawn = np.random.default_rng(arguments.seed).permutation(len(rows))[: arguments.sample]
+        rows = [rows[at] for at in drawn]
+    for body, fabric, garment in rows:
         if (garment.stem, body.stem, fabric) not in done:
             table.add(drape_row(garment, body, fabric, arguments.out, arguments.settings, arguments.limit))
     table.write_csv()

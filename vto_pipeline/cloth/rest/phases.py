@@ -19,6 +19,7 @@ from vto_pipeline.cloth.placement.body_growth import plan_body_growth
 from vto_pipeline.cloth.placement.clear_body import OVERSTRETCHED, clear_body_crossings, edge_stretches
 from vto_pipeline.cloth.placement.collision_free_start import find_collision_free_start, freed_of_body
 from vto_pipeline.cloth.placement.limbs.limbs import Limbs
+from vto_pipeline.cloth.placement.limbs.mittens import in_mittens
 from vto_pipeline.cloth.placement.thinning import BodyGrowth
 from vto_pipeline.cloth.rest.convergence import SettleLimits, SettlingResult, relax_to_rest
 from vto_pipeline.cloth.rest.true_distance import some_positions
@@ -48,6 +49,7 @@ _LARGER = 1.02  # times its size: what starts so was enlarged, not just bent
 ENLARGED = 1.15
 """Times its size: a place is found for it a fifth larger, or more; what is worn snugly is stretched less."""
 _LONG = 0.5  # steps per 1/60 s on the way to rest: backward Euler takes the more motion out, the longer they are
+_PADDING = 0.25  # of an edge: so far one may cut into what both of its ends lie on
 _CALM = 20.0  # 1/s: velocities fade this fast while the body grows, where the way does not matter
 
 
@@ -152,27 +154,30 @@ class Phases:
     def _grown_clear(self, growth: BodyGrowth, body: TriangleMesh) -> ClothState:
         """Return the cloth clear of the body as it ends; where that cannot be, it may cross.
 
-        What is finer than the cloth, as fingers and toes in long sleeves and legs are, grows out between its vertices.
-        Where that cannot be parted, the body grows again, and its vertices and edges keep out of the cloth, too.
+        What is finer than the cloth grows out between its vertices. It is moved off, else pushed off by a thicker skin.
+        Where that fails, too, the body grows again, and its vertices and edges keep out of the cloth.
 
         Raises:
             IntersectingError: it jams on the way.
         """
-        grown = self._grown(growth, self._config)
+        grown, stepper = self._grown(growth, self._config)
         if not self._config.self_collision or self._config.body_features:
             return grown
         rest, faces = self._rest.positions, self._model.faces
         freed = freed_of_body(grown.positions, faces, rest, self._fabric.thickness, body)
         if freed is not None:
             return replace(grown, positions=freed)
+        cleared, left = clear_body_crossings(stepper, grown, rest, faces, body, self._config.clear_rounds)
+        if len(left) == 0:
+            return at_rest(cleared.positions)
         self._job.progress(0.05, f"{_GROWING}, closely")
         try:
-            return self._grown(growth, self._config.model_copy(update={"body_features": True}))
+            return self._grown(growth, self._config.model_copy(update={"body_features": True}))[0]
         except IntersectingError:  # it jams before what it went through
             return grown
 
-    def _grown(self, growth: BodyGrowth, config: DrapeConfig) -> ClothState:
-        """Return the cloth outside the body as it ends.
+    def _grown(self, growth: BodyGrowth, config: DrapeConfig) -> tuple[ClothState, Stepper]:
+        """Return the cloth outside the body as it ends, and among its colliders.
 
         Raises:
             IntersectingError: it jams on the way.
@@ -182,7 +187,8 @@ class Phases:
             growth = growth.from_smaller(times)
         thin = TriangleMesh(growth.body.keyframes[0], growth.body.faces)
         state = self.resolve_crossings(at_rest(growth.garment.vertices), thin)
-        collider = self.collider(growth.body, growth.garment)
+        padding = _PADDING * self._model.edge_length
+        collider = self.collider(in_mittens(growth.body, growth.thinning.limbs, padding), growth.garment)
         stepper = self.stepper(without_gravity(self._model), collider, _CALM, config)
         stepper.prepare(state.positions)
         stepper.accelerate(True)
@@ -194,7 +200,7 @@ class Phases:
             lambda done: self._job.progress(0.05 + 0.25 * done, _GROWING),
             only_grows=True,
         )
-        return at_rest(grown.positions)
+        return at_rest(grown.positions), stepper
 
     def _times_its_size(self, garment: TriangleMesh) -> float:
         """Return how many times its edges are as long as at rest, by their median, in the garment's triangles."""

@@ -26,6 +26,7 @@ _BAND = 0.015  # of the body's height: distance between levels, and between the 
 _STANDS_OUT = 0.1  # of the body's height: shorter ones are fingers, a nose, a bun
 _ROOT = 0.08  # of the body's height: how far a shoulder or a hip goes on within the trunk
 _STRAIGHT = 5  # bands at the end of a limb that tell its direction there
+_END = 0.1  # of the body's height: from the tip of a hand over the skin to its wrist
 _SHIN = 0.25  # of the body's height: from the toes over the skin to the middle of the shin
 _FOOT = 0.05  # of the body's height: how far toes are in front of it at least
 _BELT = 0.02  # of the body's height: half of the belt's width
@@ -72,7 +73,7 @@ class Limbs:
         if len(self._belt) == 0 or height == 0.0:  # as coarse as a box, or flat: nothing stands out
             return
         away = distance_from(body, self._belt, np.inf)
-        away = np.where(np.isfinite(away), away, -1.0)
+        self._away = away = np.where(np.isfinite(away), away, -1.0)
         levels = np.arange(away.max(), 0.0, -self._band)
         found = _standing_out(self._graph, away, levels, _STANDS_OUT * height)
         limbs = [self._limb(body, away, tip, members, _ROOT * height) for tip, members in found]
@@ -102,6 +103,14 @@ class Limbs:
             return level.astype(np.int32)
         _, piece = connected_components(self._graph[level][:, level], directed=False)
         return level[piece == np.bincount(piece, self._area[level]).argmax()].astype(np.int32)
+
+    def ends(self) -> list[IntArray]:
+        """Return the vertices of the end of each limb, as far as a hand or the front of a foot goes, shape (N,) each."""
+        least = [self._away[limb.tip] - _END * self._height for limb in self.limbs]
+        return [
+            np.flatnonzero(limb.members & (self._away >= level)).astype(np.int32)
+            for limb, level in zip(self.limbs, least, strict=True)
+        ]
 
     @property
     def parting(self) -> float:
