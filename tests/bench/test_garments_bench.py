@@ -45,6 +45,22 @@ def rod(radius, low, high, edge, lids):
     return TriangleMesh(up, whole.faces.astype(np.int32))
 
 
+def test_rows_are_drawn_at_random_and_no_row_twice(tmp_path, monkeypatch):
+    drawn = {}
+    monkeypatch.setattr(garments, "drape_row", lambda *given: drawn[seed].append(given[:3]) or row())
+    monkeypatch.setattr(garments, "write_picture_table", lambda *given: None)
+    monkeypatch.setattr(garments.LiveRows, "add", lambda *given: None)
+    names = ["--garment", "a", "b", "c", "--body", "d", "e", "--fabric", "f", "g", "h"]
+    for seed in ("0", "1", "2"):
+        drawn[seed] = []
+        given = ["garments", *names, "--out", str(tmp_path / seed), "--sample", "12", "--seed", seed]
+        monkeypatch.setattr("sys.argv", given)
+        garments.main()
+    assert [len(set(rows)) for rows in drawn.values()] == [12, 12, 12]
+    assert len(set.union(*map(set, drawn.values()))) == 18
+    assert drawn["1"] != drawn["2"]
+
+
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory):
     """Two garments on one body, one of them no mesh at all; run twice, the second time after another body's."""

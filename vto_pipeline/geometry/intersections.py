@@ -76,15 +76,14 @@ def _is_beside(vertices, one, other):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _edges_meet(vertices, edges_of, face):  # type: ignore[no-untyped-def]
     """Return whether an edge of the one face meets the other face."""
+    a, b, c = load(vertices, face[0]), load(vertices, face[1]), load(vertices, face[2])
     for k in range(3):
         p, q = edges_of[k], edges_of[(k + 1) % 3]
         shared = False
         for m in range(3):
             if face[m] == p or face[m] == q:
                 shared = True
-        if not shared and segment_meets_triangle(
-            load(vertices, p), load(vertices, q), load(vertices, face[0]), load(vertices, face[1]), load(vertices, face[2])
-        ):
+        if not shared and segment_meets_triangle(load(vertices, p), load(vertices, q), a, b, c):
             return True
     return False
 

@@ -40,7 +40,7 @@ _PATIENCE = 24  # rounds without a better one
 _KINKED = 4  # such rounds after which the cloth about the crossings is smoothed, and again after as many
 _GROWTH = 0.01  # of the area: a round that stretches the cloth more does not count
 _PRESSED = 0.3  # share of its shortage that a pressed bar regains in a sweep: cloth folds sooner than it stretches
-_RECOVERY = 10  # rounds at most in which the untangled cloth gets its lengths back
+_RECOVERY = 4  # rounds at most in which the untangled cloth gets its lengths back: three do for ninety bad starts
 _RECOVERED = 0.98  # of what is missing: a round must leave less than this to be followed by another
 
 
@@ -113,6 +113,8 @@ def untangle(
         if tangle.count < best.count and work.area_growth(tangle.positions) <= _GROWTH:
             best, best_round = tangle, k
         job.progress(1.0 - best.count / began, f"untangling: {best.count} of {began} pairs of triangles left")
+    if best_round:
+        best = work.recovered(best)
     places = work.places(best)
     if best.count:
         shown = ", ".join("({:.3f}, {:.3f}, {:.3f})".format(*points.mean(axis=0)) for points in places[:5])
@@ -172,6 +174,23 @@ class _UntangleProblem:
         met = np.concatenate([self._faces[tangle.pairs].ravel(), self._faces[tangle.body_pairs[:, 0]].ravel()])
         return smoothed(tangle.positions, self._laplacian, met, rings)
 
+    def recovered(self, tangle: _Crossing) -> _Crossing:
+        """Return the cloth with its lengths as far back as goes without new pairs."""
+        nothing, pressed = np.zeros(len(tangle.positions), np.bool_), 1.0
+        for _ in range(_RECOVERY):
+            parts = self._separation_rows(tangle, nothing)
+            found = self.find_crossings(
+                project_rows_and_lengths(tangle.positions, concatenate_rows(parts), self._bars, _SWEEPS, pressed)
+            )
+            short, before = self._short(found), self._short(tangle)
+            if found.count > tangle.count or short >= before or self.area_growth(found.positions) > _GROWTH:
+                pressed *= 0.5
+                continue
+            tangle = found
+            if short > _RECOVERED * before:
+                break
+        return tangle
+
     def places(self, tangle: _Crossing) -> tuple[FloatArray, ...]:
         """Return the points of each contour."""
         made = crossings(tangle.positions, self._faces, tangle.pairs), self._with_body(tangle)
@@ -206,6 +225,9 @@ class _UntangleProblem:
             np.vstack([self._faces, self._body.faces + np.int32(count)]),
             tangle.body_pairs + np.array([0, len(self._faces)], np.int32),
         )
+
+    def _short(self, tangle: _Crossing) -> float:
+        return length_violation(tangle.positions, self._bars)
 
     def _mesh(self, positions: FloatArray) -> TriangleMesh:
         return TriangleMesh(positions, self._faces)

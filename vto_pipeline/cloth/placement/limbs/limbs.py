@@ -105,7 +105,7 @@ class Limbs:
         return level[piece == np.bincount(piece, self._area[level]).argmax()].astype(np.int32)
 
     def ends(self) -> list[IntArray]:
-        """Return the vertices of the end of each limb, as far as a hand or the front of a foot goes, shape (N,) each."""
+        """Return the vertices of the end of each limb, of a hand or the front of a foot, shape (N,) each."""
         least = [self._away[limb.tip] - _END * self._height for limb in self.limbs]
         return [
             np.flatnonzero(limb.members & (self._away >= level)).astype(np.int32)
