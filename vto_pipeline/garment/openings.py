@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
@@ -117,10 +119,13 @@ def close_scan_holes(
     trimmed = thinned if mannequin is None else trim_ledges(thinned, mannequin, config.ledge_mm * 1e-3)
     edge = float(np.median(edge_lengths(trimmed)))
     least_perimeter = config.least_perimeter_mm * 1e-3
-    clean = repair(drop_flaps(trimmed, config.flap_edges * edge, least_perimeter), RepairConfig(weld_mm=0.0), job)
+    reach = config.reach_mm * 1e-3
+    passed = None if distance is None else partial(encloses, distance=distance, reach=reach)
+    whole = drop_flaps(trimmed, config.flap_edges * edge, least_perimeter, passed)
+    clean = repair(whole, RepairConfig(weld_mm=0.0), job)
     bridged, notches = clean, 0
     if distance is not None:
-        bridged, notches = close_notches(clean, distance, bare, least_perimeter, config.reach_mm * 1e-3)
+        bridged, notches = close_notches(clean, distance, bare, least_perimeter, reach)
     worn = _worn_faces(bridged, distance, mannequin, photos, config, job)
     bridged, _ = split_off(bridged, worn)
     clean, unworn = split_off(clean, worn[: len(clean.faces)])
