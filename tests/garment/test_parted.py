@@ -40,19 +40,9 @@ def without_straps(garment: TriangleMesh) -> TriangleMesh:
     return largest(submesh(garment, garment.vertices[garment.faces][..., 1].max(axis=1) < STRAPS)[0])
 
 
-def photographs(folder, garment: TriangleMesh, body: TriangleMesh, cloth=PRINT) -> PosedPhotos:
-    """Sixteen photos from around, half of them from above."""
-    import open3d as o3d
-
-    scene = o3d.t.geometry.RaycastingScene()
-    for mesh in (garment, body):
-        scene.add_triangles(mesh.vertices.astype(np.float32), mesh.faces.astype(np.uint32))
-    rng = np.random.default_rng(0)
-    paint = cloth[rng.integers(0, len(cloth), len(garment.faces))]
-    names, poses, folder = [], [], folder / "photos"
-    folder.mkdir()
-    middle = np.array([0.0, 0.55, 0.0])
-    half_pixel = np.array([[1.0, 0.0, 0.5], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]])
+def around() -> list[np.ndarray]:
+    """Sixteen poses, half of them from above."""
+    middle, poses = np.array([0.0, 0.55, 0.0]), []
     for k in range(16):
         turn, rise = 2.0 * np.pi * k / 16, np.radians(15.0 if k % 2 else 40.0)
         eye = middle + 1.3 * np.array([np.sin(turn) * np.cos(rise), np.sin(rise), np.cos(turn) * np.cos(rise)])
@@ -60,6 +50,23 @@ def photographs(folder, garment: TriangleMesh, body: TriangleMesh, cloth=PRINT) 
         right = np.cross(ahead, [0.0, 1.0, 0.0]) / np.cos(rise)
         pose = np.eye(4)
         pose[:3, :3], pose[:3, 3] = np.column_stack([right, np.cross(ahead, right), ahead]), eye
+        poses.append(pose)
+    return poses
+
+
+def photographs(folder, garment: TriangleMesh, body: TriangleMesh, cloth=PRINT) -> PosedPhotos:
+    """A photo from each pose."""
+    import open3d as o3d
+
+    scene = o3d.t.geometry.RaycastingScene()
+    for mesh in (garment, body):
+        scene.add_triangles(mesh.vertices.astype(np.float32), mesh.faces.astype(np.uint32))
+    rng = np.random.default_rng(0)
+    paint = cloth[rng.integers(0, len(cloth), len(garment.faces))]
+    names, poses, folder = [], around(), folder / "photos"
+    folder.mkdir()
+    half_pixel = np.array([[1.0, 0.0, 0.5], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]])
+    for k, pose in enumerate(poses):
         cam_from_world = np.linalg.inv(pose)
         rays = o3d.t.geometry.RaycastingScene.create_rays_pinhole(
             o3d.core.Tensor(half_pixel @ LENS.matrix),
@@ -74,7 +81,6 @@ def photographs(folder, garment: TriangleMesh, body: TriangleMesh, cloth=PRINT) 
         picture[thing == 0] = paint[face[thing == 0]]
         picture = np.clip(picture * (0.8 + 0.02 * k) + rng.normal(0, 5, picture.shape), 0, 255)  # exposure changes
         names.append(f"{k:02}.png")
-        poses.append(pose)
         cv2.imwrite(str(folder / names[-1]), picture[..., ::-1].astype(np.uint8))
     cameras = CameraSet(tuple(names), (LENS,) * 16, np.array(poses))
     return PosedPhotos(tuple(folder / name for name in names), cameras)

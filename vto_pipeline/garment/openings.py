@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
@@ -16,6 +18,7 @@ from vto_pipeline.garment.photographed.carved import carve_fillings
 from vto_pipeline.garment.photographed.confirmed import LookAgain, confirm_fillings
 from vto_pipeline.garment.photographed.covered import covered_loops
 from vto_pipeline.garment.photographed.parted import refuse_parted, refuse_unseen
+from vto_pipeline.garment.photographed.seen_ends import Scanned, Seen, refuse_unseen_ends
 from vto_pipeline.garment.photographed.sightings import look_at_mannequin
 from vto_pipeline.garment.pierced import open_pierced
 from vto_pipeline.garment.rims import drop_flaps, fair_rims, trim_ledges
@@ -80,6 +83,7 @@ def close_scan_holes(
     bare: BareParts | None = None,
     photos: PosedPhotos | None = None,
     look: LookAgain | None = None,
+    scan: Scanned | None = None,
 ) -> tuple[TriangleMesh, list[Opening], NDArray[np.bool_]]:
     """Fill the scan holes and keep the garment's own openings.
 
@@ -98,13 +102,14 @@ def close_scan_holes(
         bare: What was seen of the bare mannequin, if it is known.
         photos: Of the garment on the mannequin, in its frame: what they show is held beside the result.
         look: Looks in the photos for what was filled; what they confirm counts as observed.
+        scan: All that was scanned, in that frame, and its cameras, which tell what was seen beyond the rims.
 
     Returns:
         The garment; its openings, highest first; which of its vertices were observed, shape (V,).
 
     Raises:
-        GarmentError: another number of openings than expected, a hole that cannot be filled, too little was seen, or
-            cloth was lost that makes several openings of one.
+        GarmentError: another number of openings than expected, a hole that cannot be filled, too little was seen,
+            cloth was lost that makes several openings of one, or nothing was seen beyond a rim.
         InputError: no opening is left that a body could get through.
     """
     job.progress(0.0, "cleaning rims")
@@ -114,10 +119,13 @@ def close_scan_holes(
     trimmed = thinned if mannequin is None else trim_ledges(thinned, mannequin, config.ledge_mm * 1e-3)
     edge = float(np.median(edge_lengths(trimmed)))
     least_perimeter = config.least_perimeter_mm * 1e-3
-    clean = repair(drop_flaps(trimmed, config.flap_edges * edge, least_perimeter), RepairConfig(weld_mm=0.0), job)
+    reach = config.reach_mm * 1e-3
+    passed = None if distance is None else partial(encloses, distance=distance, reach=reach)
+    whole = drop_flaps(trimmed, config.flap_edges * edge, least_perimeter, passed)
+    clean = repair(whole, RepairConfig(weld_mm=0.0), job)
     bridged, notches = clean, 0
     if distance is not None:
-        bridged, notches = close_notches(clean, distance, bare, least_perimeter, config.reach_mm * 1e-3)
+        bridged, notches = close_notches(clean, distance, bare, least_perimeter, reach)
     worn = _worn_faces(bridged, distance, mannequin, photos, config, job)
     bridged, _ = split_off(bridged, worn)
     clean, unworn = split_off(clean, worn[: len(clean.faces)])
@@ -171,13 +179,17 @@ def close_scan_holes(
         unobserved_share=1.0 - seen,
     )
     _check_seen(seen, final, config, job)
+    sightings, answered = None, config.keep is not None or config.expected is not None
     if mannequin is not None and found:
         sightings = None if photos is None else look_at_mannequin(final, observed, mannequin, photos, job)
         if sightings is not None:
             refuse_parted(sightings, final, found, config.keep is not None, job)
         if bare is not None and (photos is None or sightings is not None):
-            answered = config.keep is not None or config.expected is not None
             refuse_unseen(final, found, mannequin, bare, sightings, answered, job)
+    if scan is not None:
+        seen_beyond = Seen(scan, distance, bare, sightings)
+        hardly_told = photos is not None and sightings is None
+        refuse_unseen_ends(final, found, seen_beyond, answered or hardly_told, job)
     warn_of_filled_rims(found, observed, job)
     if bare is not None and pieces > 1:
         warn_of_torn(final, bare, job)

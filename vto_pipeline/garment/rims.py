@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
@@ -17,11 +19,12 @@ from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import (
     boundary_loops,
     edge_faces,
+    edges,
     face_components,
     face_normals,
     submesh,
 )
-from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
 
 LEDGE_COSINE = 0.45
@@ -58,16 +61,20 @@ def trim_ledges(shell: TriangleMesh, mannequin: TriangleMesh, widest: float) -> 
     return without_crumbs(submesh(shell, ~ledge)[0]) if ledge.any() else shell
 
 
-def drop_flaps(shell: TriangleMesh, width: float, shortest: float) -> TriangleMesh:
+def drop_flaps(
+    shell: TriangleMesh, width: float, shortest: float, is_opening: Callable[[FloatArray], bool] | None = None
+) -> TriangleMesh:
     """Return the shell without what hangs on it by less than a width: erode by half of it, keep the large parts of
     each piece, grow back.
 
-    Cloth between small holes hangs on nothing: they will be filled, and much of a patchy scan is such cloth.
+    Cloth between small holes hangs on nothing: they will be filled, and much of a patchy scan is such cloth. A strap is
+    as narrow, but parts two openings: it stays.
 
     Args:
         shell: The cut-out garment.
         width: [m]; with none, nothing is dropped.
         shortest: Shorter loops are holes of the scan [m].
+        is_opening: Tells of a loop (L, 3) whether it is an opening of the garment; None where nothing tells.
     """
     loops = [loop for loop in boundary_loops(shell) if perimeter(shell, loop) >= shortest]
     if not loops or width == 0.0:
@@ -81,7 +88,23 @@ def drop_flaps(shell: TriangleMesh, width: float, shortest: float) -> TriangleMe
     core, source = submesh(shell, kept_faces)
     seeds = source[np.unique(core.faces[large_faces(core, face_components(shell)[1][kept_faces])])]
     reach = distance_from(shell, seeds.astype(np.int32), 8.0 * radius)
-    return without_crumbs(clip_to_positive(shell, 1.5 * radius - np.minimum(reach, 8.0 * radius)))
+    kept = 1.5 * radius - np.minimum(reach, 8.0 * radius)
+    if is_opening is not None:
+        openings = [loop for loop in loops if is_opening(shell.vertices[loop])]
+        kept[_parting(shell, kept < 0.0, openings)] = radius
+    return without_crumbs(clip_to_positive(shell, kept))
+
+
+def _parting(shell: TriangleMesh, among: NDArray[np.bool_], loops: Sequence[IntArray]) -> NDArray[np.bool_]:
+    """Return which vertices of a set belong to patches of it that lie between two of some loops or more, shape (V,)."""
+    pair = edges(shell)
+    pair = pair[among[pair].all(axis=1)]
+    graph = coo_matrix((np.ones(len(pair), np.int8), pair.T), (len(among),) * 2)
+    count, patch = connected_components(graph, directed=False)
+    beside = np.zeros(count, dtype=int)
+    for loop in loops:
+        beside[np.unique(patch[loop])] += 1
+    return np.asarray(among & (beside >= 2)[patch])
 
 
 def fair_rims(shell: TriangleMesh, wavelength: float) -> TriangleMesh:

@@ -9,11 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vto_pipeline.errors import ScanError
+from vto_pipeline.io.captures.depth import frame_color, frame_depth
 from vto_pipeline.model.arrays import ByteArray, FloatArray
 from vto_pipeline.model.camera import Intrinsics
-from vto_pipeline.model.frames import DepthMaps
+from vto_pipeline.model.frames import DepthFrameSet, DepthMaps
 from vto_pipeline.numerics.cpu_threads import in_order
+from vto_pipeline.scan.depth.depth_mask import clean_depth
+from vto_pipeline.scan.object_sphere import Sphere, inside_sphere
 from vto_pipeline.scan.photos.consistency import views_on_surface
+
+GREY = 200
+"""Colour of a surface without photos."""
 
 SAMPLED = 40
 """Maps looked at, evenly spread, to choose the size of voxels and to count them."""
@@ -58,6 +64,35 @@ def depth_only(maps: DepthMaps) -> DepthViews:
     return DepthViews(
         maps.names, maps.intrinsics, maps.world_from_cam, depth_of, lambda _: np.empty((0, 0, 3), np.uint8)
     )
+
+
+def placed(world_from_cam: FloatArray) -> NDArray[np.int_]:
+    """Return which frames have a pose, of transforms (N, 4, 4) that are NaN for those left out."""
+    return np.flatnonzero(np.isfinite(world_from_cam).all(axis=(1, 2)))
+
+
+def frame_views(frames: DepthFrameSet, world_from_cam: FloatArray, sphere: Sphere | None = None) -> DepthViews:
+    """Return the frames of a depth camera as views, without their flying pixels.
+
+    Args:
+        frames: Depth, and colour if there is any.
+        world_from_cam: Poses [m], shape (N, 4, 4); NaN for frames to leave out.
+        sphere: What lies outside of it is left out, too.
+    """
+    used = placed(world_from_cam)
+    camera, poses = frames.intrinsics, world_from_cam[used]
+    plain = np.full((camera.height, camera.width, 3), GREY, np.uint8)
+
+    def depth_of(index: int) -> NDArray[np.float32]:
+        depth = clean_depth(frame_depth(frames, int(used[index])), camera)
+        return depth if sphere is None else inside_sphere(depth, camera, poses[index], sphere)
+
+    def color_of(index: int) -> ByteArray:
+        picture = frame_color(frames, int(used[index]))
+        return plain if picture is None else picture
+
+    names = tuple(frames.depth_paths[k].name for k in used)
+    return DepthViews(names, (camera,) * len(used), poses, depth_of, color_of)
 
 
 def pixel_on_surface(views: DepthViews) -> float:

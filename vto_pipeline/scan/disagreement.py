@@ -1,36 +1,42 @@
-"""How far a surface may be off where there is no truth: how far each depth map that saw it says that it is.
+"""How far a surface may be off where there is no truth: how far either half of the depth maps that saw it says it is.
 
-A map is a measurement of its own, from its own side. Maps of neighbouring photos share some of their errors, so that
-their mean is hardly better than one of them: its distances from the surface stand for the surface's own.
+Maps taken one after the other share most of their errors: of light, slant, and where the camera is thought to be. The
+first and the second half of those that saw a place share few. Where a surface lies in the middle of both, half of their
+difference is its standard error (batch means; Conway 1963), and that is how far it lies from either.
+
+A map's reading of a place is the mean of those around it: a surface is made from the readings of an area, too.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from vto_pipeline.geometry.remeshing.remesh import edge_lengths
+from vto_pipeline.geometry.smooth import neighbour_mean
 from vto_pipeline.geometry.topology import vertex_normals
+from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.scan.depth_views import DepthViews
 
 REACH = 6.0
 """Readings farther from a surface are of another [edge lengths]; an edge is two thirds of a voxel."""
-BINS = 4000
-"""Distances are counted in so many steps up to the reach."""
+PLACES = 10_000
+"""Of the surface that are asked for, evenly among its vertices."""
 QUANTILES = {"median": 0.5, "p95": 0.95}
 
 
 def predicted_error(
     views: DepthViews, surface: TriangleMesh, metres_per_unit: float = 1.0, filled_share: float = 0.0
 ) -> dict[str, float | None] | None:
-    """Return the median and the 95th percentile of the maps' distances from a surface, along its normals [mm].
+    """Return the median and the 95th percentile of a surface's distances from halves of its maps, along normals [mm].
 
     What all maps have in common is not in it: the scale, and how the scan is placed. What was filled counts as farther
     off than all that was seen.
 
     Args:
-        views: Posed depth maps.
+        views: Posed depth maps, in the order in which they were taken.
         surface: Made from them, in their unit.
         metres_per_unit: Of both.
         filled_share: Of the finished surface, what no map saw.
@@ -39,21 +45,43 @@ def predicted_error(
         None where no map has a reading on it; a quantile is None where it lies among what was filled.
     """
     reach = REACH * float(np.median(edge_lengths(surface)))
-    normals, counts = vertex_normals(surface), np.zeros(BINS, np.int64)
+    around = neighbour_mean(surface)[np.unique(np.linspace(0, len(surface.vertices) - 1, PLACES).round().astype(int))]
+    read = np.unique(around.indices)
+    points, normals, around = surface.vertices[read], vertex_normals(surface)[read], around[:, read]
+    readings = np.empty((len(views.names), around.shape[0]), np.float32)
     for index, depth in views.depths():
-        pose = np.ascontiguousarray(views.world_from_cam[index])
-        _count(surface.vertices, normals, depth, views.intrinsics[index].matrix, pose, reach, counts)
-    if not counts.any():
+        pose, found = np.ascontiguousarray(views.world_from_cam[index]), np.full(len(read), np.nan)
+        _read(points, normals, depth, views.intrinsics[index].matrix, pose, reach, found)
+        readings[index] = around @ found
+    away = _halves_away(readings)
+    if len(away) == 0:
         return None
-    share = (1.0 - filled_share) * np.cumsum(counts) / counts.sum()
-    step = 1e3 * metres_per_unit * reach / BINS
-    found = {name: int(np.searchsorted(share, q)) for name, q in QUANTILES.items()}
-    return {name: round(step * (k + 0.5), 3) if k < BINS else None for name, k in found.items()}
+    seen, scale = 1.0 - filled_share, 1e3 * metres_per_unit
+    return {
+        name: round(scale * float(np.quantile(away, q / seen)), 3) if q < seen else None
+        for name, q in QUANTILES.items()
+    }
+
+
+def _halves_away(readings: NDArray[np.float32]) -> FloatArray:
+    """Return how far the halves of the readings (C, N) of each place are off in their means [m], one or two a place."""
+    known = np.isfinite(readings)
+    rank, count = np.cumsum(known, axis=0), known.sum(axis=0)
+    early = known & (rank <= (count + 1) // 2)
+    away = []
+    for half in (early, known & ~early):
+        number = half.sum(axis=0)
+        total = np.sum(readings, axis=0, where=half, dtype=float)
+        away.append(np.abs(total[number > 0] / number[number > 0]))
+    return np.concatenate(away)
 
 
 @njit(cache=True, nogil=True)
-def _count(points, normals, depth, matrix, world_from_cam, reach, counts):  # type: ignore[no-untyped-def]  # Numba
-    """Count a map's distances from points along their normals, where the map is known on all four sides of a point."""
+def _read(points, normals, depth, matrix, world_from_cam, reach, found):  # type: ignore[no-untyped-def]  # Numba
+    """Write a map's signed distances from points along their normals, where it is known on all four sides of a point.
+
+    What is nearer to the camera is positive.
+    """
     height, width = depth.shape
     turn, eye = world_from_cam[:3, :3], world_from_cam[:3, 3]
     for n in range(len(points)):
@@ -75,5 +103,4 @@ def _count(points, normals, depth, matrix, world_from_cam, reach, counts):  # ty
         lower = (1 - s) * corners[1, 0] + s * corners[1, 1]
         measured = (1 - t) * upper + t * lower
         if abs(measured - w) < reach:
-            away = abs((measured / w - 1.0) * along)
-            counts[min(int(away / reach * len(counts)), len(counts) - 1)] += 1
+            found[n] = (measured / w - 1.0) * along

@@ -6,12 +6,10 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from vto_pipeline.errors import ScanError
 from vto_pipeline.geometry.topology import component_areas
-from vto_pipeline.io.captures.depth import frame_color, frame_depth
 from vto_pipeline.io.captures.images import read_image
 from vto_pipeline.io.captures.undistort import undistorted
 from vto_pipeline.model.arrays import ByteArray, FloatArray
@@ -21,16 +19,18 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import PointCloud, TriangleMesh
 from vto_pipeline.model.settings import Config
 from vto_pipeline.scan.canonical import drop_small_pieces, drop_vertices
-from vto_pipeline.scan.depth.depth_mask import clean_depth
-from vto_pipeline.scan.depth_views import DepthViews, depth_only, pixel_on_surface, supporting_views
-from vto_pipeline.scan.disagreement import predicted_error
+from vto_pipeline.scan.depth_views import (
+    DepthViews,
+    depth_only,
+    frame_views,
+    pixel_on_surface,
+    placed,
+    supporting_views,
+)
 from vto_pipeline.scan.level_set import count_blocks, level_set
 from vto_pipeline.scan.library_message import library_message
-from vto_pipeline.scan.object_sphere import inside_sphere, object_sphere
+from vto_pipeline.scan.object_sphere import object_sphere
 from vto_pipeline.scan.photos.coverage import covered_share
-
-GREY = 200
-"""Colour of a surface without photos."""
 
 MAX_BLOCKS = 10_000
 """0.8 GB of distances, weights and colours; a scene that needs more gets coarser voxels."""
@@ -135,33 +135,12 @@ def fuse_depth_frames(frames: DepthFrameSet, world_from_cam: FloatArray, config:
     Raises:
         ScanError: no surface came out.
     """
-    used = np.flatnonzero(np.isfinite(world_from_cam).all(axis=(1, 2)))
-    camera, poses = frames.intrinsics, world_from_cam[used]
-    plain = np.full((camera.height, camera.width, 3), GREY, np.uint8)
-    sphere = object_sphere(poses)
+    sphere = object_sphere(world_from_cam[placed(world_from_cam)])
     if sphere is None:
         job.note("the frames do not look at one place from around: all that they see is fused")
     else:
         job.note(f"fused what is within {sphere.radius:.2f} m of the place that the frames look at")
-
-    def depth_of(index: int) -> NDArray[np.float32]:
-        depth = clean_depth(frame_depth(frames, int(used[index])), camera)
-        return depth if sphere is None else inside_sphere(depth, camera, poses[index], sphere)
-
-    def color_of(index: int) -> ByteArray:
-        picture = frame_color(frames, int(used[index]))
-        return plain if picture is None else picture
-
-    views = DepthViews(
-        tuple(frames.depth_paths[k].name for k in used),
-        (camera,) * len(used),
-        poses,
-        depth_of,
-        color_of,
-    )
-    surface = _fuse(views, config, job)
-    job.measure(predicted_error_mm=predicted_error(views, surface))
-    return surface
+    return _fuse(frame_views(frames, world_from_cam, sphere), config, job)
 
 
 def _fuse(views: DepthViews, config: FuseConfig, job: Job) -> TriangleMesh:

@@ -18,6 +18,7 @@ from vto_pipeline.garment.openings import OpeningsConfig, close_scan_holes, list
 from vto_pipeline.garment.pattern.embed import in_shape
 from vto_pipeline.garment.pattern.sew import SewConfig, sew
 from vto_pipeline.garment.photographed.confirmed import LookAgain
+from vto_pipeline.garment.photographed.seen_ends import Scanned
 from vto_pipeline.garment.simulation_mesh import SimulationMeshConfig, remesh_for_simulation
 from vto_pipeline.garment.subtraction.estimated import label_over_estimate
 from vto_pipeline.garment.subtraction.subtract import SubtractConfig, extract_garment, label_garment
@@ -28,10 +29,12 @@ from vto_pipeline.geometry.rigid import transform_cameras, transform_mesh
 from vto_pipeline.geometry.topology import concatenate
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Avatar
+from vto_pipeline.model.camera import CameraSet
 from vto_pipeline.model.garment import SurfaceLabels
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.pipeline.stage import Stage
+from vto_pipeline.scan.depth_views import frame_views
 from vto_pipeline.scan.photos.rematch.fillings import look_at_fillings
 from vto_pipeline.scan.texture.project import TextureConfig, texture_surface
 
@@ -75,10 +78,22 @@ def _openings(inputs: Inputs, settings: OpeningsConfig, job: Job) -> Outputs:
         if "garment_photos" in inputs and "garment_cameras" in inputs:
             cameras = transform_cameras(inputs["garment_cameras"], placement)
             photos = PosedPhotos(inputs["garment_photos"].paths, cameras)
-    look = _look_at_fillings(inputs, settings, job)
+    look, scan = _look_at_fillings(inputs, settings, job), _scanned(inputs)
     shell = inputs["garment_shell"]
-    garment, openings, observed = close_scan_holes(shell, mannequin, settings, job, bare, photos, look)
+    garment, openings, observed = close_scan_holes(shell, mannequin, settings, job, bare, photos, look, scan)
     return {"garment": garment, "openings": openings, "observed": observed}
+
+
+def _scanned(inputs: Inputs) -> Scanned | None:
+    """Return the whole scan and its cameras in the frame of the garment; None where they are not known."""
+    cameras, frames = inputs.get("garment_cameras"), inputs.get("garment_depth")
+    if frames is not None and "garment_trajectory" in inputs:
+        views = frame_views(frames, inputs["garment_trajectory"])
+        cameras = CameraSet(views.names, views.intrinsics, views.world_from_cam)
+    if cameras is None or "garment_surface" not in inputs:
+        return None
+    placement = inputs.get("garment_placement", np.eye(4))
+    return Scanned(transform_mesh(inputs["garment_surface"], placement), transform_cameras(cameras, placement))
 
 
 def _look_at_fillings(inputs: Inputs, settings: OpeningsConfig, job: Job) -> LookAgain | None:
@@ -186,13 +201,15 @@ STAGES: tuple[Stage, ...] = (
             "garment_surface",
             "garment_placement",
             "labels",
+            "garment_depth",
+            "garment_trajectory",
             *LOOK,
         ),
         idle=_idle_look,
         makes=("garment", "openings", "observed"),
         run=_openings,
         settings=OpeningsConfig,
-        uses=("libigl", "opencv-python-headless"),
+        uses=("libigl", "opencv-python-headless", "open3d"),
     ),
     Stage(
         name="texture",

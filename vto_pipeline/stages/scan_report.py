@@ -6,13 +6,17 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vto_pipeline.avatar.standing import warn_of_misread_unit
+from vto_pipeline.geometry.rigid import transform_mesh
 from vto_pipeline.geometry.topology import submesh
+from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
 from vto_pipeline.pipeline.stage import Stage
-from vto_pipeline.scan.depth_views import depth_only
+from vto_pipeline.scan.depth_views import DepthViews, depth_only, frame_views
 from vto_pipeline.scan.disagreement import predicted_error
 from vto_pipeline.stages.roles import ROLES
 
@@ -53,7 +57,7 @@ def scan_report(
             source = _SOURCES.get(name, source)
     source = said.get("scale_source", source)
     unit = said.get("metres_per_unit", 1.0 if surface_is_metric else None)
-    error = said.get("predicted_error_mm")
+    error = None
     if error_of is not None and unit is not None:
         error = error_of(unit, said.get("unobserved_share") or 0.0)
     if error is not None and unit is not None:
@@ -88,17 +92,17 @@ def _with_scale(error: Mapping[str, float | None], sigma: float) -> dict[str, fl
 def _stage(role: str) -> Stage:
     def run(inputs: Inputs, settings: Config, job: Job) -> Outputs:
         surface, record = inputs[f"{role}_surface"], inputs["run_record"]
-        maps, labels = inputs.get(f"{role}_depth_maps"), inputs.get("labels")
+        views = _views(inputs, role)
         if role == "body" and surface.metric:
             warn_of_misread_unit(surface, job)
-        if maps is None:
+        if views is None:
             return {f"{role}_scan_report": scan_report(role, surface.metric, record)}
-        if role == "garment" and labels is not None and len(labels.garment) == len(surface.vertices):
-            surface, _ = submesh(surface, labels.garment[surface.faces].all(axis=1))
+        if role == "garment" and "garment" in inputs:
+            surface = _seen_of(inputs["garment"], inputs["observed"], inputs.get("garment_placement"))
         lever = float(np.median(np.linalg.norm(surface.vertices - surface.vertices.mean(axis=0), axis=1)))
 
         def error_of(unit: float, filled: float) -> Mapping[str, float | None] | None:
-            return predicted_error(depth_only(maps), surface, unit, filled)
+            return predicted_error(views, surface, unit, filled)
 
         return {f"{role}_scan_report": scan_report(role, surface.metric, record, error_of, lever)}
 
@@ -106,11 +110,29 @@ def _stage(role: str) -> Stage:
         name=f"{role}.scan_report",
         about="how good the scan is, as far as it can tell itself",
         needs=(f"{role}_surface",),
-        optional=(f"{role}_depth_maps", *(("labels",) if role == "garment" else ())),
+        optional=(
+            *(f"{role}_{name}" for name in ("depth_maps", "depth", "trajectory")),
+            *(("garment", "observed", "garment_placement") if role == "garment" else ()),
+        ),
         makes=(f"{role}_scan_report",),
         run=run,
         final=True,
     )
+
+
+def _seen_of(garment: TriangleMesh, observed: NDArray[np.bool_], garment_from_scan: FloatArray | None) -> TriangleMesh:
+    """Return what was seen (V,) of a finished garment, in the frame of the scan."""
+    seen, _ = submesh(garment, np.all(observed[garment.faces], axis=1))
+    return seen if garment_from_scan is None else transform_mesh(seen, np.asarray(np.linalg.inv(garment_from_scan)))
+
+
+def _views(inputs: Inputs, role: str) -> DepthViews | None:
+    """Return the depth maps that the surface was made from; None where it was made from none."""
+    if f"{role}_depth_maps" in inputs:
+        return depth_only(inputs[f"{role}_depth_maps"])
+    if f"{role}_depth" in inputs and f"{role}_trajectory" in inputs:
+        return frame_views(inputs[f"{role}_depth"], inputs[f"{role}_trajectory"])
+    return None
 
 
 STAGES: tuple[Stage, ...] = tuple(_stage(role) for role in ROLES)
