@@ -93,6 +93,10 @@ class FallenError(SimulationError):
     """Nothing holds the garment: it fell off the body."""
 
 
+class JammedError(SimulationError):
+    """Contacts hold the cloth with forces that no waiting takes away."""
+
+
 class IntersectingError(SimulationError):
     """The result still passes through the body or itself."""
 

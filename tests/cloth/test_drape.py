@@ -2,6 +2,7 @@
 
 import itertools
 import time
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -13,7 +14,8 @@ import vto_pipeline.cloth.drape as drape_module
 import vto_pipeline.cloth.rest.phases as phases_module
 from vto_pipeline.cloth.drape import drape
 from vto_pipeline.cloth.placement.collision_free_start import Start
-from vto_pipeline.errors import ConfigError, IntersectingError
+from vto_pipeline.cloth.rest.multiresolution import come_to_rest
+from vto_pipeline.errors import ConfigError, IntersectingError, JammedError
 from vto_pipeline.geometry.intersections import intersecting_faces, meeting_vertices, self_intersections
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.garment import Garment, RestShape
@@ -176,6 +178,26 @@ def test_what_cannot_be_cleared_is_an_error_with_places_and_the_partial_result()
         drape(plug, pear(), fabric(), {**hopeless, "settle_seconds": 0.1})
     partial = caught.value.partial
     assert partial["audit"]["body_intersections"] == len(intersecting_faces(partial["draped"], pear())) > 0
+
+
+@pytest.mark.parametrize(("jammed", "times"), [(True, 2.5), (True, 1.5), (False, 2.5)])
+def test_jammed_cloth_is_refused_where_it_is_stretched_as_none_can_be(monkeypatch, jammed, times):
+    """A vest larger than the pear by so much, which is clear of it."""
+
+    def stretched(*given):
+        reached = come_to_rest(*given)
+        state = replace(reached.settling.state, positions=times * reached.settling.state.positions)
+        return reached._replace(settling=replace(reached.settling, state=state, settled=False, jammed=jammed))
+
+    monkeypatch.setattr(drape_module, "come_to_rest", stretched)
+    if not jammed or times < 2.0:
+        assert drape(vest(), pear(), fabric(bending=1e-5), QUICK).audit["max_stretch"] > 0.4
+        return
+    with pytest.raises(JammedError, match=r"the cloth is jammed: .* stretched by up to 1[0-9][0-9]%") as caught:
+        drape(vest(), pear(), fabric(bending=1e-5), QUICK)
+    partial = caught.value.partial
+    assert set(partial) == {"draped", "audit", "trace"}
+    assert partial["audit"]["max_stretch"] > 1.0
 
 
 def test_settings_are_checked():

@@ -17,10 +17,11 @@ from vto_pipeline.cloth.judge.limits import warn_beyond_limits
 from vto_pipeline.cloth.judge.residual import covers_all_energies
 from vto_pipeline.cloth.judge.too_small import warn_if_too_small
 from vto_pipeline.cloth.model.settings import checked
+from vto_pipeline.cloth.placement.clear_body import OVERSTRETCHED
 from vto_pipeline.cloth.placement.place import place_garment
 from vto_pipeline.cloth.placement.transfer import transfer_deformation
 from vto_pipeline.cloth.rest.multiresolution import come_to_rest
-from vto_pipeline.errors import DivergedError, FallenError, IntersectingError
+from vto_pipeline.errors import DivergedError, FallenError, IntersectingError, JammedError
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.cloth import Draped, seconds_within
 from vto_pipeline.model.fabric import Fabric
@@ -63,6 +64,7 @@ def drape(
         InputError: the garment is none for a body of this size, in whatever unit, or the fabric no material.
         IntersectingError: triangles still cross; `partial` holds the mesh as "draped", "audit" and "trace". Or a limb
             goes through cloth from the start; it holds the start as "draped".
+        JammedError: cloth is held between contacts, stretched as none can be; `partial` holds the same.
         DivergedError, FallenError: positions are no longer finite, or it fell off the body; `partial` holds the mesh as
             it began, as "draped".
     """
@@ -121,7 +123,10 @@ def drape(
     )
     if not settling.settled:
         job.warn(settling.not_settled_warning)
-    refuse_crossings(findings, {"draped": draped, "audit": findings, "trace": tuple(settling.trace)})
+    partial = {"draped": draped, "audit": findings, "trace": tuple(settling.trace)}
+    refuse_crossings(findings, partial)
+    if settling.jammed:
+        refuse_overstretched(findings, partial)
     return Draped(draped, state.velocities, None, tuple(settling.trace), findings)
 
 
@@ -166,6 +171,26 @@ def refuse_crossings(findings: Mapping[str, object], partial: Mapping[str, objec
         raise IntersectingError(
             "; ".join(crossing),
             hint="check that the garment is the right way up and large enough; or raise skin_mm or clear_rounds",
+            partial=partial,
+        )
+
+
+def refuse_overstretched(findings: Mapping[str, object], partial: Mapping[str, object]) -> None:
+    """Raise an error if jammed cloth is stretched as none can be: that is no rest, and no picture of how it fits.
+
+    Args:
+        findings: Of an audit: the largest stretch beyond rest, and the residual force as a share of weight.
+        partial: What was reached, artifact -> value.
+
+    Raises:
+        JammedError: it is.
+    """
+    stretch, residual = findings["max_stretch"], findings["residual"]
+    assert isinstance(stretch, float)
+    if 1.0 + stretch > OVERSTRETCHED:
+        raise JammedError(
+            f"the cloth is jammed: forces of {residual:.0f} times its weight, stretched by up to {stretch:.0%}",
+            hint="it is too small for this body, or was put on it in a wrong place: look at what was reached",
             partial=partial,
         )
 
