@@ -2,14 +2,15 @@
 
 import numpy as np
 import pytest
-from cloth_scenes import ball, tube
+from cloth_scenes import ball, moved, tube
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
 from vto_pipeline.cloth.placement.body_growth import plan_body_growth
 from vto_pipeline.cloth.placement.flexible_escape import escape_flexibly
 from vto_pipeline.cloth.placement.rigid_escape import escape_rigidly
-from vto_pipeline.geometry.intersections import intersecting_faces
+from vto_pipeline.cloth.placement.rigidity import Rigidity
+from vto_pipeline.geometry.intersections import intersecting_faces, self_intersections
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import edges
 from vto_pipeline.model.job import Job
@@ -64,6 +65,36 @@ def test_a_straight_leg_is_led_about_a_bent_one_with_hardly_a_change_of_lengths(
     was, now = (np.linalg.norm(np.diff(x[ends], axis=1)[:, 0], axis=1) for x in (garment.vertices, led))
     assert_allclose(np.median(now / was), 1.0, rtol=0.01)  # bent, not stretched
     assert_allclose(now / was, 1.0, rtol=0.35)  # but for the wrinkles of the knee
+
+
+def worn_over(one, other):
+    """Two garments as one mesh."""
+    faces = np.vstack([one.faces, other.faces + np.int32(len(one.vertices))])
+    return TriangleMesh(np.vstack([one.vertices, other.vertices]), faces)
+
+
+@pytest.mark.parametrize("bend", [-0.5, 0.5])
+def test_what_lies_on_a_leg_is_led_with_it_and_does_not_cross_it(bend):
+    """A band about the knee, 4 mm outside, of which nothing is in the body: it would stay, and the leg would not."""
+    leg = trouser_leg()
+    both = worn_over(leg, tube(0.069, 0.15, AROUND, 12, base=0.38))
+    led = escape_flexibly(limb(bend), both)
+    assert len(self_intersections(TriangleMesh(led, both.faces))) == 0
+    inner, outer = led[: len(leg.vertices)], led[len(leg.vertices) :]
+    assert np.linalg.norm(inner - leg.vertices, axis=1).max() > 0.03
+    away = SurfaceDistance(TriangleMesh(inner, leg.faces)).nearest(outer).distance
+    assert away.min() > 0.002
+    assert away.max() < 0.007
+
+
+def test_legs_that_face_each_other_go_their_own_ways():
+    """Two tubes 5 mm apart, of which one is asked to go aside."""
+    leg = trouser_leg()
+    both = worn_over(leg, moved(leg, 0.135, 0.0, 0.0))
+    one = np.arange(len(both.vertices)) < len(leg.vertices)
+    wanted = both.vertices - np.outer(one, [0.1, 0.0, 0.0])
+    led = Rigidity(both).follow(both.vertices, wanted, np.where(one, 1.0, 1e-3))
+    assert_allclose(led, wanted, rtol=0, atol=1e-9)
 
 
 def test_a_garment_with_no_cloth_in_the_body_stays():
