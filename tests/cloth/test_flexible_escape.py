@@ -12,7 +12,7 @@ from vto_pipeline.cloth.placement.rigid_escape import escape_rigidly
 from vto_pipeline.cloth.placement.rigidity import Rigidity
 from vto_pipeline.geometry.intersections import intersecting_faces, self_intersections
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import edges
+from vto_pipeline.geometry.topology import concatenate, edges
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
@@ -67,17 +67,11 @@ def test_a_straight_leg_is_led_about_a_bent_one_with_hardly_a_change_of_lengths(
     assert_allclose(now / was, 1.0, rtol=0.35)  # but for the wrinkles of the knee
 
 
-def worn_over(one, other):
-    """Two garments as one mesh."""
-    faces = np.vstack([one.faces, other.faces + np.int32(len(one.vertices))])
-    return TriangleMesh(np.vstack([one.vertices, other.vertices]), faces)
-
-
 @pytest.mark.parametrize("bend", [-0.5, 0.5])
 def test_what_lies_on_a_leg_is_led_with_it_and_does_not_cross_it(bend):
     """A band about the knee, 4 mm outside, of which nothing is in the body: it would stay, and the leg would not."""
     leg = trouser_leg()
-    both = worn_over(leg, tube(0.069, 0.15, AROUND, 12, base=0.38))
+    both = concatenate([leg, tube(0.069, 0.15, AROUND, 12, base=0.38)])
     led = escape_flexibly(limb(bend), both)
     assert len(self_intersections(TriangleMesh(led, both.faces))) == 0
     inner, outer = led[: len(leg.vertices)], led[len(leg.vertices) :]
@@ -90,7 +84,7 @@ def test_what_lies_on_a_leg_is_led_with_it_and_does_not_cross_it(bend):
 def test_legs_that_face_each_other_go_their_own_ways():
     """Two tubes 5 mm apart, of which one is asked to go aside."""
     leg = trouser_leg()
-    both = worn_over(leg, moved(leg, 0.135, 0.0, 0.0))
+    both = concatenate([leg, moved(leg, 0.135, 0.0, 0.0)])
     one = np.arange(len(both.vertices)) < len(leg.vertices)
     wanted = both.vertices - np.outer(one, [0.1, 0.0, 0.0])
     led = Rigidity(both).follow(both.vertices, wanted, np.where(one, 1.0, 1e-3))
