@@ -28,6 +28,22 @@ def sheet(columns, rows, width, height, upright=True):
     return TriangleMesh(points, np.vstack([one, two]).astype(np.int32))
 
 
+def across_a_ridge(room, poke):
+    """Cloth with edges of 30 mm, and a ridge that stands out of it by `poke`, `room` below a wall [m].
+
+    No vertex of the cloth lies on the ridge.
+    """
+    ridge = trimesh.creation.box([0.1, 0.1, 0.17])
+    ridge.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 4, [0.0, 0.0, 1.0]))
+    ridge.apply_translation([0.0, -np.sqrt(0.005), 0.0])
+    wall = trimesh.creation.box([0.2, 0.05, 0.17])
+    wall.apply_translation([0.0, room + 0.025, 0.0])
+    both = trimesh.util.concatenate([ridge, wall]).subdivide().subdivide().subdivide()
+    cloth = sheet(9, 9, 0.24, 0.24, upright=False)
+    cloth = TriangleMesh(cloth.vertices - np.array([0.111, poke, 0.12]), cloth.faces)
+    return cloth, TriangleMesh(np.array(both.vertices), np.array(both.faces, np.int32))
+
+
 def tube(radius, height, around, along, base=0.0):
     """An open cylinder about the y axis, outward normals, with staggered rings."""
     angle = np.add.outer(0.5 * (np.arange(along) % 2), np.arange(around)) * 2 * np.pi / around

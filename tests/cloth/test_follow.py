@@ -1,15 +1,17 @@
 """A garment that is carried through its body's motion: frames of reference, friction, steps, interruptions."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from cloth_scenes import ball, fabric
+from cloth_scenes import across_a_ridge, ball, fabric
 from ipc_judge import crosses, self_crosses
 from numpy.testing import assert_allclose, assert_array_equal
 
 from vto_pipeline.cloth import MeshCollider, simulate
 from vto_pipeline.cloth.model.build import build_cloth
+from vto_pipeline.cloth.moving import frame as frame_module
 from vto_pipeline.cloth.moving.config import FollowConfig
 from vto_pipeline.cloth.moving.follow import follow
 from vto_pipeline.cloth.moving.frame import FrameStepper
@@ -139,6 +141,43 @@ def test_a_spike_that_no_attempt_gets_cloth_over_leaves_it_clear_of_the_body(cap
     assert found["max_stretch"] < 0.1
 
 
+def test_a_patch_that_has_come_through_the_cap_under_it_is_led_out_again(cap):
+    """Contacts alone would hold it there: they keep each vertex on the side of the cloth where they find it."""
+    top = cap.mesh.vertices[:, 1] > 0.9 * cap.mesh.vertices[:, 1].max()
+    patch = submesh(cap.mesh, top[cap.mesh.faces].all(axis=1))[0]
+    upper = patch.vertices + 0.004 * patch.vertices / np.linalg.norm(patch.vertices, axis=1, keepdims=True)
+    count = len(cap.mesh.vertices)
+    places, faces = np.vstack([cap.mesh.vertices, upper]), np.vstack([cap.mesh.faces, patch.faces + count])
+    both = Garment(TriangleMesh(places, faces), RestShape(np.vstack([cap.rest.positions, patch.vertices])))
+    still = path(lambda t, x: x, 0.2)
+    stepper = FrameStepper(build_cloth(both.mesh, both.rest, cloth()), both, still, cloth(), FollowConfig(), Job())
+    through = places.copy()
+    through[count + np.argmax(upper[:, 1]), 1] -= 0.006
+    assert self_crosses(TriangleMesh(through, faces))
+    stepper.now = stepper.now._replace(state=replace(stepper.now.state, positions=through))
+    for frame in (1, 2):
+        assert stepper.go_to(frame).attempts == 1
+        sheets = TriangleMesh(stepper.now.state.positions, faces)
+        assert not self_crosses(sheets)
+        assert not crosses(sheets, stepper.body_at(still.time(frame)))
+    assert np.abs(sheets.vertices - places).max() < 0.006  # it has not been thrown about
+
+
+def test_what_contacts_leave_across_a_ridge_is_lifted_off_it_by_little(monkeypatch):
+    """The ridge stands out by half a millimetre, 2 mm below a wall; half an edge at once went 34 mm."""
+    sheet, body = across_a_ridge(2e-3, 5e-4)
+    still = BodyPath(lambda t: np.array(body.vertices), body.faces, 6, 1 / FPS)
+    garment = Garment(sheet, RestShape(sheet.vertices))
+    config = FollowConfig(skin_mm=0.3, attempts=1)  # so thin that the body need not give way
+    stepper = FrameStepper(build_cloth(sheet, garment.rest, cloth()), garment, still, cloth(), config, Job())
+    monkeypatch.setattr(stepper._stepper, "run", lambda state, seconds: replace(state, time=state.time + seconds))
+    stepper.go_to(1)
+    after = TriangleMesh(stepper.now.state.positions, sheet.faces)
+    assert crosses(sheet, body)
+    assert not crosses(after, body)
+    assert np.linalg.norm(after.vertices - sheet.vertices, axis=1).max() < 2e-3
+
+
 def test_a_frame_with_cloth_in_skin_that_gave_way_though_it_was_free_is_tried_again_in_thicker_skin(cap, monkeypatch):
     """And no longer than that helps."""
     still = path(lambda t, x: x, 0.2)
@@ -152,6 +191,18 @@ def test_a_frame_with_cloth_in_skin_that_gave_way_though_it_was_free_is_tried_ag
     assert_array_equal(thicker, np.sort(cap.mesh.faces[0]))
     assert stepper.go_to(2).attempts == 2
     assert not answers
+
+
+def test_thicker_skin_that_brings_cloth_back_into_the_body_ends_the_attempts(cap, monkeypatch):
+    """Only the skin as posed is still in the way after the first attempt; a thicker skin makes it worse."""
+    still = path(lambda t, x: x, 0.2)
+    stepper = FrameStepper(build_cloth(cap.mesh, cap.rest, cloth()), cap, still, cloth(), FollowConfig(), Job())
+    one = np.array([[0, 0]], np.int32)
+    crossing = [one[:0], one]
+    monkeypatch.setattr(frame_module, "intersecting_faces", lambda *_: crossing.pop(0))
+    monkeypatch.setattr(stepper.body, "crossing_with_room", lambda *_: one)
+    assert stepper.go_to(1).attempts == 2
+    assert not crossing
 
 
 def test_half_the_step_gives_the_same_motion(cap):

@@ -2,7 +2,8 @@
 
 A frame is taken from where the last one ended. If triangles of the cloth then meet the body, the skin of their vertices
 thickens and the frame is tried again; if the cloth overstretches or blows up, it is tried again in half the steps. The
-skin thins out again as the body moves on, to what the drape needed.
+skin thins out again as the body moves on, to what the drape needed. Cloth that then still passes through the body or
+through itself is untangled: contacts would keep it as it is from frame to frame.
 
 What cloth must not meet is the body as it gives way. Where that leaves a free place as posed, cloth is kept out of the
 posed skin, too, if further attempts bring it out.
@@ -29,11 +30,11 @@ from vto_pipeline.cloth.moving.frame_audit import stretch_of_edges
 from vto_pipeline.cloth.moving.path_collider import PathCollider
 from vto_pipeline.cloth.moving.skins import draped_skin, thickened
 from vto_pipeline.cloth.simulation import default_skin
-from vto_pipeline.cloth.untangle import untangle
+from vto_pipeline.cloth.untangle import Untangled, untangle
 from vto_pipeline.errors import DivergedError
-from vto_pipeline.geometry.intersections import intersecting_faces
+from vto_pipeline.geometry.intersections import intersecting_faces, self_intersections
 from vto_pipeline.geometry.topology import laid_edge_lengths
-from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.fabric import Fabric
 from vto_pipeline.model.garment import Garment
 from vto_pipeline.model.job import Job
@@ -43,6 +44,7 @@ from vto_pipeline.model.motion import BodyPath
 _THINS_S = 0.5  # s in which the skin loses half of what it is thicker by,
 _PACE_M_S = 0.2  # while the body moves as fast; more slowly where it is slower: held, it needs what it needed
 _CLEAR_M = 5e-4  # from the body, of what is untangled
+_GENTLY = 0.1  # of an edge: how far a round of that pushes first; folds that close on cloth have no room for more
 _FINER = 2  # times as many steps where the cloth overstretches
 
 
@@ -89,13 +91,11 @@ class Reached(NamedTuple):
     """How a frame was reached.
 
     Args:
-        crossing: Pairs of triangles of cloth and body that meet, shape (K, 2).
         steps: Taken, in the attempt that was kept.
         attempts: How many there were.
         why: What went wrong in the last of them, in words; empty where nothing did.
     """
 
-    crossing: IntArray
     steps: int
     attempts: int
     why: str = ""
@@ -155,15 +155,15 @@ class FrameStepper:
     def go_to(self, frame: int) -> Reached:
         """Take the garment from one frame to the next, this one, where `now` then is.
 
-        Where no attempt is clean, the one with the fewest crossings is untangled from the body. Where all of them
-        overstretch the cloth or blow it up, it stays where it was, and `why` says so.
+        Where no attempt is clean, the one with the fewest crossings is untangled. Where all of them overstretch the
+        cloth or blow it up, it stays where it was, and `why` says so.
         """
         time = self._path.time(frame)
         begin, body = self.now, self.body_at(time)
         self._collider.crosses_itself = self.body.crosses_itself(frame)
         travel, skin = self._travel(begin, time), begin.skin.copy()
         substeps = self._steps_by_travel(travel, time - begin.state.time)
-        best: tuple[tuple[int, int], Moment, Reached] | None = None
+        best: tuple[tuple[int, int], Moment, int] | None = None
         why, tried, left = "", 0, 0.5 ** (min(time - begin.state.time, travel / _PACE_M_S) / _THINS_S)
         for attempt in range(1, self._config.attempts + 1):
             tried = attempt
@@ -180,14 +180,14 @@ class FrameStepper:
             if stretch > self._stretched:
                 why, substeps = f"an edge has {1.0 + stretch:.1f} times its length at rest", self._finer(substeps)
                 continue
-            count = len(crossing), len(in_posed)
-            better = best is None or count < best[0]
-            if better:
+            count = len(crossing) + len(self_intersections(cloth)), len(in_posed)
+            if best is None or count < best[0]:
                 thinner = self._skin + left * (skin - self._skin)
                 moment = Moment(state, thinner, self._stepper.contact_memory, self._collider.recollection)
-                reached = Reached(crossing, self._stepper.steps - taken, attempt)
-                best = count, moment, reached
-            if count == (0, 0) or (count[0] == 0 and not better):
+                best = count, moment, self._stepper.steps - taken
+            elif best[0][0] == 0:  # clear of the body: still thicker skin leads to nothing better
+                break
+            if count == (0, 0):
                 break
             before, meeting = skin, self._model.faces[np.concatenate([crossing, in_posed])[:, 0]]
             skin = thickened(before, np.unique(meeting), state.positions, body)
@@ -195,18 +195,23 @@ class FrameStepper:
                 break
         if best is None:
             self.now = begin
-            return Reached(np.empty((0, 2), np.int32), 0, tried, why)
-        _, self.now, reached = best
-        if len(reached.crossing) > 0:
-            reached = reached._replace(crossing=self._untangled(body))
-        return reached._replace(attempts=tried)
+            return Reached(0, tried, why)
+        count, self.now, steps = best
+        if count[0] > 0:
+            self._untangle(body)
+        return Reached(steps, tried)
 
-    def _untangled(self, body: TriangleMesh) -> IntArray:
-        """Move the cloth out of the body, as little as needed, and keep its speed; return what still meets (K, 2)."""
+    def _untangle(self, body: TriangleMesh) -> None:
+        """Move the cloth out of the body and of itself, as little as needed, and keep its speed."""
         state = self.now.state
-        found = untangle(state.positions, self._model.faces, body=body, thickness=_CLEAR_M)
-        self.now = self.now._replace(state=replace(state, positions=found.positions))
-        return found.body_pairs
+
+        def found(step: float | None) -> Untangled:
+            return untangle(state.positions, self._model.faces, body=body, thickness=_CLEAR_M, step=step)
+
+        best = found(_GENTLY * self._model.edge_length)
+        if best.crossings_left > 0:
+            best = min(best, found(None), key=lambda one: one.crossings_left)
+        self.now = self.now._replace(state=replace(state, positions=best.positions))
 
     def _finer(self, substeps: float) -> float:
         return min(_FINER * substeps, max(self._config.finest, substeps))

@@ -34,7 +34,7 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.numerics.spatial import bvh
 
-_STEP = 0.5  # of the mean edge: how far a round pushes
+_STEP = 0.5  # of the mean edge: how far a round pushes by default
 _SWEEPS = 20  # of the relaxation, each round
 _PATIENCE = 24  # rounds without a better one
 _KINKED = 4  # such rounds after which the cloth about the crossings is smoothed, and again after as many
@@ -77,6 +77,7 @@ def untangle(
     body: TriangleMesh | None = None,
     rest: FloatArray | None = None,
     thickness: float,
+    step: float | None = None,
     rounds: int = 100,
     job: Job | None = None,
 ) -> Untangled:
@@ -90,6 +91,7 @@ def untangle(
         body: May be open and cross itself.
         rest: The cloth's shape without forces [m], shape (V, 3), to whose lengths it may return; by default the start.
         thickness: Gap to leave where something was moved [m].
+        step: How far a round pushes [m]; by default half of the mean edge. In a narrow fold, less than its room.
         rounds: At most.
         job: For progress, and a warning if something is left.
 
@@ -97,7 +99,8 @@ def untangle(
         The best that was found. Whatever is left is named.
     """
     job = job or Job()
-    work = _UntangleProblem(TriangleMesh(positions, faces), body, positions if rest is None else rest, thickness)
+    start = TriangleMesh(positions, faces)
+    work = _UntangleProblem(start, body, positions if rest is None else rest, thickness, step)
     x = np.array(positions, dtype=np.float64)
     best = tangle = work.find_crossings(x)
     best_round, began = 0, best.count
@@ -138,7 +141,9 @@ class _Crossing:
 class _UntangleProblem:
     """What does not change from round to round."""
 
-    def __init__(self, start: TriangleMesh, body: TriangleMesh | None, rest: FloatArray, thickness: float) -> None:
+    def __init__(
+        self, start: TriangleMesh, body: TriangleMesh | None, rest: FloatArray, thickness: float, step: float | None
+    ) -> None:
         self._faces = start.faces.copy()
         self._features = features(start.faces, len(start.vertices))
         self._tree = bvh.build(start.vertices.copy(), self._features.faces)
@@ -150,7 +155,7 @@ class _UntangleProblem:
         self._walls = None if body is None else OutermostFaces(body)
         self._thickness = thickness
         ends = start.vertices[self._features.edges]
-        self._step = _STEP * float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean())
+        self._step = _STEP * float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean()) if step is None else step
 
     def find_crossings(self, positions: FloatArray) -> _Crossing:
         """Return what meets at these positions."""
