@@ -62,6 +62,7 @@ bench: $(READY)  ## Measure error against run time (hours; `vto bench NAME --qui
 
 figures: $(READY)  ## Measure what the pages quote again (under an hour on a quiet machine), and write the pages
 	$(BIN)/vto bench all --quick --out docs/results
+	$(BIN)/vto bench physics --out docs/results
 	$(BIN)/python -m vto_pipeline.bench.docs
 
 first-run:  ## In a fresh clone: clock `make demo` and `make test` from nothing
