@@ -38,7 +38,7 @@ MOST_SIGMA = 5e-3
 THICKENED, SELDOM, THICKER = 0.1, 0.003, 3e-3
 """These shares of the thin parts of the bare mannequin, and of its trunk, are scanned with errors of so many metres
 (standard deviation), whatever the noise of the rest: fingers and arms come out too thick. Only colour can tell such
-places from tight cloth. On the trunk, distance outweighs colours in doubt: those of a strap are mixed with the skin's."""
+places from tight cloth. On the trunk, distance outweighs colours in doubt: a strap's are mixed with the skin's."""
 FLOOR_REACH = 0.01
 """A board on the floor may lie so much higher than the lowest point of the mannequin [m]."""
 
