@@ -168,7 +168,7 @@ def test_flying_pixels_and_grazing_surfaces_are_masked():
     depth[:, 30:34] = 1.2  # a step, and on its edge:
     depth[:, 29] = 1.1
     clean = clean_depth(depth, camera)
-    assert (clean[:, 27:36] == 0).mean() > 0.7
+    assert not clean[:, 29].any()
     assert (clean[5:-5, 5:20] == 1).all()
     u = np.arange(64)
     wall = np.tile((1.0 / (1 + 9 * (u - 31.5) / 60 * 0.1)).astype(np.float32), (48, 1))

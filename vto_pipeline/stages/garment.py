@@ -190,7 +190,7 @@ STAGES: tuple[Stage, ...] = (
         makes=("labels", "garment_shell"),
         run=_subtract,
         settings=SubtractConfig,
-        uses=("libigl", "scipy"),
+        uses=("libigl", "open3d", "scipy"),
     ),
     Stage(
         name="openings",

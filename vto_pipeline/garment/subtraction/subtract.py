@@ -10,6 +10,7 @@ from vto_pipeline.garment.robust_icp import scan_noise
 from vto_pipeline.garment.subtraction.color_model import cielab, color_evidence
 from vto_pipeline.garment.subtraction.floor import is_level, not_worn
 from vto_pipeline.garment.subtraction.graph_cut import minimum_cut
+from vto_pipeline.garment.subtraction.thin_parts import thin_parts
 from vto_pipeline.geometry.remeshing.clip import clip_to_positive
 from vto_pipeline.geometry.remeshing.repair import RepairConfig, repair
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
@@ -34,9 +35,10 @@ TIGHT = 0.007
 LEAST_SIGMA = 1e-4
 """Scans claim to be better than this only by accident [m]."""
 MOST_SIGMA = 5e-3
-THICKENED, THICKER = 0.1, 3e-3
-"""This share of the bare mannequin is scanned with errors of so many metres (standard deviation), whatever the noise of
-the rest: fingers and other thin parts come out too thick. Only colour can tell such places from tight cloth."""
+THICKENED, SELDOM, THICKER = 0.1, 0.003, 3e-3
+"""These shares of the thin parts of the bare mannequin, and of its trunk, are scanned with errors of so many metres
+(standard deviation), whatever the noise of the rest: fingers and arms come out too thick. Only colour can tell such
+places from tight cloth. On the trunk, distance outweighs colours in doubt: a strap's are mixed with the skin's."""
 FLOOR_REACH = 0.01
 """A board on the floor may lie so much higher than the lowest point of the mannequin [m]."""
 
@@ -79,14 +81,15 @@ def label_garment(surface: TriangleMesh, mannequin: TriangleMesh, config: Subtra
             f"no part of the scan stands off from the mannequin by more than {(thickness + 3 * sigma) * 1e3:.1f} mm",
             hint="is the garment on the mannequin, and the scan aligned?",
         )
-    by_color = None
+    by_color = thickened = None
     if surface.colors is None:
         job.leave_out("colour evidence", "the scan has no colours")
     elif not sure_bare.any():
         job.leave_out("colour evidence", "no bare mannequin shows")
     else:
         by_color = np.clip(color_evidence(surface.colors, sure_garment, sure_bare), -CERTAIN, CERTAIN)
-    evidence = _distance_evidence(near.distance, sigma, thickness, 0.0 if by_color is None else THICKENED)
+        thickened = np.where(thin_parts(mannequin), THICKENED, SELDOM)[near.face]
+    evidence = _distance_evidence(near.distance, sigma, thickness, thickened)
     evidence = np.where(facing < 0.0, np.maximum(evidence, CERTAIN / 2.0), evidence)
     if by_color is not None:
         evidence = evidence + by_color
@@ -121,17 +124,19 @@ def extract_garment(surface: TriangleMesh, labels: SurfaceLabels, config: Subtra
     return submesh(shell, keep[piece])[0]
 
 
-def _distance_evidence(distance: FloatArray, sigma: float, thickness: float, thickened: float) -> FloatArray:
+def _distance_evidence(
+    distance: FloatArray, sigma: float, thickness: float, thickened: FloatArray | None
+) -> FloatArray:
     """Return the log-likelihood ratio of cloth, anywhere beyond its thickness, against bare mannequin at zero, (V,).
 
     Args:
         distance: Signed, to the mannequin [m], shape (V,).
         sigma: Noise of the scan [m].
         thickness: Of cloth [m].
-        thickened: Share of the bare mannequin whose errors have the deviation `THICKER`.
+        thickened: Share of the bare mannequin there whose errors have the deviation `THICKER`, shape (V,), or None.
     """
     bare = -0.5 * np.square(distance / sigma)
-    if thickened > 0.0:
+    if thickened is not None:
         wide = np.log(thickened * sigma / THICKER) - 0.5 * np.square(distance / THICKER)
         bare = np.logaddexp(bare, wide)
     cloth = -0.5 * np.square(np.minimum((distance - thickness) / sigma, 0.0))
