@@ -67,25 +67,28 @@ def test_a_mitten_moves_along_and_is_padded_at_the_end_only(forearm):
     assert away[1].max() < 0.0101
 
 
-@pytest.mark.parametrize("covered", [True, False])
-def test_fingers_do_not_come_through_coarse_cloth_in_which_they_grow(forearm, covered, monkeypatch):
-    """A sleeve of long edges that begins in the trunk and goes on over the fingers, which spread beyond it."""
-    garment = tube(0.045, 0.6, 14, 20, base=0.6)
-    rest = RestShape(tube(0.065, 0.6, 14, 20, base=0.6).vertices)
-    model, asked = build_cloth(garment, rest, fabric()), []
-    usual = Phases._grown
+@pytest.mark.parametrize("base", [0.6, 0.603, 0.608])
+def test_fingers_do_not_come_through_coarse_cloth_in_which_they_grow(forearm, base, monkeypatch):
+    """A sleeve of long edges that begins in the trunk and goes on over the fingers, which spread beyond it.
+
+    What comes through without mittens is twice as much, and sometimes comes free all the same: that hangs on bits.
+    """
+    garment = tube(0.045, 0.6, 14, 20, base=base)
+    rest = RestShape(tube(0.065, 0.6, 14, 20, base=base).vertices)
+    model = build_cloth(garment, rest, fabric())
+    usual, through = Phases._grown, []
 
     def grown(phases, growth, config):
-        asked.append(config.body_features)
         if config.body_features:  # which takes long, and is not what is asked here
             raise IntersectingError("jammed")
-        return usual(phases, growth, config)
+        state, stepper = usual(phases, growth, config)
+        through.append(len(intersecting_faces(TriangleMesh(state.positions, garment.faces), forearm)))
+        return state, stepper
 
     monkeypatch.setattr(Phases, "_grown", grown)
-    if not covered:
-        monkeypatch.setattr(module, "in_mittens", lambda body, limbs, padding: body)
     phases = Phases(model, rest, fabric(), DrapeConfig(), Job())
     found = phases.grow_body(at_rest(garment.vertices), forearm)
-    lies = TriangleMesh(found.positions, garment.faces)
-    assert asked == [False] + [True] * (not covered)
-    assert covered is False or len(intersecting_faces(lies, forearm)) == 0
+    assert len(intersecting_faces(TriangleMesh(found.positions, garment.faces), forearm)) == 0
+    monkeypatch.setattr(module, "in_mittens", lambda body, limbs, padding: body)
+    phases.grow_body(at_rest(garment.vertices), forearm)
+    assert through[1] > 1.5 * through[0]
