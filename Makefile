@@ -60,7 +60,7 @@ docs: $(READY)  ## Write README.md and docs/ from docs/source and docs/results
 bench: $(READY)  ## Measure error against run time (hours; `vto bench NAME --quick` takes minutes)
 	$(BIN)/vto bench all
 
-figures: $(READY)  ## Measure what the pages quote again (under an hour on a quiet machine), and write the pages
+figures: $(READY)  ## Measure what the pages quote again (about an hour on a quiet machine), and write the pages
 	$(BIN)/vto bench all --quick --out docs/results
 	$(BIN)/vto bench physics --out docs/results
 	$(BIN)/python -m vto_pipeline.bench.docs
