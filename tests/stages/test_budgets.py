@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import statistics
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -101,14 +102,20 @@ def test_what_a_level_states_takes_as_long_as_the_level_where_it_is_one_number()
     assert told == {"simulation_mesh"}
 
 
-def test_usual_times_are_those_of_the_results():
-    """Within a half of what the last measured run of the demo took, for all that takes long."""
+def test_usual_times_are_to_each_other_as_those_of_the_results():
+    """Within a half of what the last measured run of the demo took, where that is long; its machine may be slower."""
     rows = json.loads((SAMPLES.parent / "docs" / "results" / "demo.json").read_text())["rows"]
     files = {"photos": 37.0}
+    pairs = {}
     for row in rows:
         if row["method"].startswith("stage ") and row["seconds"] > 1.0:
             section = row["method"].removeprefix("stage ").rpartition(".")[2]
-            assert USUAL[section].of(files) == pytest.approx(row["seconds"], rel=0.5), section
+            pairs[section] = (row["seconds"], USUAL[section].of(files))
+    assert len(pairs) > 10
+    slower = statistics.median(measured / usual for measured, usual in pairs.values())
+    assert 0.3 < slower < 3.0
+    for section, (measured, usual) in pairs.items():
+        assert slower * usual == pytest.approx(measured, rel=0.5), section
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,8 @@ to stop, and of a coarser mesh, are set by their distance from the drape by defa
 One that stops counts more than its 0.2 mm left: it comes last, and what others take too long is taken from it. Stopped
 much earlier it is no drape: its first steps take as long as all others.
 What shows in neither, as texture, has a small one, so that it is given up first. Those of `align` and
-`register_mannequin` are judged, not measured. The usual times are those of docs/results, with both threads of a quiet
-machine.
+`register_mannequin` are judged, not measured. The usual times are to each other as those of
+docs/results, which may be of a slower machine, with both threads of a quiet one.
 """
 
 from __future__ import annotations
@@ -50,9 +50,9 @@ LEVELS: dict[str, tuple[Level, ...]] = {
 """Section -> its levels besides the default."""
 
 USUAL: dict[str, UsualTime] = {
-    "sfm": UsualTime(0.0, 0.18, "photos", 1.5),
-    "scale": UsualTime(0.6),
-    "stereo": UsualTime(0.0, 0.89, "photos"),
+    "sfm": UsualTime(0.0, 0.19, "photos", 1.5),
+    "scale": UsualTime(1.6),
+    "stereo": UsualTime(0.0, 1.0, "photos"),
     "fuse_photos": UsualTime(4.5),
     "odometry": UsualTime(0.0, 0.25, "depth"),
     "fuse_depth": UsualTime(4.5),
@@ -60,15 +60,16 @@ USUAL: dict[str, UsualTime] = {
     "align": UsualTime(4.0),
     "subtract": UsualTime(4.0),
     "openings": UsualTime(3.0, 0.42, "photos"),
-    "texture": UsualTime(9.5),
+    "texture": UsualTime(10.0),
     "simulation_mesh": UsualTime(4.7),
     "register_mannequin": UsualTime(11.0),
     "register_body": UsualTime(11.0),
+    "stand_source": UsualTime(1.0),
     "fit_scan": UsualTime(18.0),
     "fit_silhouettes": UsualTime(9.7),
-    "drape": UsualTime(32.0),
+    "drape": UsualTime(17.0),
     "transfer": UsualTime(0.6),
-    "assess": UsualTime(0.4),
+    "assess": UsualTime(0.5),
     "page": UsualTime(1.5),
 }
 """Section -> what its stages take by default."""
