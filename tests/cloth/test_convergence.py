@@ -151,6 +151,8 @@ def test_forces_far_above_the_weight_that_no_longer_fall_end_the_wait(monkeypatc
     assert not found.settled
     assert len(found.trace) == (10 if jammed else 30)
     assert ("jammed" in found.not_settled_warning) is jammed
+    assert np.isinf([found.error, found.trace[-1].error_mm]).all() == jammed
+    assert (found.error_mm is None) is jammed
 
 
 def test_cloth_that_is_caught_is_not_waited_for():
@@ -160,3 +162,4 @@ def test_cloth_that_is_caught_is_not_waited_for():
     assert not found.settled
     assert len(found.trace) == 5  # of 30
     assert "caught" in found.not_settled_warning
+    assert found.error_mm is None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -55,7 +55,7 @@ class SettlingResult:
     Args:
         state: At the end.
         settled: Whether both bounds were reached: cloth that stands still out of balance is not at rest.
-        error: Predicted distance to the state of rest, rms over vertices [m]; infinite while unknown.
+        error: Predicted distance to the state of rest, rms over vertices [m]; infinite while unknown, as where jammed.
         residual: Residual force as a share of weight.
         trace: One row for each look.
         looks: Where some of its vertices were at each [m], shape (S, 3).
@@ -190,7 +190,9 @@ def relax_to_rest(
         watch(share, result.error)
         result.caught = looks >= _JAM_LOOKS and is_caught(after.positions)
         result.jammed = exact and _is_jammed([one.residual for one in result.trace])
-        if result.caught or result.jammed:
+        if result.caught or result.jammed:  # moves that do not come from forces that fall tell of no end
+            result.error = np.inf
+            result.trace[-1] = replace(row, error_mm=np.inf)
             break
         if brief:
             newton_steps.choose(False, stuck, residual, moved)
