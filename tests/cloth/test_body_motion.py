@@ -5,6 +5,7 @@ import pytest
 from cloth_scenes import ball, fabric, tube
 from numpy.testing import assert_allclose
 
+import vto_pipeline.cloth.dynamics.body_motion as module
 from vto_pipeline.cloth.dynamics.body_motion import VariableSpeedBody, body_travel, is_jammed, run_body_motion
 from vto_pipeline.cloth.dynamics.stepper import StepConfig, Stepper
 from vto_pipeline.cloth.model.build import at_rest, build_cloth
@@ -92,6 +93,30 @@ def test_a_body_does_not_grow_into_jammed_cloth(monkeypatch):
     assert caught.value.partial["draped"].faces.shape == mesh.faces.shape
     state = run_body_motion(stepper, at_rest(mesh.vertices), body, 5e-4, lambda done: None)
     assert state.time > 0.5 - 1e-9  # a body that may open again is waited for
+
+
+@pytest.mark.parametrize(("until", "ends"), [(0.02, True), (1.0, False)])
+def test_a_body_that_would_go_through_cloth_all_along_is_not_waited_for(monkeypatch, until, ends):
+    """At three hundredths of its pace it takes minutes, and goes through in the end; for a part of its way it may."""
+    mesh = tube(0.11, 0.05, 36, 5, base=-0.025)
+    model = build_cloth(mesh, RestShape(mesh.vertices), fabric())
+    body = VariableSpeedBody(swelling(0.1, 0.105), 0.5, 0.3)
+    stepper = Stepper(model, [body], np.full(len(mesh.vertices), 1e-3), StepConfig())
+    done, gone = [0.0], [0]
+
+    def gone_through(stepper):
+        gone[0] += done[-1] < until
+        return gone[0]
+
+    monkeypatch.setattr(module, "_gone_through", gone_through)
+    start = at_rest(mesh.vertices)
+    if ends:
+        state = run_body_motion(stepper, start, body, 5e-4, done.append, only_grows=True)
+        assert body.ends - 1e-9 <= state.time < 8.0 * 0.5
+        return
+    with pytest.raises(IntersectingError, match="would go through the cloth as it grows, however slowly"):
+        run_body_motion(stepper, start, body, 5e-4, done.append, only_grows=True)
+    assert len(done) - 1 == pytest.approx(8.0 * 0.5 / 0.05, abs=1)
 
 
 def test_what_a_method_that_solves_in_part_leaves_over_is_no_jam(monkeypatch):

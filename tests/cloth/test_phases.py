@@ -1,6 +1,7 @@
 """Rest and clearing: what is moved off the body after it came to rest has not come to rest."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from vto_pipeline.errors import IntersectingError
 from vto_pipeline.model.body import MovingBody
 from vto_pipeline.model.garment import RestShape
 from vto_pipeline.model.job import Job
+from vto_pipeline.model.mesh import TriangleMesh
 
 NONE, ONE = np.zeros((0, 2), np.int32), np.zeros((1, 2), np.int32)
 
@@ -167,10 +169,16 @@ def test_what_is_far_too_small_is_refused_at_its_first_jam(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("place", "left", "pushed_off", "closely"),
-    [(0.0, 3, 0.0, True), (0.0, 3, 0.5, False), (0.0, 0, 0.0, False), (1.0, 3, 0.0, False)],
+    ("place", "left", "pushed_off", "times", "closely"),
+    [
+        (0.0, 3, 0.0, 1.1, True),
+        (0.0, 3, 0.0, 1.2, False),
+        (0.0, 3, 0.5, 1.0, False),
+        (0.0, 0, 0.0, 1.0, False),
+        (1.0, 3, 0.0, 1.0, False),
+    ],
 )
-def test_the_body_grows_closely_where_cloth_does_not_come_off_it(monkeypatch, place, left, pushed_off, closely):
+def test_the_body_grows_closely_where_cloth_does_not_come_off_it(monkeypatch, place, left, pushed_off, times, closely):
     """Cloth across the ball, or far from it and tangled in itself; it is clear of both where features are kept out."""
     mesh, body, asked = moved(sheet(4, 4, 0.4, 0.4), place, 0.0, 0.0), ball(0.1, levels=1), []
     rest = RestShape(mesh.vertices)
@@ -188,7 +196,7 @@ def test_the_body_grows_closely_where_cloth_does_not_come_off_it(monkeypatch, pl
         start_module, "find_collision_free_start", lambda x, *given: Start(x, 3, left, np.zeros(len(x), bool))
     )
     phases = Phases(build_cloth(mesh, rest, fabric()), rest, fabric(), DrapeConfig(), Job())
-    found = phases._grown_clear(None, body)
+    found = phases._grown_clear(SimpleNamespace(garment=TriangleMesh(times * rest.positions, mesh.faces)), body)
     assert asked == [False, True][: 1 + closely]
     assert (found.positions == mesh.vertices + 2.0 * closely + pushed_off).all()
 

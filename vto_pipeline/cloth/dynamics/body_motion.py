@@ -20,6 +20,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 _WINDOW = 0.05  # s of cloth time between changes of speed
 _SLOWEST = 0.125  # of full speed
 _CAREFUL = 0.03  # of full speed: the slowest where parts of the body go through cloth in one step
+_LONGEST = 8.0  # times as long as at full speed, what only grows: as at the slowest pace but where it is careful
 _BRAKE, _PICK_UP = 0.5, 1.25  # of the speed, where contact is deep and where it is not
 _AGAIN = 0.25  # of the speed, where a part went through
 _SHALLOW = 0.25  # of what counts as deep: between the two, the speed is kept
@@ -95,9 +96,10 @@ def run_body_motion(
 
     Raises:
         IntersectingError: the body only grows and the cloth is jammed: what is left over of its forces is far above its
-            weight, and does not fall. Steps take minutes then, and lead nowhere. `partial` holds it there as "draped".
+            weight, and does not fall. Or parts of the body would go through it at all but the slowest pace, for long.
+            Steps take minutes then, and lead nowhere. `partial` holds it there as "draped".
     """
-    speed, left, passed = 1.0, [0.0], _gone_through(stepper)
+    speed, left, passed, longest = 1.0, [0.0], _gone_through(stepper), _LONGEST * body.ends
     while state.time < body.ends - 1e-9:
         before, known = state, stepper.contact_memory
         state = stepper.run(state, min(_WINDOW, body.ends - state.time))
@@ -113,6 +115,12 @@ def run_body_motion(
             raise IntersectingError(
                 f"the cloth is jammed as the body grows, with forces of {left[-1]:.0f} times its weight",
                 hint="it lies between parts of the body, or its layers are entangled: give it nearer to how it is worn",
+                partial={"draped": TriangleMesh(state.positions, stepper.faces)},
+            )
+        if only_grows and state.time > longest:
+            raise IntersectingError(
+                "parts of the body would go through the cloth as it grows, however slowly",
+                hint="it is too small for this body, or its mesh too coarse: give a larger size, or a finer mesh",
                 partial={"draped": TriangleMesh(state.positions, stepper.faces)},
             )
         depth = body.depth(state.time, state.positions)

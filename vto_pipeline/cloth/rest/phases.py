@@ -155,7 +155,8 @@ class Phases:
         """Return the cloth clear of the body as it ends; where that cannot be, it may cross.
 
         What is finer than the cloth grows out between its vertices. It is moved off, else pushed off by a thicker skin.
-        Where that fails, too, the body grows again, and its vertices and edges keep out of the cloth.
+        Where that fails, too, the body grows again, and its vertices and edges keep out of the cloth, unless that is far
+        too small.
 
         Raises:
             IntersectingError: it jams on the way.
@@ -170,6 +171,8 @@ class Phases:
         cleared, left = clear_body_crossings(stepper, grown, rest, faces, body, self._config.clear_rounds)
         if len(left) == 0:
             return at_rest(cleared.positions)
+        if self._times_its_size(growth.garment) > ENLARGED:
+            return grown  # what is far too small jams then, after minutes
         self._job.progress(0.05, f"{_GROWING}, closely")
         try:
             return self._grown(growth, self._config.model_copy(update={"body_features": True}))[0]
