@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from dressed_form import HIGH, LOW, form_distance, largest, level_set, outward
+from dressed_form import HIGH, LOW, ellipsoid, form_distance, largest, level_set, outward
 from test_parted import CELL, form, photographs
 
+from vto_pipeline.garment.bare_parts import BareParts
 from vto_pipeline.garment.loop_evidence import encloses
 from vto_pipeline.garment.openings import OpeningsConfig, close_scan_holes, list_openings
 from vto_pipeline.garment.photographed.covered import covered_loops
 from vto_pipeline.garment.photographed.sightings import Sightings
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import submesh
+from vto_pipeline.model.garment import SurfaceLabels
 from vto_pipeline.model.job import Job
 
 
@@ -52,6 +54,53 @@ def test_a_shoulder_that_comes_through_a_hole_is_no_opening(tmp_path, body):
     assert any("the photos show cloth there: scan hole" in note for note in job.notes)
     off = form_distance(closed.vertices[~observed])
     assert np.quantile(np.abs(off - 0.008), 0.95) < 0.006
+
+
+FLARE, STUMP, MIDDLE = (0.2, 0.09, 0.2), (0.085, 0.11), 0.55
+
+
+def shoulders(points):
+    """Flat shoulders, and a form's neck that ends 3 cm above them, about the middle of the photos."""
+    y, around = points[:, 1] - MIDDLE, np.hypot(points[:, 0], points[:, 2])
+    neck = np.maximum(around - STUMP[0], np.maximum(y - STUMP[1], -y))
+    return np.minimum(ellipsoid(points, (0.0, MIDDLE, 0.0), FLARE), neck)
+
+
+def cape(neck=0.1):
+    """2 mm off the shoulders, from a collar of that radius to below their widest place."""
+    size = np.array(FLARE) + 0.002
+    cloth = outward(
+        *level_set(lambda p: ellipsoid(p, (0.0, MIDDLE, 0.0), size), (-0.25, 0.4, -0.25), (0.25, 0.7, 0.25), 0.008)
+    )
+    x, y, z = (cloth.vertices[cloth.faces].mean(axis=1) - [0.0, MIDDLE, 0.0]).T
+    return largest(submesh(cloth, (y > -0.03) & ((np.hypot(x, z) > neck) | (y < 0.0)))[0])
+
+
+def bare_over(body, seen):
+    return BareParts(body, SurfaceLabels(np.zeros(len(body.vertices), bool), np.where(seen, 1.0, 0.0)), body)
+
+
+@pytest.mark.parametrize("told", ["scan", "photos", None])
+def test_a_collar_in_which_the_neck_of_the_form_ends_is_an_opening(tmp_path, told):
+    """Nothing of the form comes out of it, and its rim lies on flat shoulders as that of a hole does."""
+    body = outward(*level_set(shoulders, (-0.25, 0.4, -0.25), (0.25, 0.7, 0.25), 0.008))
+    cloth = cape()
+    collar = max(list_openings(cloth), key=lambda one: one.center[1])
+    assert not encloses(cloth.vertices[collar.loop], SurfaceDistance(body), 0.06)  # the form alone tells wrongly
+    neck = np.hypot(body.vertices[:, 0], body.vertices[:, 2]) < 0.1
+    bare = bare_over(body, neck) if told == "scan" else None
+    photos = photographs(tmp_path, cloth, body) if told == "photos" else None
+    config = OpeningsConfig(edge_mm=8.0, flap_edges=1.0, least_seen=0.0)
+    _, openings, _ = close_scan_holes(cloth, body, config, Job(), bare, photos)
+    assert len(openings) == (1 if told is None else 2)
+
+
+def test_a_hole_over_shoulders_that_were_not_seen_bare_is_none():
+    body = outward(*level_set(shoulders, (-0.25, 0.4, -0.25), (0.25, 0.7, 0.25), 0.008))
+    for half in (False, True):
+        bare = bare_over(body, half & (body.vertices[:, 0] > 0.0))
+        config = OpeningsConfig(edge_mm=8.0, flap_edges=1.0, least_seen=0.0)
+        assert len(close_scan_holes(cape(), body, config, Job(), bare)[1]) == 1
 
 
 def circle(x, radius=0.05):

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+from pathlib import Path
+
 import cv2
 import numpy as np
 import pytest
@@ -9,13 +12,16 @@ from dressed_form import HIGH, LOW, form_distance, largest, level_set, outward
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.align import PosedPhotos
-from vto_pipeline.garment.openings import list_openings
+from vto_pipeline.garment.openings import OpeningsConfig, list_openings
 from vto_pipeline.garment.photographed.parted import parted_openings, refuse_parted
 from vto_pipeline.garment.photographed.sightings import Sightings, look_at_mannequin
-from vto_pipeline.geometry.topology import submesh
+from vto_pipeline.geometry.topology import concatenate, submesh
 from vto_pipeline.model.camera import CameraSet, Intrinsics
+from vto_pipeline.model.frames import DepthFrameSet
+from vto_pipeline.model.garment import SurfaceLabels
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.stages.garment import STAGES
 
 LENS = Intrinsics(400, 400, 480.0, 480.0, 199.5, 199.5)
 STRAPS = 0.69
@@ -123,6 +129,31 @@ def test_photos_show_the_same_on_one_core(dressed, monkeypatch):
     again = look_at_mannequin(top, observed, body, photos, Job())
     assert first.points.tobytes() == again.points.tobytes()
     assert first.cloth.tobytes() == again.cloth.tobytes()
+
+
+@pytest.mark.parametrize("colored", [True, False])
+def test_colour_frames_of_a_depth_camera_show_the_straps(dressed, colored):
+    """The depth of the straps was lost: without colours nobody knows of them."""
+    body, top, photos = dressed
+    paths = tuple(Path(f"{k}.png") for k in range(16))
+    shown = (lambda found: found, without_straps)
+    for part, refused in zip(shown, (False, colored), strict=True):
+        found = part(top)
+        scan = concatenate([found, body])
+        cloth = np.arange(len(scan.vertices)) < len(found.vertices)
+        inputs = {
+            "garment_shell": found,
+            "mannequin_surface": body,
+            "garment_surface": scan,
+            "garment_placement": np.eye(4),
+            "labels": SurfaceLabels(cloth, np.ones(len(cloth))),
+            "garment_depth": DepthFrameSet(paths, photos.paths if colored else (), LENS, 1000.0),
+            "garment_trajectory": photos.cameras.world_from_cam,
+        }
+        stage = {stage.name: stage for stage in STAGES}["openings"]
+        settings = OpeningsConfig(look_again=False, edge_mm=12.0, flap_edges=1.0)
+        with pytest.raises(GarmentError, match="the photos show .* of cloth") if refused else nullcontext():
+            assert len(stage.run(inputs, settings, Job())["openings"]) == len(list_openings(found))
 
 
 def test_one_lost_strap_is_enough(dressed):

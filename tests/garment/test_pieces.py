@@ -80,6 +80,7 @@ def test_a_scrap_is_left_out_and_counts_as_not_seen(height, warned):
     assert len(openings) == 2
     lost = 0.5 * height / (0.3 + 0.5 * height)
     assert_allclose(job.metrics["unobserved_share"], lost, rtol=0.05)  # the rims of the tube are smoothed
+    assert_allclose(job.metrics["filled_share"], 0.0, atol=1e-9)  # nothing of what is there was filled
     assert_allclose(job.metrics["lost_cm2"], 1e4 * 0.5 * height * AROUND, rtol=0.03)  # of its facets
     told = job.warnings if warned else job.notes
     assert any(f"{lost:.0%} of the garment, hang on nothing that was seen" in text for text in told)
@@ -123,7 +124,8 @@ def test_cloth_in_a_hole_that_was_filled_counts_once():
     job = Job()
     closed([submesh(whole, middle > 0.03)[0], patch], job)
     assert_allclose(job.metrics["lost_cm2"], 0.0, atol=1e-9)
-    assert_allclose(job.metrics["unobserved_share"], np.pi * 0.03**2 / (0.3 * AROUND), rtol=0.1)  # a flat disc's
+    share = np.pi * 0.03**2 / (0.3 * AROUND)  # a flat disc's
+    assert_allclose([job.metrics["unobserved_share"], job.metrics["filled_share"]], share, rtol=0.1)
 
 
 def test_a_sock_is_worn_though_it_has_one_opening():

@@ -72,10 +72,12 @@ class PosedPhotos:
     Args:
         paths: Their files.
         cameras: In the scan's frame and unit.
+        beside_depth: Whether they are a depth camera's: then depth was read even where their colours tell nothing.
     """
 
     paths: tuple[Path, ...]
     cameras: CameraSet
+    beside_depth: bool = False
 
 
 def align_to_mannequin(

@@ -114,6 +114,16 @@ def outside_share(points: FloatArray, distance: SurfaceDistance) -> float:
     return _Loop(points).outside_share(np.zeros(3), distance)
 
 
+def disc_of(points: FloatArray) -> FloatArray:
+    """Return points of the disc that spans a loop (L, 3), evenly along its radii, shape (N, 3)."""
+    return _Loop(points).disc
+
+
+def is_filled(points: FloatArray, distance: SurfaceDistance) -> bool:
+    """Return whether the mannequin fills the middle of a loop (L, 3): it need not go on beyond."""
+    return _Loop(points).is_filled(np.zeros(3), distance)
+
+
 def passes_through(points: FloatArray, distance: SurfaceDistance) -> bool:
     """Return whether a part of the mannequin fills the middle of a loop and goes on on both sides of it.
 

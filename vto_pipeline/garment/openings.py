@@ -12,11 +12,11 @@ from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.align import PosedPhotos
 from vto_pipeline.garment.bare_parts import BareParts
 from vto_pipeline.garment.lifting import HINT, check_lifted, lift_fillings, pierced_fillings
-from vto_pipeline.garment.loop_evidence import LoopShape, encloses, goes_round, measure_loops
+from vto_pipeline.garment.loop_evidence import LoopShape, disc_of, encloses, goes_round, is_filled, measure_loops
 from vto_pipeline.garment.notches import close_notches
 from vto_pipeline.garment.photographed.carved import carve_fillings
 from vto_pipeline.garment.photographed.confirmed import LookAgain, confirm_fillings
-from vto_pipeline.garment.photographed.covered import covered_loops
+from vto_pipeline.garment.photographed.covered import bare_loops, covered_loops
 from vto_pipeline.garment.photographed.parted import refuse_parted, refuse_unseen
 from vto_pipeline.garment.photographed.seen_ends import Scanned, Seen, refuse_unseen_ends
 from vto_pipeline.garment.photographed.sightings import look_at_mannequin
@@ -37,11 +37,15 @@ from vto_pipeline.geometry.remeshing.remesh import edge_lengths
 from vto_pipeline.geometry.remeshing.repair import RepairConfig, repair
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import component_areas, face_areas, face_components, surface_area
+from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.garment import Opening
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
 
+SEEN_BARE = 0.95
+"""Through an opening that the mannequin fills, but does not come out of, such a share of it was seen bare: a form's
+neck ends in the collar. Cloth that lies close was taken for bare over a quarter of a hole at most."""
 FILLED_RIM = 1.0 / 3.0
 """With a larger share of its rim filled, an opening's length is uncertain."""
 
@@ -126,11 +130,11 @@ def close_scan_holes(
     bridged, notches = clean, 0
     if distance is not None:
         bridged, notches = close_notches(clean, distance, bare, least_perimeter, reach)
-    worn = _worn_faces(bridged, distance, mannequin, photos, config, job)
+    worn = _worn_faces(bridged, distance, mannequin, photos, bare, config, job)
     bridged, _ = split_off(bridged, worn)
     clean, unworn = split_off(clean, worn[: len(clean.faces)])
     pieces = face_components(clean)[0]
-    shapes, is_opening = _told_apart(bridged, distance, mannequin, photos, config, job)
+    shapes, is_opening = _told_apart(bridged, distance, mannequin, photos, bare, config, job)
     job.progress(0.5, f"filling {len(shapes) - sum(is_opening)} scan holes")
     if all(is_opening):
         job.leave_out("hole filling", "every boundary loop is a real opening")
@@ -141,7 +145,7 @@ def close_scan_holes(
         pierced = [] if config.keep is not None else pierced_fillings(lifted, distance, bare)
         if pierced:
             opened = open_pierced(filled, len(clean.faces), pierced, mannequin, bare, config.clearance_mm * 1e-3, job)
-            shapes, is_opening = _told_apart(opened, distance, mannequin, photos, config, job)
+            shapes, is_opening = _told_apart(opened, distance, mannequin, photos, bare, config, job)
             filled = _filled(opened, shapes, is_opening)
             observed = np.zeros(len(filled.vertices), dtype=bool)
             observed[filled.faces[: len(clean.faces)]] = True
@@ -168,7 +172,8 @@ def close_scan_holes(
     found = list_openings(final)
     check_wearable(final, found)
     lost = lost_cloth([*rest, *unworn], final, observed, distance, job)
-    seen = float(face_areas(final)[scanned].sum()) / (surface_area(final) + lost)
+    scanned_area, area = float(face_areas(final)[scanned].sum()), surface_area(final)
+    seen = scanned_area / (area + lost)
     job.measure(
         pieces=pieces,
         openings=len(found),
@@ -177,19 +182,20 @@ def close_scan_holes(
         perimeters_mm=[round(opening.perimeter * 1e3, 1) for opening in found],
         trimmed_cm2=(surface_area(large) - sum(map(surface_area, [clean, *unworn]))) * 1e4,
         unobserved_share=1.0 - seen,
+        filled_share=1.0 - scanned_area / area,
     )
     _check_seen(seen, final, config, job)
     sightings, answered = None, config.keep is not None or config.expected is not None
+    hardly_told = photos is not None and not photos.beside_depth  # unless by their colours
     if mannequin is not None and found:
         sightings = None if photos is None else look_at_mannequin(final, observed, mannequin, photos, job)
         if sightings is not None:
             refuse_parted(sightings, final, found, config.keep is not None, job)
-        if bare is not None and (photos is None or sightings is not None):
+        if bare is not None and not (hardly_told and sightings is None):
             refuse_unseen(final, found, mannequin, bare, sightings, answered, job)
     if scan is not None:
         seen_beyond = Seen(scan, distance, bare, sightings)
-        hardly_told = photos is not None and sightings is None
-        refuse_unseen_ends(final, found, seen_beyond, answered or hardly_told, job)
+        refuse_unseen_ends(final, found, seen_beyond, answered or (hardly_told and sightings is None), job)
     warn_of_filled_rims(found, observed, job)
     if bare is not None and pieces > 1:
         warn_of_torn(final, bare, job)
@@ -201,6 +207,7 @@ def _worn_faces(
     distance: SurfaceDistance | None,
     mannequin: TriangleMesh | None,
     photos: PosedPhotos | None,
+    bare: BareParts | None,
     config: OpeningsConfig,
     job: Job,
 ) -> NDArray[np.bool_]:
@@ -214,7 +221,7 @@ def _worn_faces(
     if len(area) == 1:
         return np.ones(len(piece), dtype=bool)
     shapes, is_opening = _told_apart(
-        mesh, distance, mannequin, photos, config.model_copy(update={"keep": None}), Job(seed=job.seed)
+        mesh, distance, mannequin, photos, bare, config.model_copy(update={"keep": None}), Job(seed=job.seed)
     )
     for shape, real in zip(shapes, is_opening, strict=True):
         rim = mesh.vertices[shape.loop]
@@ -228,14 +235,15 @@ def _told_apart(
     distance: SurfaceDistance | None,
     mannequin: TriangleMesh | None,
     photos: PosedPhotos | None,
+    bare: BareParts | None,
     config: OpeningsConfig,
     job: Job,
 ) -> tuple[list[LoopShape], list[bool]]:
     """Return the boundary loops of a garment, and which of them are openings by all the evidence there is."""
     shapes = measure_loops(mesh)
-    is_opening = _classify(mesh, shapes, distance, config, job)
-    if mannequin is not None and photos is not None and any(is_opening):
-        is_opening = _uncovered(mesh, shapes, is_opening, mannequin, photos, job)
+    is_opening = _classify(mesh, shapes, distance, bare, config, job)
+    if mannequin is not None and distance is not None and photos is not None and shapes:
+        is_opening = _by_photos(mesh, shapes, is_opening, distance, mannequin, photos, config, job)
     if config.keep is not None:
         is_opening = _kept(shapes, is_opening, config.keep, job)
     return shapes, is_opening
@@ -300,7 +308,12 @@ def _check_seen(share: float, garment: TriangleMesh, config: OpeningsConfig, job
 
 
 def _classify(
-    mesh: TriangleMesh, shapes: list[LoopShape], distance: SurfaceDistance | None, config: OpeningsConfig, job: Job
+    mesh: TriangleMesh,
+    shapes: list[LoopShape],
+    distance: SurfaceDistance | None,
+    bare: BareParts | None,
+    config: OpeningsConfig,
+    job: Job,
 ) -> list[bool]:
     """Return which loops are real openings."""
     long_enough = [shape.perimeter >= config.least_perimeter_mm * 1e-3 for shape in shapes]
@@ -313,7 +326,7 @@ def _classify(
     real = []
     for ok, shape in zip(long_enough, shapes, strict=True):
         rim = mesh.vertices[shape.loop]
-        around = ok and encloses(rim, distance, reach)
+        around = ok and (encloses(rim, distance, reach) or _shows_bare(rim, distance, bare))
         hangs = ok and not around and shape.tubular >= config.tubular and distance.signed(rim).distance.min() > reach
         if hangs:
             job.note(f"beyond the mannequin, by its shape alone: {_listing([shape], [True])}")
@@ -321,24 +334,37 @@ def _classify(
     return real
 
 
-def _uncovered(
+def _shows_bare(rim: FloatArray, distance: SurfaceDistance, bare: BareParts | None) -> bool:
+    """Return whether the mannequin fills a loop (L, 3), and was seen bare through it."""
+    return bare is not None and is_filled(rim, distance) and float(np.mean(bare.under(disc_of(rim)))) > SEEN_BARE
+
+
+def _by_photos(
     mesh: TriangleMesh,
     shapes: list[LoopShape],
     likely: list[bool],
+    distance: SurfaceDistance,
     mannequin: TriangleMesh,
     photos: PosedPhotos,
+    config: OpeningsConfig,
     job: Job,
 ) -> list[bool]:
-    """Return which loops are openings once the photos were asked: not those through which they show cloth."""
+    """Return which loops are openings once the photos were asked: not those through which they show cloth, but those
+    that the mannequin fills, and through which they show it bare."""
     silent = Job(seed=job.seed)  # it is told once, of the finished garment
     sightings = look_at_mannequin(mesh, np.ones(len(mesh.vertices), dtype=bool), mannequin, photos, silent)
     if sightings is None:
         return likely
-    covered = covered_loops(sightings, [mesh.vertices[shape.loop] for shape in shapes])
-    turned = [shape for shape, real, shut in zip(shapes, likely, covered, strict=True) if real and shut]
-    if turned:
-        job.note(f"the photos show cloth there: {_listing(turned, [False] * len(turned))}")
-    return [real and not shut for real, shut in zip(likely, covered, strict=True)]
+    rims = [mesh.vertices[shape.loop] for shape in shapes]
+    covered, bare = covered_loops(sightings, rims), bare_loops(sightings, rims)
+    real = []
+    for shape, rim, before, shut, shown in zip(shapes, rims, likely, covered, bare, strict=True):
+        long_enough = shape.perimeter >= config.least_perimeter_mm * 1e-3
+        real.append((before and not shut) or (shown and long_enough and is_filled(rim, distance)))
+        if real[-1] != before:
+            what = "the photos show the mannequin bare there" if real[-1] else "the photos show cloth there"
+            job.note(f"{what}: {_listing([shape], real[-1:])}")
+    return real
 
 
 def _kept(shapes: list[LoopShape], likely: list[bool], count: int, job: Job) -> list[bool]:

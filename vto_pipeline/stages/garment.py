@@ -30,11 +30,12 @@ from vto_pipeline.geometry.topology import concatenate
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import Avatar
 from vto_pipeline.model.camera import CameraSet
+from vto_pipeline.model.frames import DepthFrameSet
 from vto_pipeline.model.garment import SurfaceLabels
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.pipeline.stage import Stage
-from vto_pipeline.scan.depth_views import frame_views
+from vto_pipeline.scan.depth_views import frame_views, placed
 from vto_pipeline.scan.photos.rematch.fillings import look_at_fillings
 from vto_pipeline.scan.texture.project import TextureConfig, texture_surface
 
@@ -45,12 +46,29 @@ LOOK = ("garment_photos", "garment_cameras", "garment_points", "garment_depth_ma
 """What the look at what was filled needs."""
 
 
+def _photos(inputs: Inputs) -> PosedPhotos | None:
+    """Return the photos that the scan was made from, in its frame; None without any."""
+    if "garment_photos" not in inputs or "garment_cameras" not in inputs:
+        return None
+    return PosedPhotos(inputs["garment_photos"].paths, inputs["garment_cameras"])
+
+
+def _photos_or_frames(inputs: Inputs) -> PosedPhotos | None:
+    """Return the photos, or a depth camera's colour frames, that the scan was made from; None without any."""
+    frames: DepthFrameSet | None = inputs.get("garment_depth")
+    if frames is None or not frames.color_paths or "garment_trajectory" not in inputs:
+        return _photos(inputs)
+    used = placed(inputs["garment_trajectory"])
+    paths = tuple(frames.color_paths[k] for k in used)
+    lens = frames.intrinsics if frames.color_intrinsics is None else frames.color_intrinsics
+    names = tuple(path.name for path in paths)
+    cameras = CameraSet(names, (lens,) * len(used), inputs["garment_trajectory"][used])
+    return PosedPhotos(paths, cameras, beside_depth=True)
+
+
 def _align(inputs: Inputs, settings: AlignConfig, job: Job) -> Outputs:
     mannequin = need_metres(inputs["mannequin_surface"], "the mannequin")
-    photos = None
-    if "garment_photos" in inputs and "garment_cameras" in inputs:
-        photos = PosedPhotos(inputs["garment_photos"].paths, inputs["garment_cameras"])
-    placement = align_to_mannequin(inputs["garment_surface"], mannequin, settings, job, photos)
+    placement = align_to_mannequin(inputs["garment_surface"], mannequin, settings, job, _photos(inputs))
     return {"garment_placement": placement}
 
 
@@ -75,9 +93,9 @@ def _openings(inputs: Inputs, settings: OpeningsConfig, job: Job) -> Outputs:
     if mannequin is not None and placement is not None:
         if "labels" in inputs:
             bare = BareParts(transform_mesh(inputs["garment_surface"], placement), inputs["labels"], mannequin)
-        if "garment_photos" in inputs and "garment_cameras" in inputs:
-            cameras = transform_cameras(inputs["garment_cameras"], placement)
-            photos = PosedPhotos(inputs["garment_photos"].paths, cameras)
+        photos = _photos_or_frames(inputs)
+        if photos is not None:
+            photos = replace(photos, cameras=transform_cameras(photos.cameras, placement))
     look, scan = _look_at_fillings(inputs, settings, job), _scanned(inputs)
     shell = inputs["garment_shell"]
     garment, openings, observed = close_scan_holes(shell, mannequin, settings, job, bare, photos, look, scan)

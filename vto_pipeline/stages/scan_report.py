@@ -59,7 +59,7 @@ def scan_report(
     unit = said.get("metres_per_unit", 1.0 if surface_is_metric else None)
     error = None
     if error_of is not None and unit is not None:
-        error = error_of(unit, said.get("unobserved_share") or 0.0)
+        error = error_of(unit, said.get("filled_share") or 0.0)
     if error is not None and unit is not None:
         error = _with_scale(error, 10.0 * (said.get("scale_error_percent") or 0.0) * lever * unit)
     return {

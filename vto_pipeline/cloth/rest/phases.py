@@ -155,8 +155,8 @@ class Phases:
         """Return the cloth clear of the body as it ends; where that cannot be, it may cross.
 
         What is finer than the cloth grows out between its vertices. It is moved off, else pushed off by a thicker skin.
-        Where that fails, too, the body grows again, and its vertices and edges keep out of the cloth, unless that is far
-        too small.
+        Where that fails, too, the body grows again, and its vertices and edges keep out of the cloth. What is far too
+        small jams then, after minutes.
 
         Raises:
             IntersectingError: it jams on the way.
@@ -172,7 +172,7 @@ class Phases:
         if len(left) == 0:
             return at_rest(cleared.positions)
         if self._times_its_size(growth.garment) > ENLARGED:
-            return grown  # what is far too small jams then, after minutes
+            return grown
         self._job.progress(0.05, f"{_GROWING}, closely")
         try:
             return self._grown(growth, self._config.model_copy(update={"body_features": True}))[0]

@@ -1,7 +1,7 @@
-"""Loops through which the photos show cloth: holes of the scan, though the mannequin bulges out of them.
+"""What photos show through loops: cloth through holes of the scan, the bare mannequin through openings.
 
 A shoulder comes through a hole over it as a neck comes through a collar. But the photos show cloth on the one, and the
-bare mannequin on the other.
+bare mannequin on the other. So they do where a form's neck ends in the collar, of which nothing comes through.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ from scipy.spatial import cKDTree
 from vto_pipeline.garment.photographed.sightings import Sightings
 from vto_pipeline.model.arrays import FloatArray
 
-COVERED = 0.7
-"""A loop is covered where a larger share of what shows through it is cloth: beside a rim some may have been lost."""
+COVERED, BARE = 0.7, 0.1
+"""A loop is covered where a larger share of what shows through it is cloth, and bare where a smaller one is: beside a
+rim some may have been lost."""
 WITHIN = 1.2
 """What is so many radii from a loop's middle, and nearest to it, shows through it."""
 LEAST_SHOWN = 0.001
@@ -23,22 +24,32 @@ LEAST_SHOWN = 0.001
 
 
 def covered_loops(sightings: Sightings, loops: Sequence[FloatArray]) -> list[bool]:
-    """Return which loops the photos show covered.
+    """Return which loops the photos show covered: as `cloth_shares`."""
+    return [share is not None and share > COVERED for share in cloth_shares(sightings, loops)]
+
+
+def bare_loops(sightings: Sightings, loops: Sequence[FloatArray]) -> list[bool]:
+    """Return through which loops the photos show the mannequin bare: as `cloth_shares`."""
+    return [share is not None and share < BARE for share in cloth_shares(sightings, loops)]
+
+
+def cloth_shares(sightings: Sightings, loops: Sequence[FloatArray]) -> list[float | None]:
+    """Return which share of what shows through each loop is cloth; None where too little shows.
 
     Args:
         sightings: What the photos show where the garment, with all its loops open, leaves the mannequin bare.
         loops: All of them, each in order [m], shape (L, 3).
     """
     if not loops or len(sightings.points) == 0:
-        return [False] * len(loops)
+        return [None] * len(loops)
     owner = np.repeat(np.arange(len(loops)), [len(loop) for loop in loops])
     nearest = owner[cKDTree(np.concatenate(loops)).query(sightings.points)[1]]
-    found = []
+    found: list[float | None] = []
     for index, loop in enumerate(loops):
         length = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
         middle = np.average(0.5 * (loop + np.roll(loop, -1, axis=0)), axis=0, weights=length)
         radius = float(length.sum()) / (2.0 * np.pi)
         shows = (nearest == index) & (np.linalg.norm(sightings.points - middle, axis=1) < WITHIN * radius)
         enough = np.count_nonzero(shows) * sightings.area >= LEAST_SHOWN
-        found.append(bool(enough and np.mean(sightings.cloth[shows]) > COVERED))
+        found.append(float(np.mean(sightings.cloth[shows])) if enough else None)
     return found

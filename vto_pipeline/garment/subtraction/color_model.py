@@ -26,11 +26,13 @@ def color_evidence(
     mixed: NDArray[np.bool_],
     bins: int = BINS,
     light: float = HISTOGRAM_SIGMA,
+    most_mixed: float = MOST_MIXED,
 ) -> FloatArray:
     """Return log p(colour | the pure material) - log p(colour | the other) per vertex, shape (V,).
 
     From smoothed CIELAB histograms. Places of the other material may hold some of the pure one, as close-lying cloth
-    passes for mannequin: the share of the pure histogram that the mixed one can hold is taken out of it.
+    passes for mannequin: the share of the pure histogram that the mixed one can hold is taken out of it. Materials of
+    much the same colours look so, too, without any mixing. Then too much is taken out, and what is left tells wrongly.
 
     Args:
         colors: sRGB, shape (V, 3).
@@ -38,10 +40,11 @@ def color_evidence(
         mixed: Vertices most of which are of the other; at least one.
         bins: Of the histogram, along each axis; more part colours that differ less, and need more vertices.
         light: Standard deviation of the smoothing along lightness [bins]; more where the two lie in other light.
+        most_mixed: The mixed hold no larger share of the pure material.
     """
     cell = _cells(colors, bins)
     one, both = (_density(cell, members, bins, light)[cell] for members in (pure, mixed))
-    share = min(float(np.median(both[pure] / one[pure])), MOST_MIXED)
+    share = min(float(np.median(both[pure] / one[pure])), most_mixed, MOST_MIXED)
     other = np.maximum(both - share * one, 0.0) / (1.0 - share)
     anything = SURPRISE / bins**3
     return np.log((1.0 - SURPRISE) * one + anything) - np.log((1.0 - SURPRISE) * other + anything)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from pydantic import Field
+from scipy.special import ndtr
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.robust_icp import scan_noise
@@ -39,6 +40,10 @@ THICKENED, SELDOM, THICKER = 0.1, 0.003, 3e-3
 """These shares of the thin parts of the bare mannequin, and of its trunk, are scanned with errors of so many metres
 (standard deviation), whatever the noise of the rest: fingers and arms come out too thick. Only colour can tell such
 places from tight cloth. On the trunk, distance outweighs colours in doubt: a strap's are mixed with the skin's."""
+SURELY_BARE, FACING = 2.0, 0.7
+"""What lies no deeper inside than so many deviations of the noise, and faces as the mannequin (cosine), is bare."""
+PRESSED = 0.5
+"""Cloth that is pressed on the mannequin may be such a share of what passes for bare, whatever the distances say."""
 FLOOR_REACH = 0.01
 """A board on the floor may lie so much higher than the lowest point of the mannequin [m]."""
 
@@ -75,7 +80,7 @@ def label_garment(surface: TriangleMesh, mannequin: TriangleMesh, config: Subtra
     floor = not_worn(surface, float(mannequin.vertices[:, 1].min()) + FLOOR_REACH, sigma, job)
     thickness = config.thickness_mm * 1e-3
     sure_garment = (near.distance > thickness + 3.0 * sigma) & ~floor
-    sure_bare = (near.distance < 0.0) & (near.distance > -2.0 * sigma) & (facing > 0.7) & ~floor
+    sure_bare = (near.distance < 0.0) & (near.distance > -SURELY_BARE * sigma) & (facing > FACING) & ~floor
     if not sure_garment.any():
         raise GarmentError(
             f"no part of the scan stands off from the mannequin by more than {(thickness + 3 * sigma) * 1e3:.1f} mm",
@@ -87,7 +92,10 @@ def label_garment(surface: TriangleMesh, mannequin: TriangleMesh, config: Subtra
     elif not sure_bare.any():
         job.leave_out("colour evidence", "no bare mannequin shows")
     else:
-        by_color = np.clip(color_evidence(surface.colors, sure_garment, sure_bare), -CERTAIN, CERTAIN)
+        facing_out = near.distance[(facing > FACING) & ~floor]
+        mixed = most_mixed(facing_out, sigma, thickness)
+        by_color = color_evidence(surface.colors, sure_garment, sure_bare, most_mixed=mixed)
+        by_color = np.clip(by_color, -CERTAIN, CERTAIN)
         thickened = np.where(thin_parts(mannequin), THICKENED, SELDOM)[near.face]
     evidence = _distance_evidence(near.distance, sigma, thickness, thickened)
     evidence = np.where(facing < 0.0, np.maximum(evidence, CERTAIN / 2.0), evidence)
@@ -98,6 +106,31 @@ def label_garment(surface: TriangleMesh, mannequin: TriangleMesh, config: Subtra
     job.measure(noise_mm=sigma * 1e3, garment_share=float(garment.mean()))
     confidence = 1.0 / (1.0 + np.exp(-np.where(garment, evidence, -evidence)))
     return SurfaceLabels(garment, confidence)
+
+
+def most_mixed(distance: FloatArray, sigma: float, thickness: float) -> float:
+    """Return the largest share of cloth among what lies just inside of the mannequin.
+
+    The bare mannequin is scanned inside as often as outside, and cloth more often outside. Cloth just outside is what
+    lies there more. Noise brings the larger share of it inside the nearer it is: all may lie at its least distance, or
+    as close as it is spread evenly from zero on. Cloth that is pressed on lies as often inside.
+
+    Args:
+        distance: Signed, of what faces as the mannequin does [m], shape (V,).
+        sigma: Noise of the scan [m].
+        thickness: Of cloth [m].
+    """
+    width = SURELY_BARE
+    inside = int(np.count_nonzero((distance < 0.0) & (distance > -width * sigma)))
+    outside = int(np.count_nonzero((distance >= 0.0) & (distance < width * sigma)))
+    below, beyond = ndtr(np.array([-width, width]) - thickness / sigma)
+    here = ndtr(-thickness / sigma)
+    at_once = (here - below) / max(beyond - here, 1e-12)
+    tail = width * ndtr(-width) + (1.0 - np.exp(-0.5 * width**2)) / np.sqrt(2.0 * np.pi)  # of Φ, from -width to 0
+    ratio = max(at_once, tail / (width - tail))
+    if ratio >= 1.0 or inside == 0:
+        return 1.0
+    return float(np.clip(ratio / (1.0 - ratio) * (outside - inside) / inside, PRESSED, 1.0))
 
 
 def extract_garment(surface: TriangleMesh, labels: SurfaceLabels, config: SubtractConfig, job: Job) -> TriangleMesh:
