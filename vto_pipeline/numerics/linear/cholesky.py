@@ -16,14 +16,22 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from vto_pipeline.numerics.linear.elimination import BINS, Elimination
-from vto_pipeline.numerics.linear.product_tile import COLUMNS, TALL, subtract_six, subtract_tall, subtract_three
+from vto_pipeline.numerics.linear.product_tile import (
+    COLUMNS,
+    PAIRS,
+    TALL,
+    subtract_pair,
+    subtract_six,
+    subtract_tall,
+    subtract_three,
+)
 
 _SIDE_BY_SIDE = 4e6  # flops; with less, starting the threads costs more than they save
 _SHARED = 1e6  # products; with more, all threads share what pivots make of the rest of a front
 _TAKEN = 1e5  # entries passed on, likewise
 _STRIP = 24  # rows that a thread takes at a time
 _ABREAST = 8  # tiles that a thread divides by pivots at a time
-_BESIDE = 24  # tiles, side by side: their share of the pivots then stays in the cache
+_BESIDE = 24  # tiles, an even number, side by side: their share of the pivots then stays in the cache
 _PIVOTS = 96  # at a time: what they make of a tile then stays in the cache
 
 
@@ -290,18 +298,25 @@ def _subtract_all(pivots, rows, begin, end, shift, threaded):
 
 @njit(cache=True, error_model="numpy")
 def _tiles(pivots, shift, width, begin):
-    """Return the pivots' last columns from `begin` on by tiles, the last first, shape (T, P, COLUMNS).
+    """Return the pivots' last columns from `begin` on by pairs of tiles, the last first, shape (T, P, 2 COLUMNS).
 
-    So the inner loops read along memory; in a large front each pivot is on a page of its own.
+    So the inner loops read along memory; in a large front each pivot is on a page of its own. Of an odd
+    number of tiles, the last has a pair to itself.
     """
     count = min((width - begin + COLUMNS - 1) // COLUMNS, width // COLUMNS)
-    tiles = np.empty((count, len(pivots), COLUMNS))
+    pairs = np.empty(((count + 1) // 2, len(pivots), 2 * COLUMNS))
     for p in range(len(pivots)):
         for n in range(count):
-            first = shift + width - COLUMNS * (n + 1)
+            first, at = shift + width - COLUMNS * (n + 1), _place_in_pair(n)
             for k in range(COLUMNS):
-                tiles[n, p, k] = pivots[p, first + k]
-    return tiles
+                pairs[n // 2, p, at + k] = pivots[p, first + k]
+    return pairs
+
+
+@njit(cache=True, error_model="numpy")
+def _place_in_pair(n):
+    """Return the column of its pair where tile n begins: the right half comes first."""
+    return COLUMNS * (1 - n % 2)
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
@@ -324,12 +339,17 @@ def _subtract(pivots, beside, rows, begin, end, shift):
             for p in range(count):
                 for k in range(tall):
                     above[p, k] = pivots[p, shift + i + k]
-            for n in range(first, min(first + _BESIDE, (width - i + COLUMNS - 1) // COLUMNS, width // COLUMNS)):
-                j = width - COLUMNS * (n + 1)
+            n, last = first, min(first + _BESIDE, (width - i + COLUMNS - 1) // COLUMNS, width // COLUMNS)
+            while PAIRS and tall == TALL and n + 1 < last:
+                subtract_pair(above, 0, beside[n // 2], 0, count, rows, i, width - COLUMNS * (n + 2))
+                n += 2
+            while n < last:
+                j, at = width - COLUMNS * (n + 1), _place_in_pair(n)
                 if tall == TALL:
-                    subtract_tall(above, 0, beside[n], 0, count, rows, i, j)
+                    subtract_tall(above, 0, beside[n // 2], at, count, rows, i, j)
                 elif tall == 6:
-                    subtract_six(above, 0, beside[n], 0, count, rows, i, j)
+                    subtract_six(above, 0, beside[n // 2], at, count, rows, i, j)
                 else:
-                    subtract_three(above, 0, beside[n], 0, count, rows, i, j)
+                    subtract_three(above, 0, beside[n // 2], at, count, rows, i, j)
+                n += 1
             i += tall

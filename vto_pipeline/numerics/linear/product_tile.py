@@ -2,7 +2,8 @@
 
 Left to itself, the compiler keeps no tile in registers, and a loop that reads and writes all it sums runs at a third of
 the speed. Here a tall tile takes twelve registers: 6 x 8 sums in registers of four numbers, 12 x 8 in those of eight.
-Each loaded number serves six to twelve times, and only the last sums meet the memory (Goto & van de Geijn 2008).
+Each loaded number serves six to twelve times, and only the last sums meet the memory (Goto & van de Geijn 2008). Where
+there are 32 registers, two such tiles side by side take 24 of them, and what one spreads serves the other, too.
 """
 
 from __future__ import annotations
@@ -25,12 +26,15 @@ _LANES = 8 if _LONG else 4  # numbers in a vector; where registers are shorter, 
 TALL = 12 if _LONG else 6
 """How many rows the tallest tile has."""
 
+PAIRS = _LONG
+"""Whether there are registers for two of the tallest side by side."""
+
 _VECTOR = ir.VectorType(ir.DoubleType(), _LANES)
 _CONTRACT = ("contract",)  # a product and a sum in one instruction lose nothing
 
 
-def _subtract_tile(height: int) -> Any:
-    """Return a function that subtracts tiles of this many rows."""
+def _subtract_tile(height: int, width: int = COLUMNS) -> Any:
+    """Return a function that subtracts tiles of this many rows and columns."""
 
     @intrinsic  # type: ignore[misc]
     def subtract(typingctx, above, i, beside, j, count, out, row, column):  # type: ignore[no-untyped-def]
@@ -39,7 +43,7 @@ def _subtract_tile(height: int) -> Any:
         def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
             left, right, target = (context.make_array(signature.args[k])(context, builder, args[k]) for k in (0, 2, 5))
             place = _places(builder)
-            vectors = range(0, COLUMNS, _LANES)
+            vectors = range(0, width, _LANES)
             sums = {(r, v): cgutils.alloca_once_value(builder, _zero()) for r in range(height) for v in vectors}
             with cgutils.for_range(builder, args[4]) as loop:
                 across = [builder.load(place(right, loop.index, args[3], 0, v, _VECTOR), align=8) for v in vectors]
@@ -64,8 +68,11 @@ subtract_tall = _subtract_tile(TALL)
 Args (above, i, beside, j, count, out, row, column): arrays float64, of two dimensions and in C order; all within them.
 """
 
+subtract_pair = _subtract_tile(TALL, 2 * COLUMNS)
+"""The same for two tiles side by side; without PAIRS no faster than one by one."""
+
 subtract_six, subtract_three = _subtract_tile(6), _subtract_tile(3)
-"""The same for fewer rows."""
+"""The same as the tall one for fewer rows."""
 
 
 def _places(builder: ir.IRBuilder) -> Callable[..., ir.Value]:
