@@ -20,7 +20,7 @@ from vto_pipeline.model.mesh import TriangleMesh
 _WINDOW = 0.05  # s of cloth time between changes of speed
 _SLOWEST = 0.125  # of full speed
 _CAREFUL = 0.03  # of full speed: the slowest where parts of the body go through cloth in one step
-_LONGEST = 8.0  # times as long as at full speed, what only grows: as at the slowest pace but where it is careful
+_LONGEST = 1.0 / _SLOWEST  # times as long as at full speed, what only grows: only where it is careful is it slower
 _BRAKE, _PICK_UP = 0.5, 1.25  # of the speed, where contact is deep and where it is not
 _AGAIN = 0.25  # of the speed, where a part went through
 _SHALLOW = 0.25  # of what counts as deep: between the two, the speed is kept

@@ -155,8 +155,8 @@ class Phases:
         """Return the cloth clear of the body as it ends; where that cannot be, it may cross.
 
         What is finer than the cloth grows out between its vertices. It is moved off, else pushed off by a thicker skin.
-        Where that fails, too, the body grows again, and its vertices and edges keep out of the cloth. What is far too
-        small jams then, after minutes.
+        Where that fails, too, the body grows again, and its vertices and edges keep out of the cloth. It does not where
+        that is far too small, and would jam after minutes.
 
         Raises:
             IntersectingError: it jams on the way.
