@@ -325,6 +325,23 @@ def test_cloth_that_is_caught_ends_with_its_frame_and_keeps_those_before():
     assert caught.value.partial["motion_audit"]["frames"] == 4
 
 
+@pytest.mark.parametrize(("times", "overstretched"), [(1.7, 0), (2.2, 1)])
+def test_frames_that_stretch_cloth_as_none_can_be_are_told(times, overstretched):
+    """A shell drawn over a ball that grows further: its edges are as much longer as the ball is wider."""
+    rest, job = ball(1.02 * RADIUS, levels=3), Job()
+
+    def size(t):
+        return 1.4 + (times - 1.4) * smooth(t / 0.3)
+
+    start = Garment(TriangleMesh(1.4 * rest.vertices, rest.faces), RestShape(rest.vertices))
+    _, found = follow(start, path(lambda t, x: size(t) * x, 0.3), cloth(), None, job)
+    assert_allclose([1.0 + one["max_stretch"] for one in found["per_frame"]], [size(k / 30) for k in range(10)], rtol=0.06)
+    assert bool(found["frames_overstretched"]) == bool(overstretched)
+    told = [line for line in job.warnings if "as none can be" in line]
+    assert len(told) == overstretched
+    assert all("in 4 frames: 6, 7, 8, 9: it is too small for this motion" in line for line in told)
+
+
 def test_unknown_settings_are_refused(cap):
     with pytest.raises(ConfigError, match="frames_a_second"):
         follow(cap, path(lambda t, x: x, 0.1), cloth(), {"frames_a_second": 3})

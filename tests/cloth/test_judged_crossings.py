@@ -1,6 +1,7 @@
 """The judge's test of which triangles cross: by hand, by ipctk, in rationals, and against the solver's own."""
 
 import ast
+import time
 from fractions import Fraction
 from itertools import combinations
 from pathlib import Path
@@ -149,7 +150,26 @@ def test_what_floats_are_sure_of_is_so_in_rationals(seed):
     assert 5 < (sure != 0).sum() < 100
     for k in np.flatnonzero(sure):
         assert judge._apart(one[k], two[k]) == (sure[k] < 0)
-    assert isinstance(judge._exact(one[0, 0])[0], Fraction)
+
+
+def test_whole_numbers_are_the_points_without_rounding():
+    points = np.random.default_rng(0).normal(size=(50, 3)) * 10.0 ** np.arange(-25, 25)[:, None]
+    points[3] = [0.0, -1e-300, 5e-324]
+    whole = judge._in_whole_numbers(points)
+    times = Fraction(whole[40][0]) / Fraction(points[40][0])
+    assert [[Fraction(part) for part in point] for point in whole] == [
+        [times * Fraction(part) for part in point] for point in points.tolist()
+    ]
+
+
+def test_a_shell_laid_on_its_own_faces_is_decided_in_seconds():
+    """Floating point decides nothing there. On a convex body, faces meet where they share a vertex, and nowhere else."""
+    shell = ball(1.0, levels=1)
+    corners = [set(face) for face in shell.faces.tolist()]
+    shared = [[a, b] for a, one in enumerate(corners) for b, other in enumerate(corners) if one & other]
+    began = time.process_time()
+    assert_array_equal(crossings_between(shell, shell), shared)
+    assert time.process_time() - began < 0.02 * len(shared)
 
 
 def test_the_judge_is_not_taken_in_by_the_solvers_test(monkeypatch):

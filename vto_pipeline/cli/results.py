@@ -108,6 +108,11 @@ def motion_lines(found: Mapping[str, Any]) -> Iterator[str]:
         f"{found['max_thread_stretch']:.0%}, on 99% of the cloth by up to {found['p99_thread_stretch']:.0%}, and "
         f"sheared by up to {found['max_shear_deg']:.0f} degrees; {found['seconds_per_frame']:.1f} s a frame"
     )
+    if found["frames_overstretched"]:
+        yield (
+            f"  stretched as no cloth can be in {found['frames_overstretched']} frames, an edge by up to "
+            f"{found['max_stretch']:.0%}: too small for this motion, or caught"
+        )
     yield f"  cloth beyond what its fabric is known to bear, at most in a frame: {_beyond(found)}"
 
 

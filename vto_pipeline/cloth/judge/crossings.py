@@ -3,14 +3,13 @@
 The solver asks on which side of a plane points lie (`geometry.intersections`). The judge looks for a direction along
 which two triangles lie apart: there is one exactly when they do not meet (the separating axis theorem; Gottschalk, Lin
 & Manocha 1996, "OBBTree"). Floating point decides where the gap, or the overlap along every axis, is larger than its
-own error; the rest is decided in rational numbers. Touching counts. Faces that share one vertex are held against each
+own error; the rest is decided in whole numbers. Touching counts. Faces that share one vertex are held against each
 other by the edges opposite to it, faces that share two are not: they only meet where they are folded flat together.
 """
 
 from __future__ import annotations
 
-from fractions import Fraction
-from itertools import combinations
+from itertools import chain, combinations
 
 import numpy as np
 from numba import njit
@@ -160,7 +159,7 @@ def _gap(one, two, axis):  # type: ignore[no-untyped-def]
     return max(there_low - here_high, here_low - there_high)
 
 
-Exact = tuple[Fraction, Fraction, Fraction]
+Exact = tuple[int, int, int]
 
 
 def _apart(one: FloatArray, two: FloatArray) -> bool:
@@ -169,22 +168,24 @@ def _apart(one: FloatArray, two: FloatArray) -> bool:
     Along crosses of their edges and of the way between them, and along those turned within their planes: some of these
     part them even where both lie in one plane, on one line, or are one point.
     """
-    ours, theirs = ([_exact(corner) for corner in corners] for corners in (one, two))
+    points = _in_whole_numbers(np.vstack([one, two]))
+    ours, theirs = points[: len(one)], points[len(one) :]
     ways = [_minus(b, a) for corners in (ours, theirs) for a, b in combinations(corners, 2)]
     ways.append(_minus(theirs[0], ours[0]))
     crosses = [_cross(u, v) for u, v in combinations(ways, 2)]
     turned = (_cross(n, u) for n in crosses for u in ways)
-    for axes in (crosses, ways, turned):
-        for axis in axes:
-            here, there = ([_dot(corner, axis) for corner in corners] for corners in (ours, theirs))
-            if max(here) < min(there) or max(there) < min(here):
-                return True
+    for axis in chain(crosses, ways, turned):
+        here, there = ([_dot(corner, axis) for corner in corners] for corners in (ours, theirs))
+        if max(here) < min(there) or max(there) < min(here):
+            return True
     return False
 
 
-def _exact(point: FloatArray) -> Exact:
-    x, y, z = (Fraction(float(part)) for part in point)
-    return x, y, z
+def _in_whole_numbers(points: FloatArray) -> list[Exact]:
+    """Return points times the least power of two that makes whole numbers of all of them: no part is rounded."""
+    ratios = [[float(part).as_integer_ratio() for part in point] for point in points]
+    times = max(below for point in ratios for _, below in point)
+    return [(x * (times // a), y * (times // b), z * (times // c)) for (x, a), (y, b), (z, c) in ratios]
 
 
 def _minus(a: Exact, b: Exact) -> Exact:
@@ -195,5 +196,5 @@ def _cross(a: Exact, b: Exact) -> Exact:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-def _dot(a: Exact, b: Exact) -> Fraction:
+def _dot(a: Exact, b: Exact) -> int:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -17,6 +17,7 @@ from vto_pipeline.cloth.model.settings import checked
 from vto_pipeline.cloth.moving.config import FollowConfig
 from vto_pipeline.cloth.moving.frame import FrameStepper, moment_from
 from vto_pipeline.cloth.moving.frame_audit import audit_frame
+from vto_pipeline.cloth.placement.clear_body import OVERSTRETCHED
 from vto_pipeline.errors import SimulationError
 from vto_pipeline.io.runs.frame_log import FrameLog
 from vto_pipeline.model.fabric import Fabric
@@ -128,6 +129,7 @@ def summary(records: Sequence[Mapping[str, Any]], fabric: Fabric) -> dict[str, A
         "frames": len(records),
         "frames_crossing_body": sum(record["body_crossings"] > 0 for record in records),
         "frames_crossing_itself": sum(record["self_crossings"] > 0 for record in records),
+        "frames_overstretched": sum(_is_overstretched(record) for record in records),
         "frames_body_crossing_itself": sum(record["own_crossings"] > 0 for record in records),
         "most_body_crossings": most("body_crossings"),
         "most_self_crossings": most("self_crossings"),
@@ -143,12 +145,29 @@ def summary(records: Sequence[Mapping[str, Any]], fabric: Fabric) -> dict[str, A
     }
 
 
+def _is_overstretched(record: Mapping[str, Any]) -> bool:
+    """Return whether an edge is longer than any cloth lets it be: such a frame is no picture of how it fits."""
+    return bool(1.0 + record["max_stretch"] > OVERSTRETCHED)
+
+
 def _warn(found: Mapping[str, Any], job: Job) -> None:
-    for kind, name in (("body", "body_crossings"), ("itself", "self_crossings")):
-        places = [k for k, record in enumerate(found["per_frame"]) if record[name]]
-        if places:
-            shown = ", ".join(map(str, places[:_SHOWN])) + (" ..." if len(places) > _SHOWN else "")
-            job.warn(f"the garment crosses {'the ' if kind == 'body' else ''}{kind} in {len(places)} frames: {shown}")
+    """Warn of each kind of frame that shows what cannot be, and of which they are."""
+    records = found["per_frame"]
+
+    def frames(is_wrong: Callable[[Mapping[str, Any]], bool]) -> str:
+        places = [str(k) for k, record in enumerate(records) if is_wrong(record)]
+        shown = ", ".join(places[:_SHOWN]) + (" ..." if len(places) > _SHOWN else "")
+        return f"{len(places)} frames: {shown}" if places else ""
+
+    if told := frames(lambda record: record["body_crossings"] > 0):
+        job.warn(f"the garment crosses the body in {told}")
+    if told := frames(lambda record: record["self_crossings"] > 0):
+        job.warn(f"the garment crosses itself in {told}")
+    if told := frames(_is_overstretched):
+        job.warn(
+            f"the cloth is stretched as none can be, by up to {found['max_stretch']:.0%}, in {told}: "
+            "it is too small for this motion, or caught"
+        )
 
 
 def _pace(number: int, frames: int, records: Sequence[Mapping[str, Any]]) -> str:
