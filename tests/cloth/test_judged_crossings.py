@@ -163,7 +163,7 @@ def test_whole_numbers_are_the_points_without_rounding():
 
 
 def test_a_shell_laid_on_its_own_faces_is_decided_in_seconds():
-    """Floating point decides nothing there. On a convex body, faces meet where they share a vertex, and nowhere else."""
+    """Floating point decides nothing there. Faces of a convex body meet where they share a vertex, and nowhere else."""
     shell = ball(1.0, levels=1)
     corners = [set(face) for face in shell.faces.tolist()]
     shared = [[a, b] for a, one in enumerate(corners) for b, other in enumerate(corners) if one & other]
