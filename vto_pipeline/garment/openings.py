@@ -17,7 +17,7 @@ from vto_pipeline.garment.notches import close_notches
 from vto_pipeline.garment.photographed.carved import carve_fillings
 from vto_pipeline.garment.photographed.confirmed import LookAgain, confirm_fillings
 from vto_pipeline.garment.photographed.covered import bare_loops, covered_loops
-from vto_pipeline.garment.photographed.parted import refuse_parted, refuse_unseen
+from vto_pipeline.garment.photographed.parted import refuse_parted, refuse_unseen, warn_of_lost
 from vto_pipeline.garment.photographed.seen_ends import Scanned, Seen, refuse_unseen_ends
 from vto_pipeline.garment.photographed.sightings import look_at_mannequin
 from vto_pipeline.garment.pierced import open_pierced
@@ -191,6 +191,7 @@ def close_scan_holes(
         sightings = None if photos is None else look_at_mannequin(final, observed, mannequin, photos, job)
         if sightings is not None:
             refuse_parted(sightings, final, found, config.keep is not None, job)
+            warn_of_lost(sightings, final, found, job)
         if bare is not None and not (hardly_told and sightings is None):
             refuse_unseen(final, found, mannequin, bare, sightings, answered, job)
     if scan is not None:

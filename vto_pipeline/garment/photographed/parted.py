@@ -29,6 +29,8 @@ LEAST_PART = 0.006
 [m²]."""
 LEAST_CLOTH = 0.001
 """Less cloth is within the error of a rim: a strap of 2 cm by 5 [m²]."""
+LEAST_LOST = 0.005
+"""Less cloth that parts nothing is a rim that ends some millimetres early [m²]."""
 AT_RIM = 0.05
 """Cloth that stands off from the mannequin ends within this of what was lost [m]."""
 STRAP = 0.08
@@ -70,6 +72,24 @@ def refuse_parted(
     for parted in parted_openings(sightings, garment.vertices):
         lacks = f"the photos show {parted.area * 1e4:.0f} cm² of cloth there that the garment lacks"
         _refuse(parted, f"should be at least {parted.parts}: {lacks}", garment, openings, answered, job)
+
+
+def warn_of_lost(sightings: Sightings, garment: TriangleMesh, openings: Sequence[Opening], job: Job) -> None:
+    """Warn of cloth beside an opening that photos show and the garment lacks, though it parts nothing: a torn chest.
+
+    Args:
+        sightings: What the photos show where the garment leaves the mannequin bare.
+        garment: The finished garment.
+        openings: Of it; at least one.
+        job: Receives the warnings.
+    """
+    patch = _pieces(sightings.points, _hanging_on(sightings, garment.vertices), sightings.area)
+    for number in range(patch.max(initial=-1) + 1):
+        cloth = sightings.points[patch == number]
+        area = len(cloth) * sightings.area
+        if area >= LEAST_LOST:
+            lacks = f"photos show {area * 1e4:.0f} cm² of cloth that the garment lacks"
+            _refuse(Parted(1, cloth, area), f"is uncertain: {lacks}", garment, openings, True, job)
 
 
 def refuse_unseen(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from vto_pipeline.garment.align import PosedPhotos
 from vto_pipeline.garment.subtraction.color_model import color_evidence
+from vto_pipeline.garment.subtraction.variety import picture_variety, variety_evidence
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.geometry.seen.depth_picture import depth_picture
 from vto_pipeline.geometry.topology import submesh, surface_area
@@ -37,8 +38,10 @@ LEAST_PIXELS = 300
 SURE = 1.0
 """Log-likelihood ratio of a colour that tells cloth from mannequin."""
 CLOTH_TOLD, FORM_TOLD = 0.8, 0.4
-"""So much of the garment, and of what shows of the mannequin, its colour must tell in a photo: part of what shows of
+"""So much of the garment, and of what shows of the mannequin, must be told in a photo: part of what shows of
 the mannequin may be cloth that the surface lacks."""
+VARIETY_PX = 15
+"""Side of the square in which colours vary: a few centimetres of cloth."""
 LEAST_VIEWS = 2
 """Photos that must show a point."""
 MOST = 4.0
@@ -91,7 +94,9 @@ def look_at_mannequin(
         cloth = depth_picture(garment, camera, cam_from_world)
         observed_cloth = depth_picture(seen_cloth, camera, cam_from_world)
         evidence = _evidence(
-            picture, _eroded(np.isfinite(cloth) & (observed_cloth <= cloth) & (cloth < form)), _eroded(form < cloth)
+            picture,
+            _eroded(np.isfinite(cloth) & (observed_cloth <= cloth) & (cloth < form)),
+            _eroded(form < cloth - BEHIND),  # it pokes through cloth that is pressed on
         )
         return None if evidence is None else _read(points, normals, pose, camera, form, evidence)
 
@@ -156,14 +161,22 @@ def _eroded(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def _evidence(picture: ByteArray, cloth: NDArray[np.bool_], form: NDArray[np.bool_]) -> NDArray[np.float32] | None:
     """Return the log-likelihood ratio of cloth against mannequin on what shows of the mannequin, NaN elsewhere, (H, W);
-    None where the photo shows too little of either, or their colours do not tell them apart."""
+    None where the photo shows too little of either, or their colours do not tell them apart.
+
+    Colours tell, or how they vary from place to place: what tells better decides alone. A form in the shadow of a hem
+    may be as grey as a print, but no print is of one colour.
+    """
     if cloth.sum() < LEAST_PIXELS or form.sum() < LEAST_PIXELS:
         return None
     colors = np.vstack([picture[cloth], picture[form]])
     is_cloth = np.arange(len(colors)) < cloth.sum()
-    ratio = color_evidence(colors, is_cloth, ~is_cloth)
-    if np.mean(ratio[is_cloth] > SURE) < CLOTH_TOLD or np.mean(ratio[~is_cloth] < -SURE) < FORM_TOLD:
+    variety = np.concatenate([picture_variety(picture, shown, VARIETY_PX)[shown] for shown in (cloth, form)])
+    kinds = (color_evidence(colors, is_cloth, ~is_cloth), variety_evidence(variety, is_cloth, ~is_cloth))
+    told = [(float(np.mean(kind[is_cloth] > SURE)), float(np.mean(kind[~is_cloth] < -SURE))) for kind in kinds]
+    telling = [k for k, (of_cloth, of_form) in enumerate(told) if of_cloth >= CLOTH_TOLD and of_form >= FORM_TOLD]
+    if not telling:
         return None
+    ratio = kinds[max(telling, key=lambda k: sum(told[k]))]
     evidence = np.full(cloth.shape, np.float32(np.nan), dtype=np.float32)
     evidence[form] = np.clip(ratio[~is_cloth], -MOST, MOST)
     return evidence

@@ -42,11 +42,22 @@ def color_evidence(
         light: Standard deviation of the smoothing along lightness [bins]; more where the two lie in other light.
         most_mixed: The mixed hold no larger share of the pure material.
     """
-    cell = _cells(colors, bins)
+    return evidence_of_cells(_cells(colors, bins), pure, mixed, bins, light, most_mixed)
+
+
+def evidence_of_cells(
+    cell: tuple[IntArray, ...],
+    pure: NDArray[np.bool_],
+    mixed: NDArray[np.bool_],
+    bins: int,
+    light: float,
+    most_mixed: float,
+) -> FloatArray:
+    """Return the evidence of `color_evidence` by the cells of a histogram, an array (V,) for each of its axes."""
     one, both = (_density(cell, members, bins, light)[cell] for members in (pure, mixed))
     share = min(float(np.median(both[pure] / one[pure])), most_mixed, MOST_MIXED)
     other = np.maximum(both - share * one, 0.0) / (1.0 - share)
-    anything = SURPRISE / bins**3
+    anything = SURPRISE / bins ** len(cell)
     return np.log((1.0 - SURPRISE) * one + anything) - np.log((1.0 - SURPRISE) * other + anything)
 
 
@@ -92,9 +103,9 @@ def _cells(colors: ByteArray, bins: int) -> tuple[IntArray, ...]:
 
 
 def _density(cell: tuple[IntArray, ...], members: NDArray[np.bool_], bins: int, light: float) -> FloatArray:
-    histogram = np.zeros((bins, bins, bins))
+    histogram = np.zeros((bins,) * len(cell))
     np.add.at(histogram, tuple(axis[members] for axis in cell), 1.0)
-    sigmas = (light, HISTOGRAM_SIGMA, HISTOGRAM_SIGMA)
+    sigmas = (light, HISTOGRAM_SIGMA, HISTOGRAM_SIGMA)[: len(cell)]
     smooth: FloatArray = gaussian_filter(histogram / members.sum(), sigmas, mode="nearest")
     return smooth
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 from scipy.special import ndtr
 
@@ -12,6 +13,7 @@ from vto_pipeline.garment.subtraction.color_model import cielab, color_evidence
 from vto_pipeline.garment.subtraction.floor import is_level, not_worn
 from vto_pipeline.garment.subtraction.graph_cut import minimum_cut
 from vto_pipeline.garment.subtraction.thin_parts import thin_parts
+from vto_pipeline.garment.subtraction.variety import surface_variety, variety_evidence
 from vto_pipeline.geometry.remeshing.clip import clip_to_positive
 from vto_pipeline.geometry.remeshing.repair import RepairConfig, repair
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
@@ -44,6 +46,8 @@ SURELY_BARE, FACING = 2.0, 0.7
 """What lies no deeper inside than so many deviations of the noise, and faces as the mannequin (cosine), is bare."""
 PRESSED = 0.5
 """Cloth that is pressed on the mannequin may be such a share of what passes for bare, whatever the distances say."""
+SURE, TOLD = 1.0, 0.8
+"""How colours vary counts where so much of either side has such a log-likelihood ratio or more."""
 FLOOR_REACH = 0.01
 """A board on the floor may lie so much higher than the lowest point of the mannequin [m]."""
 
@@ -61,8 +65,9 @@ def label_garment(surface: TriangleMesh, mannequin: TriangleMesh, config: Subtra
     """Divide the scan into garment and the rest by an exact graph cut.
 
     Evidence per vertex: the signed distance against the noise measured on the bare parts, the colour, and whether the
-    normal agrees with the mannequin's. The form's colours are those of what lies just inside of it, where no cloth can
-    be: as far outside, tight cloth may be most of what there is. A boundary is cheap where the colour changes. The
+    normal agrees with the mannequin's. Where cloth is printed, so that colours vary from place to place as they do on
+    no form, it is cut once more with that. The form's colours are those of what lies just inside of it, where no cloth
+    can be: as far outside, tight cloth may be most of what there is. A boundary is cheap where the colour changes. The
     level surface that the scan stands on is floor or board; cloth that hangs below the mannequin is cloth.
 
     Args:
@@ -86,7 +91,7 @@ def label_garment(surface: TriangleMesh, mannequin: TriangleMesh, config: Subtra
             f"no part of the scan stands off from the mannequin by more than {(thickness + 3 * sigma) * 1e3:.1f} mm",
             hint="is the garment on the mannequin, and the scan aligned?",
         )
-    by_color = thickened = None
+    by_color, thickened, mixed = None, None, 1.0
     if surface.colors is None:
         job.leave_out("colour evidence", "the scan has no colours")
     elif not sure_bare.any():
@@ -95,14 +100,24 @@ def label_garment(surface: TriangleMesh, mannequin: TriangleMesh, config: Subtra
         facing_out = near.distance[(facing > FACING) & ~floor]
         mixed = most_mixed(facing_out, sigma, thickness)
         by_color = color_evidence(surface.colors, sure_garment, sure_bare, most_mixed=mixed)
-        by_color = np.clip(by_color, -CERTAIN, CERTAIN)
         thickened = np.where(thin_parts(mannequin), THICKENED, SELDOM)[near.face]
-    evidence = _distance_evidence(near.distance, sigma, thickness, thickened)
-    evidence = np.where(facing < 0.0, np.maximum(evidence, CERTAIN / 2.0), evidence)
+    by_distance = _distance_evidence(near.distance, sigma, thickness, thickened)
+    by_distance = np.where(facing < 0.0, np.maximum(by_distance, CERTAIN / 2.0), by_distance)
+    pair, price = edges(surface), boundary_price(surface, config)
+
+    def cut(by_look: FloatArray | float) -> tuple[FloatArray, NDArray[np.bool_]]:
+        evidence = np.where(floor, -4.0 * CERTAIN, by_distance + np.clip(by_look, -CERTAIN, CERTAIN))
+        return evidence, minimum_cut(evidence, pair, price)
+
+    evidence, garment = cut(0.0 if by_color is None else by_color)
     if by_color is not None:
-        evidence = evidence + by_color
-    evidence = np.where(floor, -4.0 * CERTAIN, evidence)
-    garment = minimum_cut(evidence, edges(surface), boundary_price(surface, config))
+        by_variety = variety_evidence(surface_variety(surface, garment), sure_garment, sure_bare, mixed)
+        of_cloth, of_form = np.mean(by_variety[sure_garment] > SURE), np.mean(by_variety[sure_bare] < -SURE)
+        if min(of_cloth, of_form) >= TOLD:
+            evidence, garment = cut(by_color + by_variety)
+            job.note(f"a print: how colours vary tells {of_cloth:.0%} of the cloth, and {of_form:.0%} of the form")
+        else:
+            job.leave_out("evidence by how colours vary", "cloth and form are told apart by it nowhere, or in part")
     job.measure(noise_mm=sigma * 1e3, garment_share=float(garment.mean()))
     confidence = 1.0 / (1.0 + np.exp(-np.where(garment, evidence, -evidence)))
     return SurfaceLabels(garment, confidence)
