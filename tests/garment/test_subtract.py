@@ -70,6 +70,28 @@ def test_cloth_of_nearly_the_forms_colours_is_told_by_distance(scene, placed):
     assert (labels.garment == scene.is_shirt)[~scene.on_ledge].mean() > 0.985
 
 
+def test_a_print_is_told_from_a_form_in_shade_by_how_its_colours_vary(scene, placed):
+    """Stereo finds a print to 0.2 mm, and guesses a plain form to 1.8: cloth 2 mm off it lies within that noise. In
+    part of the print are the greys that the form has where light comes from above."""
+    rng = np.random.default_rng(2)
+    pressed = scene.is_shirt & (placed.vertices[:, 1] > 0.55) & (placed.vertices[:, 2] > 0.0)
+    foot = SurfaceDistance(scene.form).nearest(placed.vertices)
+    out = face_normals(scene.form)[foot.face]
+    away = np.where(pressed, rng.normal(2e-3, 2e-4, len(out)), rng.normal(0.0, 1.8e-3, len(out)))
+    moved = pressed | ~scene.is_shirt
+    vertices = np.where(moved[:, None], foot.point + away[:, None] * out, placed.vertices)
+    flowers = np.array([[150, 145, 132], [205, 190, 170], [160, 175, 190], [190, 150, 140]], float)
+    spot = np.floor(placed.vertices / 0.012).astype(int) @ [1, 3, 5] % 4
+    colors = np.where(scene.is_shirt[:, None], flowers[spot], [210.0, 195.0, 175.0])
+    colors = colors * (0.78 + 0.22 * out[:, 1:2]) + rng.normal(0.0, 3.0, colors.shape)
+    surface = TriangleMesh(vertices, placed.faces, np.clip(colors, 0, 255).astype(np.uint8))
+    job = Job()
+    labels = label_garment(surface, scene.form, SubtractConfig(), job)
+    assert any("how colours vary tells" in note for note in job.notes)
+    assert labels.garment[pressed].mean() > 0.93
+    assert labels.garment[~scene.is_shirt & ~scene.on_ledge].mean() < 0.025
+
+
 @pytest.mark.parametrize("thick", [0.0015, 0.0025])
 def test_bare_arms_that_were_scanned_too_thick_are_the_forms_by_their_colour(scene, placed, thick):
     """They lie as far from the form as tight cloth, many times its noise; the shirt's sleeves are where they were."""

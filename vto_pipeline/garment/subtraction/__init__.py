@@ -2,6 +2,7 @@
 
 floor: what is not worn
 color_model: the colours of cloth and mannequin
+variety: how colours vary, on a print and on a form
 graph_cut: labels from evidence
 thin_parts: parts of the mannequin that come out too thick
 subtract: over a mannequin that was scanned bare; the garment's shell
