@@ -117,7 +117,7 @@ def label_garment(surface: TriangleMesh, mannequin: TriangleMesh, config: Subtra
             evidence, garment = cut(by_color + by_variety)
             job.note(f"a print: how colours vary tells {of_cloth:.0%} of the cloth, and {of_form:.0%} of the form")
         else:
-            job.leave_out("evidence by how colours vary", "cloth and form are told apart by it nowhere, or in part")
+            job.leave_out("evidence by how colours vary", "it does not tell cloth from form")
     job.measure(noise_mm=sigma * 1e3, garment_share=float(garment.mean()))
     confidence = 1.0 / (1.0 + np.exp(-np.where(garment, evidence, -evidence)))
     return SurfaceLabels(garment, confidence)
