@@ -10,7 +10,7 @@ from test_parted import CELL, form, photographs
 from vto_pipeline.garment.bare_parts import BareParts
 from vto_pipeline.garment.loop_evidence import encloses
 from vto_pipeline.garment.openings import OpeningsConfig, close_scan_holes, list_openings
-from vto_pipeline.garment.photographed.covered import covered_loops
+from vto_pipeline.garment.photographed.covered import BARE, COVERED, cloth_shares
 from vto_pipeline.garment.photographed.sightings import Sightings
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import submesh
@@ -114,7 +114,10 @@ def test_what_counts_is_what_shows_within_each_loop():
     points = np.column_stack([x.ravel(), 0.0 * x.ravel(), z.ravel()])
     points = points[~((points[:, 0] > 0.38) & (np.arange(len(points)) % 40 > 0))]
     sightings = Sightings(points, points[:, 0] < 0.1, 25e-6)
-    assert covered_loops(sightings, [circle(0.0), circle(0.2), circle(0.45)]) == [True, False, False]
+    covered, bare, nothing = cloth_shares(sightings, [circle(0.0), circle(0.2), circle(0.45)])
+    assert covered > COVERED
+    assert bare < BARE
+    assert nothing is None
     mixed = Sightings(points, points[:, 2] > 0.0, 25e-6)
-    assert covered_loops(mixed, [circle(0.0), circle(0.2)]) == [False, False]
-    assert covered_loops(sightings, []) == []
+    assert all(BARE < share < COVERED for share in cloth_shares(mixed, [circle(0.0), circle(0.2)]))
+    assert cloth_shares(sightings, []) == []

@@ -11,15 +11,17 @@ from pydantic import Field
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.align import PosedPhotos
 from vto_pipeline.garment.bare_parts import BareParts
+from vto_pipeline.garment.falls import trim_falls
 from vto_pipeline.garment.lifting import HINT, check_lifted, lift_fillings, pierced_fillings
 from vto_pipeline.garment.loop_evidence import LoopShape, disc_of, encloses, goes_round, is_filled, measure_loops
 from vto_pipeline.garment.notches import close_notches
 from vto_pipeline.garment.photographed.carved import carve_fillings
 from vto_pipeline.garment.photographed.confirmed import LookAgain, confirm_fillings
-from vto_pipeline.garment.photographed.covered import bare_loops, covered_loops
-from vto_pipeline.garment.photographed.parted import refuse_parted, refuse_unseen, warn_of_lost
+from vto_pipeline.garment.photographed.covered import BARE, COVERED, cloth_shares
+from vto_pipeline.garment.photographed.parted import refuse_parted, refuse_unseen
 from vto_pipeline.garment.photographed.seen_ends import Scanned, Seen, refuse_unseen_ends
 from vto_pipeline.garment.photographed.sightings import look_at_mannequin
+from vto_pipeline.garment.photographed.unsure import SEEN_BARE, unsure_loops
 from vto_pipeline.garment.pierced import open_pierced
 from vto_pipeline.garment.rims import drop_flaps, fair_rims, trim_ledges
 from vto_pipeline.garment.subtraction.pieces import (
@@ -43,9 +45,6 @@ from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.model.settings import Config
 
-SEEN_BARE = 0.95
-"""Through an opening that the mannequin fills, but does not come out of, such a share of it was seen bare: a form's
-neck ends in the collar. Cloth that lies close was taken for bare over a quarter of a hole at most."""
 FILLED_RIM = 1.0 / 3.0
 """With a larger share of its rim filled, an opening's length is uncertain."""
 
@@ -121,6 +120,8 @@ def close_scan_holes(
     large, rest = split_off(shell, may_be_worn(shell, distance))
     thinned = _thinned(large, config.edge_mm * 1e-3, job)
     trimmed = thinned if mannequin is None else trim_ledges(thinned, mannequin, config.ledge_mm * 1e-3)
+    if bare is not None and mannequin is not None:
+        trimmed = trim_falls(trimmed, mannequin, bare)
     edge = float(np.median(edge_lengths(trimmed)))
     least_perimeter = config.least_perimeter_mm * 1e-3
     reach = config.reach_mm * 1e-3
@@ -134,7 +135,7 @@ def close_scan_holes(
     bridged, _ = split_off(bridged, worn)
     clean, unworn = split_off(clean, worn[: len(clean.faces)])
     pieces = face_components(clean)[0]
-    shapes, is_opening = _told_apart(bridged, distance, mannequin, photos, bare, config, job)
+    shapes, is_opening, unsure = _told_apart(bridged, distance, mannequin, photos, bare, config, job)
     job.progress(0.5, f"filling {len(shapes) - sum(is_opening)} scan holes")
     if all(is_opening):
         job.leave_out("hole filling", "every boundary loop is a real opening")
@@ -145,7 +146,7 @@ def close_scan_holes(
         pierced = [] if config.keep is not None else pierced_fillings(lifted, distance, bare)
         if pierced:
             opened = open_pierced(filled, len(clean.faces), pierced, mannequin, bare, config.clearance_mm * 1e-3, job)
-            shapes, is_opening = _told_apart(opened, distance, mannequin, photos, bare, config, job)
+            shapes, is_opening, unsure = _told_apart(opened, distance, mannequin, photos, bare, config, job)
             filled = _filled(opened, shapes, is_opening)
             observed = np.zeros(len(filled.vertices), dtype=bool)
             observed[filled.faces[: len(clean.faces)]] = True
@@ -191,13 +192,14 @@ def close_scan_holes(
         sightings = None if photos is None else look_at_mannequin(final, observed, mannequin, photos, job)
         if sightings is not None:
             refuse_parted(sightings, final, found, config.keep is not None, job)
-            warn_of_lost(sightings, final, found, job)
         if bare is not None and not (hardly_told and sightings is None):
             refuse_unseen(final, found, mannequin, bare, sightings, answered, job)
     if scan is not None:
         seen_beyond = Seen(scan, distance, bare, sightings)
         refuse_unseen_ends(final, found, seen_beyond, answered or (hardly_told and sightings is None), job)
     warn_of_filled_rims(found, observed, job)
+    for what in unsure if not answered else []:
+        job.warn(what)
     if bare is not None and pieces > 1:
         warn_of_torn(final, bare, job)
     return final, found, observed
@@ -221,7 +223,7 @@ def _worn_faces(
     passed = np.where(area == area.max(), 2, 0)
     if len(area) == 1:
         return np.ones(len(piece), dtype=bool)
-    shapes, is_opening = _told_apart(
+    shapes, is_opening, _ = _told_apart(
         mesh, distance, mannequin, photos, bare, config.model_copy(update={"keep": None}), Job(seed=job.seed)
     )
     for shape, real in zip(shapes, is_opening, strict=True):
@@ -239,15 +241,20 @@ def _told_apart(
     bare: BareParts | None,
     config: OpeningsConfig,
     job: Job,
-) -> tuple[list[LoopShape], list[bool]]:
-    """Return the boundary loops of a garment, and which of them are openings by all the evidence there is."""
+) -> tuple[list[LoopShape], list[bool], list[str]]:
+    """Return the boundary loops of a garment, which are openings by all the evidence there is, and what is unsure."""
     shapes = measure_loops(mesh)
     is_opening = _classify(mesh, shapes, distance, bare, config, job)
+    shares: list[float | None] = [None] * len(shapes)
+    unsure: list[str] = []
     if mannequin is not None and distance is not None and photos is not None and shapes:
-        is_opening = _by_photos(mesh, shapes, is_opening, distance, mannequin, photos, config, job)
+        is_opening, shares = _by_photos(mesh, shapes, is_opening, distance, mannequin, photos, config, job)
+    if distance is not None:
+        rims = [mesh.vertices[shape.loop] for shape in shapes]
+        unsure = unsure_loops(shapes, rims, is_opening, shares, distance, bare, config.reach_mm * 1e-3)
     if config.keep is not None:
         is_opening = _kept(shapes, is_opening, config.keep, job)
-    return shapes, is_opening
+    return shapes, is_opening, unsure
 
 
 def _filled(mesh: TriangleMesh, shapes: list[LoopShape], is_opening: list[bool]) -> TriangleMesh:
@@ -336,8 +343,10 @@ def _classify(
 
 
 def _shows_bare(rim: FloatArray, distance: SurfaceDistance, bare: BareParts | None) -> bool:
-    """Return whether the mannequin fills a loop (L, 3), and was seen bare through it."""
-    return bare is not None and is_filled(rim, distance) and float(np.mean(bare.under(disc_of(rim)))) > SEEN_BARE
+    """Return whether the mannequin fills a loop (L, 3), and was seen bare through it, or where cloth ends there."""
+    if bare is None or not is_filled(rim, distance):
+        return False
+    return float(np.mean(bare.under(disc_of(rim)))) > SEEN_BARE or bare.ends_cloth(rim) > 0.0
 
 
 def _by_photos(
@@ -349,23 +358,23 @@ def _by_photos(
     photos: PosedPhotos,
     config: OpeningsConfig,
     job: Job,
-) -> list[bool]:
-    """Return which loops are openings once the photos were asked: not those through which they show cloth, but those
-    that the mannequin fills, and through which they show it bare."""
+) -> tuple[list[bool], list[float | None]]:
+    """Return which loops are openings once the photos were asked, and how much of what they show through each is cloth:
+    not those through which it is most, but those that the mannequin fills, and through which they show it bare."""
     silent = Job(seed=job.seed)  # it is told once, of the finished garment
     sightings = look_at_mannequin(mesh, np.ones(len(mesh.vertices), dtype=bool), mannequin, photos, silent)
     if sightings is None:
-        return likely
+        return likely, [None] * len(likely)
     rims = [mesh.vertices[shape.loop] for shape in shapes]
-    covered, bare = covered_loops(sightings, rims), bare_loops(sightings, rims)
-    real = []
-    for shape, rim, before, shut, shown in zip(shapes, rims, likely, covered, bare, strict=True):
+    shares, real = cloth_shares(sightings, rims), []
+    for shape, rim, before, share in zip(shapes, rims, likely, shares, strict=True):
+        shut, shown = (False, False) if share is None else (share > COVERED, share < BARE)
         long_enough = shape.perimeter >= config.least_perimeter_mm * 1e-3
         real.append((before and not shut) or (shown and long_enough and is_filled(rim, distance)))
         if real[-1] != before:
             what = "the photos show the mannequin bare there" if real[-1] else "the photos show cloth there"
             job.note(f"{what}: {_listing([shape], real[-1:])}")
-    return real
+    return real, shares
 
 
 def _kept(shapes: list[LoopShape], likely: list[bool], count: int, job: Job) -> list[bool]:

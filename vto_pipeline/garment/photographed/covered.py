@@ -23,16 +23,6 @@ LEAST_SHOWN = 0.001
 """Less of the mannequin tells nothing: 3 by 3 cm [m²]."""
 
 
-def covered_loops(sightings: Sightings, loops: Sequence[FloatArray]) -> list[bool]:
-    """Return which loops the photos show covered: as `cloth_shares`."""
-    return [share is not None and share > COVERED for share in cloth_shares(sightings, loops)]
-
-
-def bare_loops(sightings: Sightings, loops: Sequence[FloatArray]) -> list[bool]:
-    """Return through which loops the photos show the mannequin bare: as `cloth_shares`."""
-    return [share is not None and share < BARE for share in cloth_shares(sightings, loops)]
-
-
 def cloth_shares(sightings: Sightings, loops: Sequence[FloatArray]) -> list[float | None]:
     """Return which share of what shows through each loop is cloth; None where too little shows.
 

@@ -57,7 +57,8 @@ class Parted(NamedTuple):
 def refuse_parted(
     sightings: Sightings, garment: TriangleMesh, openings: Sequence[Opening], answered: bool, job: Job
 ) -> None:
-    """Refuse a garment of which an opening is several, as neck and armholes without the straps between them.
+    """Refuse a garment of which an opening is several, as neck and armholes without the straps between them; warn of
+    other cloth that it lacks.
 
     Args:
         sightings: What the photos show where the garment leaves the mannequin bare.
@@ -72,6 +73,7 @@ def refuse_parted(
     for parted in parted_openings(sightings, garment.vertices):
         lacks = f"the photos show {parted.area * 1e4:.0f} cm² of cloth there that the garment lacks"
         _refuse(parted, f"should be at least {parted.parts}: {lacks}", garment, openings, answered, job)
+    warn_of_lost(sightings, garment, openings, job)
 
 
 def warn_of_lost(sightings: Sightings, garment: TriangleMesh, openings: Sequence[Opening], job: Job) -> None:
