@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from vto_pipeline.garment.align import PosedPhotos
 from vto_pipeline.garment.openings import OpeningsConfig, list_openings
 from vto_pipeline.garment.photographed.parted import parted_openings, refuse_parted
 from vto_pipeline.garment.photographed.sightings import Sightings, look_at_mannequin
-from vto_pipeline.geometry.topology import concatenate, submesh
+from vto_pipeline.geometry.topology import concatenate, submesh, surface_area
 from vto_pipeline.model.camera import CameraSet, Intrinsics
 from vto_pipeline.model.frames import DepthFrameSet
 from vto_pipeline.model.garment import SurfaceLabels
@@ -176,10 +177,16 @@ def test_a_whole_garment_passes(dressed):
     assert checked(top, body, photos).warnings == []
 
 
-def test_a_rim_a_little_short_passes(dressed):
+@pytest.mark.parametrize(("ends", "warned"), [(0.26, False), (0.29, True)])
+def test_a_rim_that_is_short_passes_and_is_warned_of_where_much_is_lost(dressed, ends, warned):
     body, top, photos = dressed
     y = top.vertices[top.faces].mean(axis=1)[:, 1]
-    assert checked(submesh(top, y > 0.29)[0], body, photos).warnings == []
+    warnings = checked(submesh(top, y > ends)[0], body, photos).warnings
+    assert len(warnings) == warned
+    lost = surface_area(submesh(top, y <= ends)[0])
+    for warning in warnings:
+        said = float(re.search(r"photos show (\d+) cm² of cloth that the garment lacks", warning)[1])
+        assert 0.5 < 1e-4 * said / lost < 1.2  # of the form under it, but for the border
 
 
 def test_a_garment_that_never_had_straps_passes(tmp_path):

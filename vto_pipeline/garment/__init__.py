@@ -6,7 +6,6 @@ subtraction/: the mannequin taken away
 loop_evidence, bare_parts, notches, rims, openings: real openings kept, scan holes filled
 lifting: fillings kept off the mannequin
 pierced: fillings that a part of it goes through, opened there
-falls: slopes that a scan draws from an edge of cloth to the mannequin, cut away
 open_seams: rims that run along each other, sewn
 simulation_mesh: the mesh that is simulated
 photographed/: the garment held beside the photos

@@ -21,8 +21,6 @@ TOUCHING = 0.003
 BESIDE = 0.008
 """A place of the mannequin was seen bare where the scan has a bare point this near [m]."""
 
-AROUND = 0.03
-"""Colours are looked for so far round a place [m]."""
 LEAST_EDGE, OF_READ = 0.2, 0.5
 """A loop is where cloth ends if a larger share of it is an edge of cloth, and of what was scanned on both sides."""
 
@@ -34,9 +32,6 @@ class BareParts:
         surface: The scan in the mannequin's frame.
         labels: Of its vertices.
         mannequin: The mannequin.
-
-    Attributes:
-        hardly_off: Cloth nearer to the mannequin than this is not told from it by distance [m].
     """
 
     def __init__(self, surface: TriangleMesh, labels: SurfaceLabels, mannequin: TriangleMesh) -> None:
@@ -44,9 +39,7 @@ class BareParts:
         away = self._distance.signed(surface.vertices).distance
         sure = ~labels.garment & (labels.confidence > CONFIDENT) & (np.abs(away) < TOUCHING)
         self._bare = cKDTree(surface.vertices[sure])
-        self._colors = None if surface.colors is None else surface.colors[sure].astype(float)
         self._edges = ClothEdges(surface, labels, away, TOUCHING)
-        self.hardly_off = self._edges.least
 
     def under(self, points: FloatArray) -> NDArray[np.bool_]:
         """Return which points (N, 3) lie over a place of the mannequin that was seen bare, shape (N,)."""
@@ -61,12 +54,3 @@ class BareParts:
         read, edge = self._edges.along(rim)
         share = float(edge.mean())
         return share if share > LEAST_EDGE and edge.sum() > OF_READ * read.sum() else 0.0
-
-    def colors_near(self, points: FloatArray) -> FloatArray:
-        """Return the median colour of what was seen bare around each point (N, 3), shape (N, 3); NaN for nothing."""
-        found = np.full((len(points), 3), np.nan)
-        if self._colors is not None and self._bare.n:
-            for row, near in enumerate(self._bare.query_ball_point(points, AROUND)):
-                if near:
-                    found[row] = np.median(self._colors[near], axis=0)
-        return found

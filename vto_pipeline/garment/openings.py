@@ -11,7 +11,6 @@ from pydantic import Field
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.align import PosedPhotos
 from vto_pipeline.garment.bare_parts import BareParts
-from vto_pipeline.garment.falls import trim_falls
 from vto_pipeline.garment.lifting import HINT, check_lifted, lift_fillings, pierced_fillings
 from vto_pipeline.garment.loop_evidence import LoopShape, disc_of, encloses, goes_round, is_filled, measure_loops
 from vto_pipeline.garment.notches import close_notches
@@ -120,8 +119,6 @@ def close_scan_holes(
     large, rest = split_off(shell, may_be_worn(shell, distance))
     thinned = _thinned(large, config.edge_mm * 1e-3, job)
     trimmed = thinned if mannequin is None else trim_ledges(thinned, mannequin, config.ledge_mm * 1e-3)
-    if bare is not None and mannequin is not None:
-        trimmed = trim_falls(trimmed, mannequin, bare)
     edge = float(np.median(edge_lengths(trimmed)))
     least_perimeter = config.least_perimeter_mm * 1e-3
     reach = config.reach_mm * 1e-3

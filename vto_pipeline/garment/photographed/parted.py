@@ -70,10 +70,12 @@ def refuse_parted(
     Raises:
         GarmentError: it lacks cloth that parts an opening.
     """
-    for parted in parted_openings(sightings, garment.vertices):
+    several = parted_openings(sightings, garment.vertices)
+    for parted in several:
         lacks = f"the photos show {parted.area * 1e4:.0f} cm² of cloth there that the garment lacks"
         _refuse(parted, f"should be at least {parted.parts}: {lacks}", garment, openings, answered, job)
-    warn_of_lost(sightings, garment, openings, job)
+    if not several:
+        warn_of_lost(sightings, garment, openings, job)
 
 
 def warn_of_lost(sightings: Sightings, garment: TriangleMesh, openings: Sequence[Opening], job: Job) -> None:

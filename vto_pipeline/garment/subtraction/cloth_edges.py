@@ -48,7 +48,7 @@ class ClothEdges:
         bare = ~labels.garment & (np.abs(distance) < touching)
         self._usual = float(np.median(distance[bare])) if bare.any() else 0.0
         self._noise = 1.4826 * float(np.median(np.abs(distance[bare] - self._usual))) if bare.any() else np.inf
-        self.least = THICKNESS + DEVIATIONS * self._noise
+        self._least = THICKNESS + DEVIATIONS * self._noise
         used = labels.garment | bare
         self._distance, self._cloth = distance[used], labels.garment[used]
         self._away, self._nearest = np.full(int(used.sum()), np.inf), np.zeros(int(used.sum()), dtype=int)
@@ -77,7 +77,7 @@ class ClothEdges:
         )
         read = np.isfinite(before) & np.isfinite(behind) & np.isfinite(farther)
         step, whole = behind - before, farther - before
-        high = step > self.least
+        high = step > self._least
         low = np.abs(before - self._usual) < self._noise
         return read, read & high & low & (step > SHARP * whole)
 
