@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from vto_pipeline.garment.photographed.parted import warn_of_lost
 from vto_pipeline.garment.photographed.sightings import SPACING, SURE, Sightings, _evidence
-from vto_pipeline.garment.subtraction.color_model import cielab
+from vto_pipeline.garment.subtraction.color_model import cielab, color_evidence
 from vto_pipeline.garment.subtraction.variety import picture_variety, surface_variety, variety_evidence
 from vto_pipeline.model.garment import Opening
 from vto_pipeline.model.job import Job
@@ -42,6 +42,31 @@ def test_plain_cloth_is_told_by_its_colour_or_not_at_all(cloth, tells):
     evidence = _evidence(picture, on_cloth, form)
     assert (evidence is not None) == tells
     assert not tells or np.mean(evidence[form] < -SURE) > 0.95
+
+
+@pytest.mark.parametrize("times", [0.6, 1.0, 1.45])
+def test_cloth_in_other_light_than_any_that_is_known_keeps_its_hue(times):
+    """A shoulder under lamps, or the inside of a fold: blue cloth and skin, as light or dark as none that was learnt."""
+    rng = np.random.default_rng(0)
+
+    def lit(color, by):
+        return np.array(color) * by * rng.uniform(0.9, 1.1, (400, 1)) + rng.normal(0, 3, (400, 3))
+
+    colors = np.concatenate([lit([110, 135, 170], 1.0), lit([170, 140, 120], 1.0), lit([110, 135, 170], times)])
+    colors = np.clip(np.concatenate([colors, lit([170, 140, 120], times)]), 0, 255).astype(np.uint8)
+    of = np.repeat(np.arange(4), 400)
+    evidence = color_evidence(colors, of == 0, of == 1)
+    assert np.mean(evidence[of == 2] > SURE) > 0.95
+    assert np.mean(evidence[of == 3] < -SURE) > 0.95
+
+
+def test_one_hue_is_still_told_by_how_light_it_is():
+    """White cloth on a grey form."""
+    grey = np.random.default_rng(0).normal(np.repeat([235.0, 120.0], 400)[:, None], 4.0, (800, 3))
+    cloth = np.arange(800) < 400
+    evidence = color_evidence(np.clip(grey, 0, 255).astype(np.uint8), cloth, ~cloth)
+    assert np.mean(evidence[cloth] > SURE) > 0.95
+    assert np.mean(evidence[~cloth] < -SURE) > 0.95
 
 
 def test_variety_of_a_picture_is_that_of_each_square_by_itself():

@@ -12,6 +12,9 @@ from vto_pipeline.numerics.srgb import decode_srgb
 BINS = 24
 HISTOGRAM_SIGMA = 1.0
 """Standard deviation of the histogram's smoothing [bins]."""
+UNEVEN = 12.5
+"""Standard deviation of lightness (CIELAB) from one place of a scene to another: half of a material is as light as what
+was seen of it, and half by so much lighter or darker. A shoulder under lamps is lighter than any other cloth."""
 SURPRISE = 0.02
 """Share of each material that may have any colour: dirt, shadow, seams."""
 RARE = 0.05
@@ -25,7 +28,7 @@ def color_evidence(
     pure: NDArray[np.bool_],
     mixed: NDArray[np.bool_],
     bins: int = BINS,
-    light: float = HISTOGRAM_SIGMA,
+    light: float | None = None,
     most_mixed: float = MOST_MIXED,
 ) -> FloatArray:
     """Return log p(colour | the pure material) - log p(colour | the other) per vertex, shape (V,).
@@ -39,10 +42,12 @@ def color_evidence(
         pure: Vertices sure to be of the one material, shape (V,); at least one.
         mixed: Vertices most of which are of the other; at least one.
         bins: Of the histogram, along each axis; more part colours that differ less, and need more vertices.
-        light: Standard deviation of the smoothing along lightness [bins]; more where the two lie in other light.
+        light: Standard deviation of the smoothing along lightness [bins], where the two lie in other light; by default
+            they lie in the same, which is uneven.
         most_mixed: The mixed hold no larger share of the pure material.
     """
-    return evidence_of_cells(_cells(colors, bins), pure, mixed, bins, light, most_mixed)
+    lights = (HISTOGRAM_SIGMA, UNEVEN / 100.0 * bins) if light is None else (light,)
+    return evidence_of_cells(_cells(colors, bins), pure, mixed, bins, lights, most_mixed)
 
 
 def evidence_of_cells(
@@ -50,11 +55,11 @@ def evidence_of_cells(
     pure: NDArray[np.bool_],
     mixed: NDArray[np.bool_],
     bins: int,
-    light: float,
+    lights: tuple[float, ...],
     most_mixed: float,
 ) -> FloatArray:
     """Return the evidence of `color_evidence` by the cells of a histogram, an array (V,) for each of its axes."""
-    one, both = (_density(cell, members, bins, light)[cell] for members in (pure, mixed))
+    one, both = (_density(cell, members, bins, *lights)[cell] for members in (pure, mixed))
     share = min(float(np.median(both[pure] / one[pure])), most_mixed, MOST_MIXED)
     other = np.maximum(both - share * one, 0.0) / (1.0 - share)
     anything = SURPRISE / bins ** len(cell)
@@ -102,12 +107,13 @@ def _cells(colors: ByteArray, bins: int) -> tuple[IntArray, ...]:
     return tuple(np.clip((scaled * bins).astype(int), 0, bins - 1).T)
 
 
-def _density(cell: tuple[IntArray, ...], members: NDArray[np.bool_], bins: int, light: float) -> FloatArray:
+def _density(cell: tuple[IntArray, ...], members: NDArray[np.bool_], bins: int, *lights: float) -> FloatArray:
+    """Return a histogram smoothed by each of the standard deviations along its first axis [bins], and their mean."""
     histogram = np.zeros((bins,) * len(cell))
-    np.add.at(histogram, tuple(axis[members] for axis in cell), 1.0)
-    sigmas = (light, HISTOGRAM_SIGMA, HISTOGRAM_SIGMA)[: len(cell)]
-    smooth: FloatArray = gaussian_filter(histogram / members.sum(), sigmas, mode="nearest")
-    return smooth
+    np.add.at(histogram, tuple(axis[members] for axis in cell), 1.0 / members.sum())
+    others = (HISTOGRAM_SIGMA,) * (len(cell) - 1)
+    smooth = [gaussian_filter(histogram, (light, *others), mode="nearest") for light in lights]
+    return np.asarray(np.mean(smooth, axis=0))
 
 
 def cielab(colors: ByteArray) -> FloatArray:

@@ -39,7 +39,7 @@ def variety_evidence(
     low, high = np.log(RANGE)
     scaled = (np.log(np.clip(variety, *RANGE)) - low) / (high - low)
     cell = (np.minimum((BINS * scaled).astype(int), BINS - 1),)
-    return evidence_of_cells(cell, pure, mixed, BINS, HISTOGRAM_SIGMA, most_mixed)
+    return evidence_of_cells(cell, pure, mixed, BINS, (HISTOGRAM_SIGMA,), most_mixed)
 
 
 def picture_variety(picture: ByteArray, among: NDArray[np.bool_], side: int) -> FloatArray:
