@@ -46,7 +46,7 @@ def test_plain_cloth_is_told_by_its_colour_or_not_at_all(cloth, tells):
 
 @pytest.mark.parametrize("times", [0.6, 1.0, 1.45])
 def test_cloth_in_other_light_than_any_that_is_known_keeps_its_hue(times):
-    """A shoulder under lamps, or the inside of a fold: blue cloth and skin, as light or dark as none that was learnt."""
+    """A shoulder under lamps, or the inside of a fold: cloth and skin, as light or dark as none that was learnt."""
     rng = np.random.default_rng(0)
 
     def lit(color, by):
