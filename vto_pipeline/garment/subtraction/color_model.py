@@ -12,9 +12,9 @@ from vto_pipeline.numerics.srgb import decode_srgb
 BINS = 24
 HISTOGRAM_SIGMA = 1.0
 """Standard deviation of the histogram's smoothing [bins]."""
-UNEVEN = 12.5
-"""Standard deviation of lightness (CIELAB) from one place of a scene to another: half of a material is as light as what
-was seen of it, and half by so much lighter or darker. A shoulder under lamps is lighter than any other cloth."""
+ELSEWHERE, UNEVEN = 0.2, 25.0
+"""Such a share of a material lies in other light than what was seen of it: its lightness (CIELAB) has this standard
+deviation. A shoulder under lamps is lighter than any other cloth."""
 SURPRISE = 0.02
 """Share of each material that may have any colour: dirt, shadow, seams."""
 RARE = 0.05
@@ -46,8 +46,10 @@ def color_evidence(
             they lie in the same, which is uneven.
         most_mixed: The mixed hold no larger share of the pure material.
     """
-    lights = (HISTOGRAM_SIGMA, UNEVEN / 100.0 * bins) if light is None else (light,)
-    return evidence_of_cells(_cells(colors, bins), pure, mixed, bins, lights, most_mixed)
+    if light is not None:
+        return evidence_of_cells(_cells(colors, bins), pure, mixed, bins, most_mixed, light)
+    uneven = UNEVEN / 100.0 * bins
+    return evidence_of_cells(_cells(colors, bins), pure, mixed, bins, most_mixed, HISTOGRAM_SIGMA, uneven)
 
 
 def evidence_of_cells(
@@ -55,11 +57,12 @@ def evidence_of_cells(
     pure: NDArray[np.bool_],
     mixed: NDArray[np.bool_],
     bins: int,
-    lights: tuple[float, ...],
     most_mixed: float,
+    light: float = HISTOGRAM_SIGMA,
+    uneven: float | None = None,
 ) -> FloatArray:
     """Return the evidence of `color_evidence` by the cells of a histogram, an array (V,) for each of its axes."""
-    one, both = (_density(cell, members, bins, *lights)[cell] for members in (pure, mixed))
+    one, both = (_density(cell, members, bins, light, uneven)[cell] for members in (pure, mixed))
     share = min(float(np.median(both[pure] / one[pure])), most_mixed, MOST_MIXED)
     other = np.maximum(both - share * one, 0.0) / (1.0 - share)
     anything = SURPRISE / bins ** len(cell)
@@ -107,13 +110,19 @@ def _cells(colors: ByteArray, bins: int) -> tuple[IntArray, ...]:
     return tuple(np.clip((scaled * bins).astype(int), 0, bins - 1).T)
 
 
-def _density(cell: tuple[IntArray, ...], members: NDArray[np.bool_], bins: int, *lights: float) -> FloatArray:
-    """Return a histogram smoothed by each of the standard deviations along its first axis [bins], and their mean."""
+def _density(
+    cell: tuple[IntArray, ...], members: NDArray[np.bool_], bins: int, light: float, uneven: float | None = None
+) -> FloatArray:
+    """Return a smoothed histogram, by such a deviation along its first axis, and by the other `ELSEWHERE` [bins]."""
     histogram = np.zeros((bins,) * len(cell))
     np.add.at(histogram, tuple(axis[members] for axis in cell), 1.0 / members.sum())
-    others = (HISTOGRAM_SIGMA,) * (len(cell) - 1)
-    smooth = [gaussian_filter(histogram, (light, *others), mode="nearest") for light in lights]
-    return np.asarray(np.mean(smooth, axis=0))
+
+    def smoothed(along: float) -> FloatArray:
+        sigmas = (along, *(HISTOGRAM_SIGMA,) * (len(cell) - 1))
+        return np.asarray(gaussian_filter(histogram, sigmas, mode="nearest"))
+
+    here = smoothed(light)
+    return here if uneven is None else (1.0 - ELSEWHERE) * here + ELSEWHERE * smoothed(uneven)
 
 
 def cielab(colors: ByteArray) -> FloatArray:

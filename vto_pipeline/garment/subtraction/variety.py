@@ -10,7 +10,6 @@ from scipy.sparse import coo_matrix, diags, identity
 
 from vto_pipeline.garment.subtraction.color_model import (
     BINS,
-    HISTOGRAM_SIGMA,
     MOST_MIXED,
     cielab,
     evidence_of_cells,
@@ -39,7 +38,7 @@ def variety_evidence(
     low, high = np.log(RANGE)
     scaled = (np.log(np.clip(variety, *RANGE)) - low) / (high - low)
     cell = (np.minimum((BINS * scaled).astype(int), BINS - 1),)
-    return evidence_of_cells(cell, pure, mixed, BINS, (HISTOGRAM_SIGMA,), most_mixed)
+    return evidence_of_cells(cell, pure, mixed, BINS, most_mixed)
 
 
 def picture_variety(picture: ByteArray, among: NDArray[np.bool_], side: int) -> FloatArray:
