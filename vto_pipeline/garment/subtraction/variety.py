@@ -54,9 +54,10 @@ def picture_variety(picture: ByteArray, among: NDArray[np.bool_], side: int) -> 
     import cv2
 
     weight = among.astype(np.float32)
-    chroma = cielab(picture.reshape(-1, 3)).reshape(picture.shape)[..., 1:].astype(np.float32)
+    chroma = np.zeros((*among.shape, 2), np.float32)
+    chroma[among] = cielab(picture[among])[:, 1:]
     count = np.maximum(cv2.blur(weight, (side, side)), 1e-6)[..., None]
-    mean, square = (cv2.blur(x * weight[..., None], (side, side)) / count for x in (chroma, chroma**2))
+    mean, square = (cv2.blur(x, (side, side)) / count for x in (chroma, chroma**2))
     return _deviation(mean, square)
 
 
