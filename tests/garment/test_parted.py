@@ -134,7 +134,7 @@ def test_photos_show_the_same_on_one_core(dressed, monkeypatch):
 
 @pytest.mark.parametrize("colored", [True, False])
 def test_colour_frames_of_a_depth_camera_show_the_straps(dressed, colored):
-    """The depth of the straps was lost: without colours nobody knows of them."""
+    """The depth of all above the chest was lost: without colours nobody knows of it."""
     body, top, photos = dressed
     paths = tuple(Path(f"{k}.png") for k in range(16))
     shown = (lambda found: found, without_straps)

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.geometry.remeshing import holes
-from vto_pipeline.geometry.remeshing.holes import fill_holes, fill_notch
+from vto_pipeline.geometry.remeshing.holes import fill_between, fill_holes, fill_notch
 from vto_pipeline.geometry.remeshing.refine import refine
 from vto_pipeline.geometry.remeshing.remesh import edge_lengths
 from vto_pipeline.geometry.remeshing.repair import RepairConfig, is_manifold, repair
@@ -135,6 +135,34 @@ def test_a_bay_is_filled_up_to_its_mouth():
     )
     assert_allclose(area, 0.04, rtol=1e-9)  # the whole sheet again, flat
     assert np.all(face_normals(filled)[:, 2] > 0.999)
+
+
+@pytest.mark.parametrize(("sides", "wanted"), [((0, 2), 0.0032), ((0, 1, 2), 0.0044), ((0, 1, 2, 3), 0.0056)])
+def test_a_sheet_goes_on_between_arcs_of_a_rim(sides, wanted):
+    """A hole of 8 by 8 cm; from the middle 4 cm of its sides cloth goes out, up to straight lines between them."""
+    sheet = shapes.grid(20, 20, 0.01)
+    middle = shapes.centers(sheet)[:, :2] - 0.1
+    cut, _ = submesh(sheet, np.abs(middle).max(axis=1) > 0.04)
+    walk = min(boundary_walks(cut), key=len)
+    halves = half_edges(cut)
+    x, y, _ = (cut.vertices[halves[walk]].mean(axis=1) - 0.1).T
+    arcs = [walk[np.array(k)] for k in ((x > 0.039) & (abs(y) < 0.02), (y > 0.039) & (abs(x) < 0.02))]
+    arcs += [walk[np.array(k)] for k in ((x < -0.039) & (abs(y) < 0.02), (y < -0.039) & (abs(x) < 0.02))]
+    assert [len(arc) for arc in arcs] == [4] * 4
+    place = {int(half): k for k, half in enumerate(walk)}
+    arcs = sorted((arcs[side] for side in sides), key=lambda arc: place[int(arc[0])])
+    arcs = [arc if np.all(np.diff([place[int(half)] for half in arc]) == 1) else np.roll(arc, 2) for arc in arcs]
+    lines = []
+    for arc, before in zip(arcs, [arcs[-1], *arcs[:-1]], strict=True):
+        start, end = cut.vertices[[halves[arc[0], 0], halves[before[-1], 1]]]
+        lines.append(start + np.linspace(0, 1, 7)[1:-1, None] * (end - start))
+    bridged = fill_between(cut, arcs, lines)
+    assert is_manifold(bridged)
+    assert len(boundary_loops(bridged)) == 1 + len(sides)
+    assert_array_equal(bridged.vertices[: len(cut.vertices)], cut.vertices)
+    added = face_area_vectors(bridged)[len(cut.faces) :]
+    assert_allclose(added[:, 2], np.linalg.norm(added, axis=1), atol=1e-9)  # flat, and the same side up
+    assert_allclose(added[:, 2].sum(), wanted, rtol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(5))

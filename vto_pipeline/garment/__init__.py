@@ -1,9 +1,9 @@
 """From a scanned surface to a garment.
 
-coarse_align, scale_search, robust_icp, align: the scan in the frame, and if need be the scale, of its mannequin
+align, alignment/: the scan in the frame, and if need be the scale, of its mannequin
 outline/: the mannequin found by its outline in the photos
 subtraction/: the mannequin taken away
-loop_evidence, bare_parts, notches, rims, openings: real openings kept, scan holes filled
+loop_evidence, bare_parts, told_apart, notches, rims, openings: real openings kept, scan holes filled
 lifting: fillings kept off the mannequin
 pierced: fillings that a part of it goes through, opened there
 open_seams: rims that run along each other, sewn

@@ -9,12 +9,12 @@ import numpy as np
 from pydantic import Field
 
 from vto_pipeline.errors import GarmentError
-from vto_pipeline.garment.coarse_align import PlacementSearch, tilted_rotations, upright_rotations
+from vto_pipeline.garment.alignment.coarse_align import PlacementSearch, tilted_rotations, upright_rotations
+from vto_pipeline.garment.alignment.robust_icp import MannequinAlignment, robust_icp, scale_of
+from vto_pipeline.garment.alignment.scale_search import scaled_starts
 from vto_pipeline.garment.outline.edges import load_edges
 from vto_pipeline.garment.outline.inside import inside_share
 from vto_pipeline.garment.outline.search import OutlineConfig, place_by_outline
-from vto_pipeline.garment.robust_icp import MannequinAlignment, robust_icp, scale_of
-from vto_pipeline.garment.scale_search import scaled_starts
 from vto_pipeline.geometry.rigid import transform_mesh
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.geometry.signed_distance import SurfaceDistance

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from vto_pipeline.garment.bare_parts import BareParts
 from vto_pipeline.garment.loop_evidence import RIM_OUTSIDE, encloses, outside_share, passes_through
 from vto_pipeline.garment.rims import smooth_curve
 from vto_pipeline.geometry.remeshing.holes import fill_notch
@@ -14,6 +15,8 @@ from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import boundary_walks, face_components, face_normals, half_edges
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
+
+OverBare = Callable[[FloatArray], bool]
 
 DETOUR = 1.6
 """A rim whose way round a notch is so many times longer than across is notched; half a circle is π/2."""
@@ -31,8 +34,6 @@ TRIED = 2000
 """Candidates that are looked at."""
 ROUNDS = 3
 """How often notches are looked for: one rim may have several."""
-BARE = 0.2
-"""With a larger share over mannequin that was seen bare, it is no notch. Over a scan hole it is nothing."""
 OVER_CLOTH, NEARER = 0.5, 0.5
 """The line across a notch runs over nothing, and the nearest cloth is the rim. Less than this share of it may be over
 cloth, which is where cloth is so many times nearer than the rim: behind a collar, from one scan hole to the next."""
@@ -44,7 +45,7 @@ WAVELENGTH = 0.025
 
 
 def close_notches(
-    mesh: TriangleMesh, distance: SurfaceDistance, bare: BareParts | None, least_perimeter: float, reach: float
+    mesh: TriangleMesh, distance: SurfaceDistance, over_bare: OverBare, least_perimeter: float, reach: float
 ) -> tuple[TriangleMesh, int]:
     """Return the mesh with the notches of its rims filled, and how many there were.
 
@@ -57,7 +58,7 @@ def close_notches(
     Args:
         mesh: The garment.
         distance: Signed distances to the mannequin.
-        bare: What was seen of the bare mannequin, if it is known.
+        over_bare: Whether points (N, 3), spread over what would close a notch, lie over mannequin that was seen bare.
         least_perimeter: Shorter loops are not looked at [m].
         reach: How far inside an opening the mannequin may end [m].
     """
@@ -69,7 +70,7 @@ def close_notches(
             rim = np.sort(half_edges(mesh)[walk, 0]).tobytes()
             if rim in done or _length(mesh, walk) <= least_perimeter:
                 continue
-            notch = _tightest_notch(mesh, walk, distance, bare, least_perimeter, reach)
+            notch = _tightest_notch(mesh, walk, distance, over_bare, least_perimeter, reach)
             if notch is None:
                 done.add(rim)
             else:
@@ -91,7 +92,7 @@ def _tightest_notch(
     mesh: TriangleMesh,
     walk: IntArray,
     distance: SurfaceDistance,
-    bare: BareParts | None,
+    over_bare: OverBare,
     least_perimeter: float,
     reach: float,
 ) -> tuple[IntArray, FloatArray] | None:
@@ -124,7 +125,7 @@ def _tightest_notch(
         rim = np.vstack([points[left], closing_line])
         if not encloses(rim, distance, reach):  # asked first, as nearly all candidates fail it
             return False
-        if bare is not None and np.mean(bare.under(_between(points, along, start, end))) > BARE:
+        if over_bare(_between(points, along, start, end)):
             return False
         curve = _closing_curve(points[start], points[end], directions_at(start, end), share)
         if runs_over_cloth(curve, cloth, rim_there):

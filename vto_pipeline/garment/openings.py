@@ -12,33 +12,31 @@ from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.align import PosedPhotos
 from vto_pipeline.garment.bare_parts import BareParts
 from vto_pipeline.garment.lifting import HINT, check_lifted, lift_fillings, pierced_fillings
-from vto_pipeline.garment.loop_evidence import LoopShape, disc_of, encloses, goes_round, is_filled, measure_loops
+from vto_pipeline.garment.loop_evidence import encloses, measure_loops
 from vto_pipeline.garment.notches import close_notches
+from vto_pipeline.garment.photographed.bridged import bridge_straps
 from vto_pipeline.garment.photographed.carved import carve_fillings
 from vto_pipeline.garment.photographed.confirmed import LookAgain, confirm_fillings
-from vto_pipeline.garment.photographed.covered import BARE, COVERED, cloth_shares
 from vto_pipeline.garment.photographed.parted import refuse_parted, refuse_unseen
 from vto_pipeline.garment.photographed.seen_ends import Scanned, Seen, refuse_unseen_ends
 from vto_pipeline.garment.photographed.sightings import look_at_mannequin
-from vto_pipeline.garment.photographed.unsure import SEEN_BARE, unsure_loops
 from vto_pipeline.garment.pierced import open_pierced
 from vto_pipeline.garment.rims import drop_flaps, fair_rims, trim_ledges
 from vto_pipeline.garment.subtraction.pieces import (
-    LEAST,
     lost_cloth,
     may_be_worn,
     split_off,
     warn_of_torn,
     without_crumbs,
 )
-from vto_pipeline.garment.wearable import LEAST_PERIMETER_MM, check_wearable
+from vto_pipeline.garment.told_apart import Evidence, Judged, listing, tell_apart, worn_faces
+from vto_pipeline.garment.wearable import LEAST_PERIMETER_MM, check_wearable, warn_one_sided
 from vto_pipeline.geometry.remeshing.decimate import decimate, faces_at
 from vto_pipeline.geometry.remeshing.holes import fill_holes
 from vto_pipeline.geometry.remeshing.remesh import edge_lengths
 from vto_pipeline.geometry.remeshing.repair import RepairConfig, repair
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
-from vto_pipeline.geometry.topology import component_areas, face_areas, face_components, surface_area
-from vto_pipeline.model.arrays import FloatArray
+from vto_pipeline.geometry.topology import face_areas, face_components, surface_area
 from vto_pipeline.model.garment import Opening
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
@@ -125,26 +123,32 @@ def close_scan_holes(
     passed = None if distance is None else partial(encloses, distance=distance, reach=reach)
     whole = drop_flaps(trimmed, config.flap_edges * edge, least_perimeter, passed)
     clean = repair(whole, RepairConfig(weld_mm=0.0), job)
-    bridged, notches = clean, 0
+    bridged, notches, sightings = clean, 0, None
+    if mannequin is not None and photos is not None:
+        silent = Job(seed=job.seed)  # it is told once, of the finished garment
+        sightings = look_at_mannequin(clean, np.ones(len(clean.vertices), dtype=bool), mannequin, photos, silent)
+    evidence = Evidence(distance, bare, sightings, least_perimeter, reach, config.tubular, config.keep)
     if distance is not None:
-        bridged, notches = close_notches(clean, distance, bare, least_perimeter, reach)
-    worn = _worn_faces(bridged, distance, mannequin, photos, bare, config, job)
+        if sightings is not None:
+            bridged = bridge_straps(bridged, sightings, distance, least_perimeter, config.clearance_mm * 1e-3, job)
+        bridged, notches = close_notches(bridged, distance, evidence.over_bare, least_perimeter, reach)
+    worn = worn_faces(bridged, evidence, job)
     bridged, _ = split_off(bridged, worn)
     clean, unworn = split_off(clean, worn[: len(clean.faces)])
     pieces = face_components(clean)[0]
-    shapes, is_opening, unsure = _told_apart(bridged, distance, mannequin, photos, bare, config, job)
-    job.progress(0.5, f"filling {len(shapes) - sum(is_opening)} scan holes")
-    if all(is_opening):
+    judged = tell_apart(bridged, evidence, job)
+    job.progress(0.5, f"filling {len(judged.shapes) - sum(judged.is_opening)} scan holes")
+    if all(judged.is_opening):
         job.leave_out("hole filling", "every boundary loop is a real opening")
-    filled = _filled(bridged, shapes, is_opening)
+    filled = _filled(bridged, judged)
     observed = np.arange(len(filled.vertices)) < len(clean.vertices)
     if mannequin is not None and distance is not None:
         lifted = lift_fillings(filled, ~observed, distance, config.clearance_mm * 1e-3)
         pierced = [] if config.keep is not None else pierced_fillings(lifted, distance, bare)
         if pierced:
             opened = open_pierced(filled, len(clean.faces), pierced, mannequin, bare, config.clearance_mm * 1e-3, job)
-            shapes, is_opening, unsure = _told_apart(opened, distance, mannequin, photos, bare, config, job)
-            filled = _filled(opened, shapes, is_opening)
+            judged = tell_apart(opened, evidence, job)
+            filled = _filled(opened, judged)
             observed = np.zeros(len(filled.vertices), dtype=bool)
             observed[filled.faces[: len(clean.faces)]] = True
             lifted = lift_fillings(filled, ~observed, distance, config.clearance_mm * 1e-3)
@@ -156,9 +160,9 @@ def close_scan_holes(
     final = fair_rims(filled, config.fair_mm * 1e-3)
     if face_components(final)[0] != pieces:
         raise GarmentError(f"the garment fell apart into {face_components(final)[0]} pieces")
-    count = sum(is_opening)
+    count = sum(judged.is_opening)
     if config.expected is not None and count != config.expected:
-        raise GarmentError(f"{count} openings found, expected {config.expected}: {_listing(shapes, is_opening)}")
+        raise GarmentError(f"{count} openings found, expected {config.expected}: {listing(judged)}")
     scanned = np.arange(len(final.faces)) < len(clean.faces)
     if mannequin is not None and distance is not None and photos is not None and count and not observed.all():
         final = carve_fillings(final, observed, mannequin, photos, distance, config.clearance_mm * 1e-3, job)
@@ -175,7 +179,7 @@ def close_scan_holes(
     job.measure(
         pieces=pieces,
         openings=len(found),
-        filled_holes=len(shapes) - count,
+        filled_holes=len(judged.shapes) - count,
         filled_notches=notches,
         perimeters_mm=[round(opening.perimeter * 1e3, 1) for opening in found],
         trimmed_cm2=(surface_area(large) - sum(map(surface_area, [clean, *unworn]))) * 1e4,
@@ -195,68 +199,20 @@ def close_scan_holes(
         seen_beyond = Seen(scan, distance, bare, sightings)
         refuse_unseen_ends(final, found, seen_beyond, answered or (hardly_told and sightings is None), job)
     warn_of_filled_rims(found, observed, job)
-    for what in unsure if not answered else []:
+    for what in judged.unsure if not answered else []:
         job.warn(what)
+    if pieces == 1 and not answered:
+        warn_one_sided(found, job)
     if bare is not None and pieces > 1:
         warn_of_torn(final, bare, job)
     return final, found, observed
 
 
-def _worn_faces(
-    mesh: TriangleMesh,
-    distance: SurfaceDistance | None,
-    mannequin: TriangleMesh | None,
-    photos: PosedPhotos | None,
-    bare: BareParts | None,
-    config: OpeningsConfig,
-    job: Job,
-) -> NDArray[np.bool_]:
-    """Return which faces belong to the largest piece or to one that is worn by itself, shape (F,).
-
-    The mannequin passes through two openings of that, or through one that goes round it, as into a sock. Without a
-    mannequin, shape alone tells.
-    """
-    piece, area = component_areas(mesh)
-    passed = np.where(area == area.max(), 2, 0)
-    if len(area) == 1:
-        return np.ones(len(piece), dtype=bool)
-    shapes, is_opening, _ = _told_apart(
-        mesh, distance, mannequin, photos, bare, config.model_copy(update={"keep": None}), Job(seed=job.seed)
-    )
-    for shape, real in zip(shapes, is_opening, strict=True):
-        rim = mesh.vertices[shape.loop]
-        if real:
-            passed[piece[shape.walk[0] // 3]] += 2 if distance is None or goes_round(rim, distance) else 1
-    return np.asarray(((passed >= 2) & (area >= LEAST * area.max()))[piece])
-
-
-def _told_apart(
-    mesh: TriangleMesh,
-    distance: SurfaceDistance | None,
-    mannequin: TriangleMesh | None,
-    photos: PosedPhotos | None,
-    bare: BareParts | None,
-    config: OpeningsConfig,
-    job: Job,
-) -> tuple[list[LoopShape], list[bool], list[str]]:
-    """Return the boundary loops of a garment, which are openings by all the evidence there is, and what is unsure."""
-    shapes = measure_loops(mesh)
-    is_opening = _classify(mesh, shapes, distance, bare, config, job)
-    shares: list[float | None] = [None] * len(shapes)
-    unsure: list[str] = []
-    if mannequin is not None and distance is not None and photos is not None and shapes:
-        is_opening, shares = _by_photos(mesh, shapes, is_opening, distance, mannequin, photos, config, job)
-    if distance is not None:
-        rims = [mesh.vertices[shape.loop] for shape in shapes]
-        unsure = unsure_loops(shapes, rims, is_opening, shares, distance, bare, config.reach_mm * 1e-3)
-    if config.keep is not None:
-        is_opening = _kept(shapes, is_opening, config.keep, job)
-    return shapes, is_opening, unsure
-
-
-def _filled(mesh: TriangleMesh, shapes: list[LoopShape], is_opening: list[bool]) -> TriangleMesh:
+def _filled(mesh: TriangleMesh, judged: Judged) -> TriangleMesh:
     """Return the mesh with the loops filled that are no openings."""
-    return fill_holes(mesh, [shape.walk for shape, real in zip(shapes, is_opening, strict=True) if not real])
+    return fill_holes(
+        mesh, [shape.walk for shape, real in zip(judged.shapes, judged.is_opening, strict=True) if not real]
+    )
 
 
 def list_openings(garment: TriangleMesh) -> list[Opening]:
@@ -309,88 +265,4 @@ def _check_seen(share: float, garment: TriangleMesh, config: OpeningsConfig, job
         hint="take more photos or frames of what is missing, often under the arms and from above and below. "
         "Or look at it, and set openings.keep or a lower openings.least_seen",
         partial={"garment": garment},
-    )
-
-
-def _classify(
-    mesh: TriangleMesh,
-    shapes: list[LoopShape],
-    distance: SurfaceDistance | None,
-    bare: BareParts | None,
-    config: OpeningsConfig,
-    job: Job,
-) -> list[bool]:
-    """Return which loops are real openings."""
-    long_enough = [shape.perimeter >= config.least_perimeter_mm * 1e-3 for shape in shapes]
-    if distance is None:
-        real = [ok and shape.tubular >= config.tubular for ok, shape in zip(long_enough, shapes, strict=True)]
-        if not all(real):
-            job.warn(f"no mannequin to tell openings from scan holes: {_listing(shapes, real)}")
-        return real
-    reach = config.reach_mm * 1e-3
-    real = []
-    for ok, shape in zip(long_enough, shapes, strict=True):
-        rim = mesh.vertices[shape.loop]
-        around = ok and (encloses(rim, distance, reach) or _shows_bare(rim, distance, bare))
-        hangs = ok and not around and shape.tubular >= config.tubular and distance.signed(rim).distance.min() > reach
-        if hangs:
-            job.note(f"beyond the mannequin, by its shape alone: {_listing([shape], [True])}")
-        real.append(around or hangs)
-    return real
-
-
-def _shows_bare(rim: FloatArray, distance: SurfaceDistance, bare: BareParts | None) -> bool:
-    """Return whether the mannequin fills a loop (L, 3), and was seen bare through it, or where cloth ends there."""
-    if bare is None or not is_filled(rim, distance):
-        return False
-    return float(np.mean(bare.under(disc_of(rim)))) > SEEN_BARE or bare.ends_cloth(rim) > 0.0
-
-
-def _by_photos(
-    mesh: TriangleMesh,
-    shapes: list[LoopShape],
-    likely: list[bool],
-    distance: SurfaceDistance,
-    mannequin: TriangleMesh,
-    photos: PosedPhotos,
-    config: OpeningsConfig,
-    job: Job,
-) -> tuple[list[bool], list[float | None]]:
-    """Return which loops are openings once the photos were asked, and how much of what they show through each is cloth:
-    not those through which it is most, but those that the mannequin fills, and through which they show it bare."""
-    silent = Job(seed=job.seed)  # it is told once, of the finished garment
-    sightings = look_at_mannequin(mesh, np.ones(len(mesh.vertices), dtype=bool), mannequin, photos, silent)
-    if sightings is None:
-        return likely, [None] * len(likely)
-    rims = [mesh.vertices[shape.loop] for shape in shapes]
-    shares, real = cloth_shares(sightings, rims), []
-    for shape, rim, before, share in zip(shapes, rims, likely, shares, strict=True):
-        shut, shown = (False, False) if share is None else (share > COVERED, share < BARE)
-        long_enough = shape.perimeter >= config.least_perimeter_mm * 1e-3
-        real.append((before and not shut) or (shown and long_enough and is_filled(rim, distance)))
-        if real[-1] != before:
-            what = "the photos show the mannequin bare there" if real[-1] else "the photos show cloth there"
-            job.note(f"{what}: {_listing([shape], real[-1:])}")
-    return real, shares
-
-
-def _kept(shapes: list[LoopShape], likely: list[bool], count: int, job: Job) -> list[bool]:
-    """Return which loops stay open when their number is given: those with evidence first, then the longest."""
-    if len(shapes) < count:
-        raise GarmentError(f"only {len(shapes)} boundary loops, but {count} openings are to be kept")
-    order = sorted(range(len(shapes)), key=lambda i: (not likely[i], -shapes[i].perimeter))
-    kept = [i in order[:count] for i in range(len(shapes))]
-    turned = [i for i in range(len(shapes)) if kept[i] != likely[i]]
-    if turned:
-        changed = _listing([shapes[i] for i in turned], [kept[i] for i in turned])
-        job.note(f"against the evidence, because {count} openings are to be kept: {changed}")
-    return kept
-
-
-def _listing(shapes: list[LoopShape], real: list[bool]) -> str:
-    """Return each loop with its verdict, length and place, for messages."""
-    return "; ".join(
-        f"{'opening' if is_opening else 'scan hole'} of {shape.perimeter * 1e3:.0f} mm at "
-        f"({shape.center[0]:.2f}, {shape.center[1]:.2f}, {shape.center[2]:.2f}) m"
-        for shape, is_opening in zip(shapes, real, strict=True)
     )

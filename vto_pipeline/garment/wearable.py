@@ -9,6 +9,7 @@ import numpy as np
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.topology import face_components
 from vto_pipeline.model.garment import Opening
+from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 from vto_pipeline.numerics.volume import axis_volumes
 
@@ -18,6 +19,10 @@ THICKEST_CLOTH_M = 0.02
 """A closed surface of less mean thickness is cloth modelled with both its sides."""
 _MOST_CLOSED = 0.5
 """Share of the surface that may be solid things, such as buttons and buckles."""
+SINGLE = 2
+"""Openings of a garment that have no counterpart beside them: a neck or a waist, and a hem."""
+ALIKE = 1.4
+"""Counterparts, as armholes, differ by less than this factor in length: one sleeve may be rolled up."""
 
 
 def check_wearable(surface: TriangleMesh, openings: Sequence[Opening]) -> None:
@@ -49,3 +54,33 @@ def check_wearable(surface: TriangleMesh, openings: Sequence[Opening]) -> None:
             f"no body can get into this: {closed:.0%} of it encloses space without {least} ({seen})",
             hint="a garment is an open surface with a neck, a hem or cuffs; is this a body, or a solid?",
         )
+
+
+def warn_one_sided(openings: Sequence[Opening], job: Job) -> None:
+    """Warn of a garment with an armhole or a leg at one side only: where a strap was lost, neck and armhole are one.
+
+    Args:
+        openings: Of one piece.
+        job: Receives the warning.
+    """
+    left = sorted(openings, key=lambda one: one.perimeter)
+    single = []
+    while left:
+        one = left.pop(0)
+        beside = [other for other in left if _beside(one, other)]
+        if beside:
+            left.remove(beside[0])
+        else:
+            single.append(one)
+    if len(single) > SINGLE:
+        x, y, z = single[0].center
+        job.warn(
+            f"nothing at the other side goes with the opening of {single[0].perimeter * 1e3:.0f} mm at "
+            f"({x:.2f}, {y:.2f}, {z:.2f}) m: unless the garment is made so, a strap or seam there was lost; look at it"
+        )
+
+
+def _beside(one: Opening, other: Opening) -> bool:
+    """Return whether two openings are about as long, and rather beside than above each other."""
+    x, y, z = np.abs(one.center - other.center)
+    return other.perimeter < ALIKE * one.perimeter and bool(np.hypot(x, z) > y)

@@ -166,6 +166,26 @@ def parted_openings(sightings: Sightings, cloth_points: FloatArray) -> list[Part
     return _parts_of(sightings, _hanging_on(sightings, cloth_points))
 
 
+def straps(sightings: Sightings, cloth_points: FloatArray) -> list[Parted]:
+    """Return each connected piece of what `parted_openings` finds that lies between several parts of the mannequin.
+
+    Args:
+        sightings: What the photos show.
+        cloth_points: Of the garment as found [m], shape (V, 3).
+    """
+    lost = _hanging_on(sightings, cloth_points)
+    patch, bare = _pieces(sightings.points, lost, sightings.area), _pieces(sightings.points, ~lost, sightings.area)
+    large = np.bincount(bare[~lost], minlength=1) * sightings.area >= LEAST_PART
+    tree, found = cKDTree(sightings.points[~lost]), []
+    for number in range(patch.max(initial=-1) + 1):
+        cloth = sightings.points[patch == number]
+        beside = np.concatenate(tree.query_ball_point(cloth, BESIDE * np.sqrt(sightings.area))).astype(int)
+        part = np.unique(bare[~lost][beside])
+        if np.count_nonzero(large[part]) > 1:
+            found.append(Parted(int(np.count_nonzero(large[part])), cloth, len(cloth) * sightings.area))
+    return found
+
+
 def unseen_openings(
     garment: TriangleMesh,
     mannequin: TriangleMesh,

@@ -8,12 +8,14 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from vto_pipeline.garment.align import PosedPhotos
 from vto_pipeline.garment.subtraction.color_model import color_evidence
 from vto_pipeline.garment.subtraction.variety import picture_variety, variety_evidence
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.geometry.seen.depth_picture import depth_picture
+from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import submesh, surface_area
 from vto_pipeline.io.captures.images import read_image
 from vto_pipeline.io.captures.undistort import undistorted
@@ -63,6 +65,21 @@ class Sightings(NamedTuple):
     points: FloatArray
     cloth: NDArray[np.bool_]
     area: float
+
+    def under(self, points: FloatArray, distance: SurfaceDistance) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return which points (N, 3) lie over mannequin that photos show bare, and which over cloth, shape (N,) each.
+
+        Args:
+            points: [m].
+            distance: To the mannequin.
+        """
+        if len(self.points) == 0:
+            return np.zeros(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
+        foot = distance.nearest(points).point
+        away, which = cKDTree(self.points).query(foot, distance_upper_bound=np.sqrt(self.area))
+        shown = np.isfinite(away)
+        clothed = np.append(self.cloth, False)[which]
+        return shown & ~clothed, shown & clothed
 
 
 def look_at_mannequin(

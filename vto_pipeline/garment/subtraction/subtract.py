@@ -8,7 +8,7 @@ from pydantic import Field
 from scipy.special import ndtr
 
 from vto_pipeline.errors import GarmentError
-from vto_pipeline.garment.robust_icp import scan_noise
+from vto_pipeline.garment.alignment.robust_icp import scan_noise
 from vto_pipeline.garment.subtraction.color_model import cielab, color_evidence
 from vto_pipeline.garment.subtraction.floor import is_level, not_worn
 from vto_pipeline.garment.subtraction.graph_cut import minimum_cut

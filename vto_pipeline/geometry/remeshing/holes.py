@@ -8,6 +8,7 @@ triangulation.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,13 +75,33 @@ def fill_notch(mesh: TriangleMesh, notch: IntArray, closing_line: FloatArray) ->
     Raises:
         GarmentError: no filling leaves the mesh manifold.
     """
+    return fill_between(mesh, [notch], [closing_line])
+
+
+def fill_between(mesh: TriangleMesh, arcs: Sequence[IntArray], lines: Sequence[FloatArray]) -> TriangleMesh:
+    """Return the mesh with what lies between arcs of one of its rims filled: the rim becomes as many as there are arcs.
+
+    Args:
+        mesh: A manifold mesh; the lines take the colours of their ends.
+        arcs: Consecutive half-edges of one of its `boundary_walks` each, in the order of that walk.
+        lines: The inner points from the start of each arc to the end of the one before it [m], shape (M, 3) each.
+
+    Raises:
+        GarmentError: no filling leaves the mesh manifold.
+    """
     halves, normals = half_edges(mesh), face_normals(mesh)
-    end_of = np.where(np.arange(len(closing_line)) < len(closing_line) / 2, halves[notch[0], 0], halves[notch[-1], 1])
-    colors = None if mesh.colors is None else np.vstack([mesh.colors, mesh.colors[end_of]])
-    widened = TriangleMesh(np.vstack([mesh.vertices, closing_line]), mesh.faces, colors)
-    new = len(mesh.vertices) + np.arange(len(closing_line))
-    loop = np.concatenate([[halves[notch[-1], 1]], halves[notch[::-1], 0], new]).astype(np.int32)
-    rim = Rim(loop, np.vstack([normals[notch[::-1] // 3], np.zeros((len(closing_line) + 1, 3))]))
+    count, points, ends, loop, beyond = len(mesh.vertices), [mesh.vertices], [], [], []
+    for number in reversed(range(len(arcs))):
+        arc, line, before = arcs[number], lines[number], arcs[number - 1]
+        new = count + np.arange(len(line))
+        loop += [[halves[arc[-1], 1]], halves[arc[::-1], 0], new]
+        beyond += [normals[arc[::-1] // 3], np.zeros((len(line) + 1, 3))]
+        ends.append(np.where(np.arange(len(line)) < len(line) / 2, halves[arc[0], 0], halves[before[-1], 1]))
+        points.append(line)
+        count += len(line)
+    colors = None if mesh.colors is None else np.vstack([mesh.colors, *(mesh.colors[end] for end in ends)])
+    widened = TriangleMesh(np.vstack(points), mesh.faces, colors)
+    rim = Rim(np.concatenate(loop).astype(np.int32), np.vstack(beyond))
     return _fair(_sew_in(widened, [rim]), widened)
 
 

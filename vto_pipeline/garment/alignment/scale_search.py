@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vto_pipeline.garment.coarse_align import PlacementSearch, upright_rotations
+from vto_pipeline.garment.alignment.coarse_align import PlacementSearch, upright_rotations
 from vto_pipeline.geometry.sampling import sample_surface
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.arrays import FloatArray
