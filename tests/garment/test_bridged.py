@@ -61,6 +61,17 @@ def test_straps_that_photos_show_are_put_back(dressed, lose, lost):
     assert form_distance(found.vertices[~observed]).min() > 0.0
 
 
+@pytest.mark.parametrize("keep", [3, 4])
+def test_no_more_openings_are_made_than_are_to_be_kept(dressed, keep):
+    """One strap was lost: three openings are left of four."""
+    body, top, photos = dressed
+    job = Job()
+    config = COARSE.model_copy(update={"keep": keep})
+    _, openings, _ = close_scan_holes(one_strap_lost(top), body, config, job, photos=photos)
+    assert len(openings) == keep
+    assert any("was put back" in warning for warning in job.warnings) == (keep == 4)
+
+
 def test_a_top_of_one_strap_keeps_it(tmp_path):
     body, top = form(), one_strap_lost(tank_top())
     job = Job()

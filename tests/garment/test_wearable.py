@@ -8,7 +8,9 @@ import trimesh
 
 from vto_pipeline.errors import InputError
 from vto_pipeline.garment.openings import list_openings
-from vto_pipeline.garment.wearable import check_wearable
+from vto_pipeline.garment.wearable import check_wearable, warn_one_sided
+from vto_pipeline.model.garment import Opening
+from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
 
@@ -52,3 +54,28 @@ def test_cloth_with_both_its_sides_and_buttons_is_a_garment():
     side = np.abs(tube.face_normals[:, 2]) < 0.5
     open_tube = trimesh.Trimesh(tube.vertices, tube.faces[side], process=False)
     check(mesh_of(open_tube, button))
+
+
+NECK, HEM, WAIST = (0.0, 1.45, 0.6), (0.0, 0.9, 1.0), (0.0, 1.0, 0.75)
+LEFT, RIGHT = (0.2, 1.35, 0.45), (-0.2, 1.3, 0.5)
+JOINED, FLAT = (-0.1, 1.4, 1.05), (-0.05, 1.4, 0.9)
+
+
+@pytest.mark.parametrize(
+    ("openings", "warned"),
+    [
+        ((NECK, LEFT, RIGHT, HEM), False),
+        ((WAIST, (0.1, 0.1, 0.5), (-0.1, 0.1, 0.52)), False),  # trousers
+        ((WAIST, HEM), False),
+        ((JOINED, LEFT, HEM), True),
+        ((FLAT, LEFT, HEM), True),
+    ],
+)
+def test_an_armhole_at_one_side_only_is_warned_of(openings, warned):
+    """Each opening: where it is, from side to side and up, and its length [m]."""
+    loop, up = np.zeros(0, dtype=np.int32), np.array([0.0, 1.0, 0.0])
+    job = Job()
+    warn_one_sided([Opening(loop, length, np.array([x, y, 0.0]), up) for x, y, length in openings], job)
+    assert len(job.warnings) == warned
+    for warning in job.warnings:
+        assert "the opening of 450 mm at (0.20, 1.35, 0.00) m" in warning

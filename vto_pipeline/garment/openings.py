@@ -129,8 +129,8 @@ def close_scan_holes(
         sightings = look_at_mannequin(clean, np.ones(len(clean.vertices), dtype=bool), mannequin, photos, silent)
     evidence = Evidence(distance, bare, sightings, least_perimeter, reach, config.tubular, config.keep)
     if distance is not None:
-        if sightings is not None:
-            bridged = bridge_straps(bridged, sightings, distance, least_perimeter, config.clearance_mm * 1e-3, job)
+        if sightings is not None and _asks_for_more(clean, evidence):
+            bridged = bridge_straps(clean, sightings, distance, least_perimeter, config.clearance_mm * 1e-3, job)
         bridged, notches = close_notches(bridged, distance, evidence.over_bare, least_perimeter, reach)
     worn = worn_faces(bridged, evidence, job)
     bridged, _ = split_off(bridged, worn)
@@ -206,6 +206,13 @@ def close_scan_holes(
     if bare is not None and pieces > 1:
         warn_of_torn(final, bare, job)
     return final, found, observed
+
+
+def _asks_for_more(mesh: TriangleMesh, evidence: Evidence) -> bool:
+    """Return whether more openings may be made of those that a garment has: not where fewer or as many are to stay."""
+    if evidence.keep is None:
+        return True
+    return sum(tell_apart(mesh, evidence._replace(keep=None), Job()).is_opening) < evidence.keep
 
 
 def _filled(mesh: TriangleMesh, judged: Judged) -> TriangleMesh:

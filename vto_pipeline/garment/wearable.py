@@ -67,11 +67,11 @@ def warn_one_sided(openings: Sequence[Opening], job: Job) -> None:
     single = []
     while left:
         one = left.pop(0)
-        beside = [other for other in left if _beside(one, other)]
-        if beside:
-            left.remove(beside[0])
-        else:
+        beside = next((k for k, other in enumerate(left) if _beside(one, other)), None)
+        if beside is None:
             single.append(one)
+        else:
+            del left[beside]
     if len(single) > SINGLE:
         x, y, z = single[0].center
         job.warn(
