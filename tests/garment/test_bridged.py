@@ -61,6 +61,22 @@ def test_straps_that_photos_show_are_put_back(dressed, lose, lost):
     assert form_distance(found.vertices[~observed]).min() > 0.0
 
 
+def test_a_large_bite_in_a_rim_is_put_back(dressed):
+    """12 by 8 cm at the hem, in front."""
+    body, top, photos = dressed
+    x, y, z = top.vertices[top.faces].mean(axis=1).T
+    bitten = largest(submesh(top, ~((np.abs(x) < 0.06) & (y < 0.33) & (z > 0.0)))[0])
+    job = Job()
+    found, openings, _ = close_scan_holes(bitten, body, COARSE, job, photos=photos)
+    assert len(openings) == 4
+    assert sum("was put back" in warning for warning in job.warnings) == 1
+    points = sample_surface(top, 100_000, 0)[0]
+    x, y, z = points.T
+    bite = points[(np.abs(x) < 0.05) & (y < 0.32) & (y > 0.27) & (z > 0.0)]
+    assert len(bite) > 300
+    assert np.quantile(SurfaceDistance(found).nearest(bite).distance, 0.98) < 0.004
+
+
 @pytest.mark.parametrize("keep", [3, 4])
 def test_no_more_openings_are_made_than_are_to_be_kept(dressed, keep):
     """One strap was lost: three openings are left of four."""

@@ -1,4 +1,4 @@
-"""Straps that photos show and the scan lost, put back between their ends.
+"""Straps that photos show and the scan lost, put back between their ends; so are large bites in a rim.
 
 Stereo sees no top of a shoulder from below it, and a strap is torn there: neck and armhole are one rim. Along its torn
 ends photos show that the cloth goes on. What lies between the ends is filled as a hole is, up to where photos show the
@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from vto_pipeline.errors import GarmentError
 from vto_pipeline.garment.lifting import KeptOutside
-from vto_pipeline.garment.photographed.parted import AT_RIM, BESIDE, straps
+from vto_pipeline.garment.photographed.parted import AT_RIM, BESIDE, LEAST_LOST, lost_patches
 from vto_pipeline.garment.photographed.sightings import SPACING, Sightings
 from vto_pipeline.geometry.remeshing.holes import fill_between
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
@@ -38,6 +38,8 @@ def bridge_straps(
 ) -> TriangleMesh:
     """Return the garment with the straps that photos show; its old vertices and faces come first.
 
+    Smaller bites are left to `close_notches`, which goes on as the rim beside them does.
+
     Args:
         mesh: The garment, its rims clean and its holes open.
         sightings: What photos show where it leaves the mannequin bare.
@@ -46,10 +48,12 @@ def bridge_straps(
         clearance: Least distance of what is filled from the mannequin [m].
         job: Receives a warning for each strap.
     """
-    for strap in straps(sightings, mesh.vertices):
-        bare = sightings.points[~sightings.cloth]
+    bare = sightings.points[~sightings.cloth]
+    for strap in lost_patches(sightings, mesh.vertices):
+        if strap.parts < 2 and strap.area < LEAST_LOST:
+            continue
         arcs = _torn_ends(mesh, strap.cloth, bare, strap.parts, least_perimeter)
-        if len(arcs) < 2:
+        if len(arcs) == 0:
             continue
         ends = half_edges(mesh)
         lines = []

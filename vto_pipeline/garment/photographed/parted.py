@@ -166,8 +166,9 @@ def parted_openings(sightings: Sightings, cloth_points: FloatArray) -> list[Part
     return _parts_of(sightings, _hanging_on(sightings, cloth_points))
 
 
-def straps(sightings: Sightings, cloth_points: FloatArray) -> list[Parted]:
-    """Return each connected piece of what `parted_openings` finds that lies between several parts of the mannequin.
+def lost_patches(sightings: Sightings, cloth_points: FloatArray) -> list[Parted]:
+    """Return each connected piece of cloth that the garment lacks, and between how many parts of the mannequin it lies:
+    a strap between two, a bite in a rim beside one.
 
     Args:
         sightings: What the photos show.
@@ -180,9 +181,8 @@ def straps(sightings: Sightings, cloth_points: FloatArray) -> list[Parted]:
     for number in range(patch.max(initial=-1) + 1):
         cloth = sightings.points[patch == number]
         beside = np.concatenate(tree.query_ball_point(cloth, BESIDE * np.sqrt(sightings.area))).astype(int)
-        part = np.unique(bare[~lost][beside])
-        if np.count_nonzero(large[part]) > 1:
-            found.append(Parted(int(np.count_nonzero(large[part])), cloth, len(cloth) * sightings.area))
+        parts = int(np.count_nonzero(large[np.unique(bare[~lost][beside])]))
+        found.append(Parted(parts, cloth, len(cloth) * sightings.area))
     return found
 
 
