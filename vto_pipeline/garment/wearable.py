@@ -75,8 +75,8 @@ def warn_one_sided(openings: Sequence[Opening], job: Job) -> None:
     if len(single) > SINGLE:
         x, y, z = single[0].center
         job.warn(
-            f"nothing at the other side goes with the opening of {single[0].perimeter * 1e3:.0f} mm at "
-            f"({x:.2f}, {y:.2f}, {z:.2f}) m: unless the garment is made so, a strap or seam there was lost; look at it"
+            f"the opening of {single[0].perimeter * 1e3:.0f} mm at ({x:.2f}, {y:.2f}, {z:.2f}) m has no counterpart at "
+            "the other side. A strap or seam may have been lost there: look at it"
         )
 
 
