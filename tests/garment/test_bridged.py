@@ -35,11 +35,20 @@ def one_strap_lost(top):
     return without_shoulders(top, (1.0,))
 
 
-@pytest.fixture(scope="module", params=[tank_top, narrow_top])
-def dressed(request, tmp_path_factory):
-    body, top = form(), request.param()
+def photographed(top, folder):
+    body = form()
     assert len(list_openings(top)) == 4
-    return body, top, photographs(tmp_path_factory.mktemp("tank"), top, body)
+    return body, top, photographs(folder, top, body)
+
+
+@pytest.fixture(scope="module")
+def wide(tmp_path_factory):
+    return photographed(tank_top(), tmp_path_factory.mktemp("wide"))
+
+
+@pytest.fixture(scope="module", params=["wide", "narrow"])
+def dressed(request, wide, tmp_path_factory):
+    return wide if request.param == "wide" else photographed(narrow_top(), tmp_path_factory.mktemp("narrow"))
 
 
 @pytest.mark.parametrize(("lose", "lost"), [(without_shoulders, 2), (one_strap_lost, 1)])
@@ -61,9 +70,9 @@ def test_straps_that_photos_show_are_put_back(dressed, lose, lost):
     assert form_distance(found.vertices[~observed]).min() > 0.0
 
 
-def test_a_large_bite_in_a_rim_is_put_back(dressed):
+def test_a_large_bite_in_a_rim_is_put_back(wide):
     """12 by 8 cm at the hem, in front."""
-    body, top, photos = dressed
+    body, top, photos = wide
     x, y, z = top.vertices[top.faces].mean(axis=1).T
     bitten = largest(submesh(top, ~((np.abs(x) < 0.06) & (y < 0.33) & (z > 0.0)))[0])
     job = Job()
@@ -78,9 +87,9 @@ def test_a_large_bite_in_a_rim_is_put_back(dressed):
 
 
 @pytest.mark.parametrize("keep", [3, 4])
-def test_no_more_openings_are_made_than_are_to_be_kept(dressed, keep):
+def test_no_more_openings_are_made_than_are_to_be_kept(wide, keep):
     """One strap was lost: three openings are left of four."""
-    body, top, photos = dressed
+    body, top, photos = wide
     job = Job()
     config = COARSE.model_copy(update={"keep": keep})
     _, openings, _ = close_scan_holes(one_strap_lost(top), body, config, job, photos=photos)
@@ -96,8 +105,8 @@ def test_a_top_of_one_strap_keeps_it(tmp_path):
     assert not any("was put back" in warning for warning in job.warnings)
 
 
-def test_a_whole_garment_stays_as_it_is(dressed):
-    body, top, photos = dressed
+def test_a_whole_garment_stays_as_it_is(wide):
+    body, top, photos = wide
     sightings = look_at_mannequin(top, np.ones(len(top.vertices), dtype=bool), body, photos, Job())
     job = Job()
     assert bridge_straps(top, sightings, SurfaceDistance(body), 0.12, 0.001, job) is top

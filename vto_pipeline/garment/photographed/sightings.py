@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +55,8 @@ MOST = 4.0
 T = TypeVar("T")
 
 
-class Sightings(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Sightings:
     """Points of the mannequin that no part of the garment hides, N of them.
 
     Args:
@@ -66,6 +69,10 @@ class Sightings(NamedTuple):
     cloth: NDArray[np.bool_]
     area: float
 
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.points)
+
     def under(self, points: FloatArray, distance: SurfaceDistance) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Return which points (N, 3) lie over mannequin that photos show bare, and which over cloth, shape (N,) each.
 
@@ -76,7 +83,7 @@ class Sightings(NamedTuple):
         if len(self.points) == 0:
             return np.zeros(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
         foot = distance.nearest(points).point
-        away, which = cKDTree(self.points).query(foot, distance_upper_bound=np.sqrt(self.area))
+        away, which = self._tree.query(foot, distance_upper_bound=np.sqrt(self.area))
         shown = np.isfinite(away)
         clothed = np.append(self.cloth, False)[which]
         return shown & ~clothed, shown & clothed
