@@ -70,24 +70,49 @@ def test_cloth_of_nearly_the_forms_colours_is_told_by_distance(scene, placed):
     assert (labels.garment == scene.is_shirt)[~scene.on_ledge].mean() > 0.985
 
 
-def test_a_print_is_told_from_a_form_in_shade_by_how_its_colours_vary(scene, placed):
-    """Stereo finds a print to 0.2 mm, and guesses a plain form to 1.8: cloth 2 mm off it lies within that noise. In
-    part of the print are the greys that the form has where light comes from above."""
+def printed(scene, placed, noise, palest=1.0):
+    """A scan of a printed shirt pressed on the chest, 2 mm off; in part of it are the greys that the form has where
+    light comes from above.
+
+    Args:
+        scene, placed: The form and its scan.
+        noise: Of the bare form, into it and out of it [m].
+        palest: Of the print where it is pressed on, how much of its colour lamps leave.
+    """
     rng = np.random.default_rng(2)
     pressed = scene.is_shirt & (placed.vertices[:, 1] > 0.55) & (placed.vertices[:, 2] > 0.0)
     foot = SurfaceDistance(scene.form).nearest(placed.vertices)
     out = face_normals(scene.form)[foot.face]
-    away = np.where(pressed, rng.normal(2e-3, 2e-4, len(out)), rng.normal(0.0, 1.8e-3, len(out)))
+    plain = rng.normal(0.0, 1.0, len(out))
+    away = np.where(pressed, rng.normal(2e-3, 2e-4, len(out)), plain * np.where(plain < 0.0, *noise))
     moved = pressed | ~scene.is_shirt
     vertices = np.where(moved[:, None], foot.point + away[:, None] * out, placed.vertices)
     flowers = np.array([[150, 145, 132], [205, 190, 170], [160, 175, 190], [190, 150, 140]], float)
-    spot = np.floor(placed.vertices / 0.012).astype(int) @ [1, 3, 5] % 4
-    colors = np.where(scene.is_shirt[:, None], flowers[spot], [210.0, 195.0, 175.0])
+    flowers = flowers[np.floor(placed.vertices / 0.012).astype(int) @ [1, 3, 5] % 4]
+    ground = [210.0, 195.0, 175.0]
+    flowers = np.where(pressed[:, None], ground + palest * (flowers - ground), flowers)
+    colors = np.where(scene.is_shirt[:, None], flowers, ground)
     colors = colors * (0.78 + 0.22 * out[:, 1:2]) + rng.normal(0.0, 3.0, colors.shape)
-    surface = TriangleMesh(vertices, placed.faces, np.clip(colors, 0, 255).astype(np.uint8))
+    return TriangleMesh(vertices, placed.faces, np.clip(colors, 0, 255).astype(np.uint8)), pressed
+
+
+def test_a_print_is_told_from_a_form_in_shade_by_how_its_colours_vary(scene, placed):
+    """Stereo finds a print to 0.2 mm, and guesses a plain form to 1.8: cloth 2 mm off it lies within that noise."""
+    surface, pressed = printed(scene, placed, (1.8e-3, 1.8e-3))
     job = Job()
     labels = label_garment(surface, scene.form, SubtractConfig(), job)
     assert any("how colours vary tells" in note for note in job.notes)
+    assert labels.garment[pressed].mean() > 0.93
+    assert labels.garment[~scene.is_shirt & ~scene.on_ledge].mean() < 0.025
+
+
+def test_a_pale_print_is_told_by_its_distance_where_a_plain_form_is_guessed_inwards(scene, placed):
+    """2.5 mm of noise into the form and 0.6 out of it: what shows is cloth that lies 2 mm outside."""
+    surface, pressed = printed(scene, placed, (2.5e-3, 0.6e-3), palest=0.5)
+    job = Job()
+    labels = label_garment(surface, scene.form, SubtractConfig(), job)
+    assert job.metrics["noise_mm"] > 2.0  # some lies on ledges
+    assert_allclose(job.metrics["noise_outward_mm"], 0.6, rtol=0.25)
     assert labels.garment[pressed].mean() > 0.93
     assert labels.garment[~scene.is_shirt & ~scene.on_ledge].mean() < 0.025
 

@@ -64,11 +64,13 @@ class SubtractConfig(Config):
 def label_garment(surface: TriangleMesh, mannequin: TriangleMesh, config: SubtractConfig, job: Job) -> SurfaceLabels:
     """Divide the scan into garment and the rest by an exact graph cut.
 
-    Evidence per vertex: the signed distance against the noise measured on the bare parts, the colour, and whether the
-    normal agrees with the mannequin's. Where cloth is printed, so that colours vary from place to place as they do on
-    no form, it is cut once more with that. The form's colours are those of what lies just inside of it, where no cloth
-    can be: as far outside, tight cloth may be most of what there is. A boundary is cheap where the colour changes. The
-    level surface that the scan stands on is floor or board; cloth that hangs below the mannequin is cloth.
+    Evidence per vertex: the signed distance against the noise measured on the bare parts, the colour, and whether
+    the normal agrees with the mannequin's. Where cloth is printed, so that colours vary from place to place as they
+    do on no form, it is cut once more with that. What looks as plain as half of the form does then tells how far
+    the form is scanned outward, too, which may be much less than inward: as near as cloth lies to it. The form's
+    colours are those of what lies just inside of it, where no cloth can be: as far outside, tight cloth may be most
+    of what there is. A boundary is cheap where the colour changes. The level surface that the scan stands on is
+    floor or board; cloth that hangs below the mannequin is cloth.
 
     Args:
         surface: The scan in the mannequin's frame.
@@ -101,20 +103,24 @@ def label_garment(surface: TriangleMesh, mannequin: TriangleMesh, config: Subtra
         mixed = most_mixed(facing_out, sigma, thickness)
         by_color = color_evidence(surface.colors, sure_garment, sure_bare, most_mixed=mixed)
         thickened = np.where(thin_parts(mannequin), THICKENED, SELDOM)[near.face]
-    by_distance = _distance_evidence(near.distance, sigma, thickness, thickened)
-    by_distance = np.where(facing < 0.0, np.maximum(by_distance, CERTAIN / 2.0), by_distance)
     pair, price = edges(surface), boundary_price(surface, config)
 
-    def cut(by_look: FloatArray | float) -> tuple[FloatArray, NDArray[np.bool_]]:
+    def cut(outward: float, by_look: FloatArray | float) -> tuple[FloatArray, NDArray[np.bool_]]:
+        by_distance = _distance_evidence(near.distance, sigma, outward, thickness, thickened)
+        by_distance = np.where(facing < 0.0, np.maximum(by_distance, CERTAIN / 2.0), by_distance)
         evidence = np.where(floor, -4.0 * CERTAIN, by_distance + np.clip(by_look, -CERTAIN, CERTAIN))
         return evidence, minimum_cut(evidence, pair, price)
 
-    evidence, garment = cut(0.0 if by_color is None else by_color)
+    evidence, garment = cut(sigma, 0.0 if by_color is None else by_color)
     if by_color is not None:
         by_variety = variety_evidence(surface_variety(surface, garment), sure_garment, sure_bare, mixed)
         of_cloth, of_form = np.mean(by_variety[sure_garment] > SURE), np.mean(by_variety[sure_bare] < -SURE)
         if min(of_cloth, of_form) >= TOLD:
-            evidence, garment = cut(by_color + by_variety)
+            plain = by_variety <= np.median(by_variety[sure_bare])
+            outward = scan_noise(-near.distance[plain & (facing > FACING) & ~floor], 4.0 * MOST_SIGMA)
+            outward = float(np.clip(outward, LEAST_SIGMA, sigma))
+            evidence, garment = cut(outward, by_color + by_variety)
+            job.measure(noise_outward_mm=outward * 1e3)
             job.note(f"a print: how colours vary tells {of_cloth:.0%} of the cloth, and {of_form:.0%} of the form")
         else:
             job.leave_out("evidence by how colours vary", "it does not tell cloth from form")
@@ -173,22 +179,23 @@ def extract_garment(surface: TriangleMesh, labels: SurfaceLabels, config: Subtra
 
 
 def _distance_evidence(
-    distance: FloatArray, sigma: float, thickness: float, thickened: FloatArray | None
+    distance: FloatArray, sigma: float, outward: float, thickness: float, thickened: FloatArray | None
 ) -> FloatArray:
     """Return the log-likelihood ratio of cloth, anywhere beyond its thickness, against bare mannequin at zero, (V,).
 
     Args:
         distance: Signed, to the mannequin [m], shape (V,).
-        sigma: Noise of the scan [m].
+        sigma, outward: Noise of the bare scan into the mannequin and out of it [m].
         thickness: Of cloth [m].
         thickened: Share of the bare mannequin there whose errors have the deviation `THICKER`, shape (V,), or None.
     """
-    bare = -0.5 * np.square(distance / sigma)
+    noise = np.where(distance > 0.0, outward, sigma)
+    bare = -0.5 * np.square(distance / noise)
     if thickened is not None:
-        wide = np.log(thickened * sigma / THICKER) - 0.5 * np.square(distance / THICKER)
+        wide = np.log(thickened * noise / THICKER) - 0.5 * np.square(distance / THICKER)
         bare = np.logaddexp(bare, wide)
     cloth = -0.5 * np.square(np.minimum((distance - thickness) / sigma, 0.0))
-    return np.clip(cloth - bare - np.log(TIGHT / sigma), -CERTAIN, 2.0 * CERTAIN)
+    return np.clip(cloth - bare - np.log(2.0 * TIGHT / (sigma + outward)), -CERTAIN, 2.0 * CERTAIN)
 
 
 def boundary_price(surface: TriangleMesh, config: SubtractConfig) -> FloatArray:
