@@ -33,6 +33,8 @@ SPACING = 0.008
 """Between points of the mannequin [m]."""
 BORDER_PX = 3
 """Pixels so near to where one thing hides another may show either."""
+CLIPPED = 253
+"""From here on a channel is taken for clipped: under lamps the palest flowers are as white as the form."""
 LEAST_COSINE = 0.2
 """Of the angle between the mannequin's normal and the line of sight."""
 BEHIND = 0.01
@@ -185,11 +187,13 @@ def _eroded(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def _evidence(picture: ByteArray, cloth: NDArray[np.bool_], form: NDArray[np.bool_]) -> NDArray[np.float32] | None:
     """Return the log-likelihood ratio of cloth against mannequin on what shows of the mannequin, NaN elsewhere, (H, W);
-    None where the photo shows too little of either, or their colours do not tell them apart.
+    None where the photo shows too little of either, or their colours do not tell them apart. Clipped pixels tell none.
 
     Colours tell, or how they vary from place to place: what tells better decides alone. A form in the shadow of a hem
     may be as grey as a print, but no print is of one colour.
     """
+    exposed = (picture < CLIPPED).all(axis=2)
+    cloth, form = cloth & exposed, form & exposed
     if cloth.sum() < LEAST_PIXELS or form.sum() < LEAST_PIXELS:
         return None
     colors = np.vstack([picture[cloth], picture[form]])
