@@ -1,4 +1,4 @@
-"""Rasterisation: the visible triangle of each pixel."""
+"""Projection into a picture and rasterisation: the visible triangle of each pixel."""
 
 from __future__ import annotations
 
@@ -28,6 +28,30 @@ def rasterise(
     depth = np.full((height, width), np.inf)
     draw_rows(corners, 0, face, weight, depth)
     return face, weight, depth
+
+
+@njit(cache=True, nogil=True)
+def projected(vertices, cam_from_mesh, lens, nearest):  # type: ignore[no-untyped-def]  # typed by Numba
+    """Return pixel column, pixel row and depth of each vertex, as `rasterise_depth` takes them, shape (V, 3).
+
+    Args:
+        vertices: Of a mesh, shape (V, 3).
+        cam_from_mesh: A similarity, shape (4, 4).
+        lens: Focal lengths and principal point (fx, fy, cx, cy) [px].
+        nearest: What is no farther ahead than this is not before the camera: zeros.
+    """
+    fx, fy, cx, cy = lens
+    pixel = np.zeros((len(vertices), 3))
+    local = np.empty(3)
+    for n in range(len(vertices)):
+        for i in range(3):
+            local[i] = cam_from_mesh[i, 3]
+            for j in range(3):
+                local[i] += cam_from_mesh[i, j] * vertices[n, j]
+        z = local[2]
+        if z > nearest:
+            pixel[n, 0], pixel[n, 1], pixel[n, 2] = fx * local[0] / z + cx, fy * local[1] / z + cy, z
+    return pixel
 
 
 @njit(cache=True, nogil=True)

@@ -11,13 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from vto_pipeline.garment.outline.edges import EdgeLevel
 from vto_pipeline.geometry.topology import edge_face_counts, face_normals, half_edges
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
-from vto_pipeline.numerics.rasterise import rasterise_depth
+from vto_pipeline.numerics.rasterise import projected, rasterise_depth
 
 SPACING = 2.0
 """Distance of points along the outline [px]."""
@@ -25,6 +24,8 @@ COVERED = 0.06
 """What was scanned this far behind the outline belongs to it still [share of the mannequin's size]."""
 BEHIND = 0.003
 """Depths differ by this where the same place is meant [share of the mannequin's size]."""
+TOWARD, AWAY, CUT = 1, 0, -1
+"""A face looks toward the camera or away, or part of it is not before the camera."""
 
 
 class Contour(NamedTuple):
@@ -66,29 +67,15 @@ class ContourMesh:
             level: The picture.
         """
         camera, scale = level.camera, float(np.cbrt(np.linalg.det(cam_from_mesh[:3, :3])))
-        local = self.mesh.vertices @ cam_from_mesh[:3, :3].T + cam_from_mesh[:3, 3]
+        size = scale * self.size
+        lens = (camera.fx, camera.fy, camera.cx, camera.cy)
+        vertices, faces = self.mesh.vertices, self.mesh.faces
+        pixel = projected(vertices, cam_from_mesh, lens, 0.05 * size)
         eye = -np.linalg.solve(cam_from_mesh[:3, :3], cam_from_mesh[:3, 3])
-        toward: NDArray[np.bool_] = _toward(self.normals, self.mesh.vertices, self.mesh.faces, eye)
-        z = local[:, 2]
-        ahead: NDArray[np.bool_] = np.asarray(z > 0.05 * scale * self.size)
-        safe = np.where(ahead, z, 1.0)
-        pixel = np.column_stack(
-            [camera.fx * local[:, 0] / safe + camera.cx, camera.fy * local[:, 1] / safe + camera.cy, z]
-        )
-        whole: NDArray[np.bool_] = (
-            np.ones(len(self.mesh.faces), bool) if ahead.all() else np.asarray(ahead[self.mesh.faces].all(axis=1))
-        )
-        depth = rasterise_depth(pixel, self.mesh.faces[whole & toward], camera.width, camera.height)
-        rim = (toward[self.beside[:, 0]] != toward[self.beside[:, 1]]) & whole[self.beside].all(axis=1)
-        pair = self.edges[rim]
-        front = np.where(toward[self.beside[rim, 0]], self.beside[rim, 0], self.beside[rim, 1])
-        third = self.mesh.faces[front].sum(axis=1) - pair.sum(axis=1)
-        edge, along, at, outward, length = _seen(
-            pixel[pair], pixel[third], depth, level.hidden, BEHIND * scale * self.size, COVERED * scale * self.size
-        )
-        ends, far = pair[edge], along[:, None]
-        point = (1 - far) * self.mesh.vertices[ends[:, 0]] + far * self.mesh.vertices[ends[:, 1]]
-        return Contour(point, at[:, :2], outward, at[:, 2], length)
+        side = _sides(self.normals, vertices, faces, pixel, eye)
+        depth = rasterise_depth(pixel, faces[side == TOWARD], camera.width, camera.height)
+        pair, third = _rim(self.edges, self.beside, faces, side)
+        return Contour(*_seen(vertices, pixel, pair, third, depth, level.hidden, BEHIND * size, COVERED * size))
 
 
 def _inner_edges(mesh: TriangleMesh) -> tuple[IntArray, IntArray]:
@@ -103,50 +90,70 @@ def _inner_edges(mesh: TriangleMesh) -> tuple[IntArray, IntArray]:
 
 
 @njit(cache=True, nogil=True)
-def _toward(normals, vertices, faces, eye):  # type: ignore[no-untyped-def]  # typed by Numba
-    """Which faces look at the eye, shape (F,)."""
-    toward = np.empty(len(faces), np.bool_)
+def _sides(normals, vertices, faces, pixel, eye):  # type: ignore[no-untyped-def]  # typed by Numba
+    """Whether each face looks toward the eye or away, or is not whole before the camera, shape (F,)."""
+    sides = np.empty(len(faces), np.int8)
     for f in range(len(faces)):
-        first, facing = vertices[faces[f, 0]], 0.0
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        facing = 0.0
         for d in range(3):
-            facing += normals[f, d] * (eye[d] - first[d])
-        toward[f] = facing > 0.0
-    return toward
+            facing += normals[f, d] * (eye[d] - vertices[a, d])
+        sides[f] = TOWARD if facing > 0.0 else AWAY
+        if not (pixel[a, 2] > 0.0 and pixel[b, 2] > 0.0 and pixel[c, 2] > 0.0):
+            sides[f] = CUT
+    return sides
 
 
 @njit(cache=True, nogil=True)
-def _seen(ends, third, depth, hidden, behind, covered):  # type: ignore[no-untyped-def]  # typed by Numba
-    """Points along projected edges that nothing hides.
+def _rim(edges, beside, faces, sides):  # type: ignore[no-untyped-def]  # typed by Numba
+    """Edges (E, 2) between a face that looks toward the eye and one that looks away, and the former's third corner."""
+    pair, third = np.empty_like(edges), np.empty(len(edges), edges.dtype)
+    n = 0
+    for e in range(len(edges)):
+        one, other = sides[beside[e, 0]], sides[beside[e, 1]]
+        if one == other or CUT in (one, other):
+            continue
+        front = beside[e, 0] if one == TOWARD else beside[e, 1]
+        a, b = edges[e, 0], edges[e, 1]
+        pair[n, 0], pair[n, 1] = a, b
+        third[n] = faces[front, 0] + faces[front, 1] + faces[front, 2] - a - b
+        n += 1
+    return pair[:n], third[:n]
+
+
+@njit(cache=True, nogil=True)
+def _seen(vertices, pixel, pair, third, depth, hidden, behind, covered):  # type: ignore[no-untyped-def]  # typed by Numba
+    """Points along projected edges that nothing hides, as of `Contour`.
 
     Args:
-        ends: Column, row, depth of both ends of each edge, shape (E, 2, 3).
-        third: The same of the third corner of the face that looks at the camera, shape (E, 3).
+        vertices: Shape (V, 3).
+        pixel: Column, row, depth of each, shape (V, 3).
+        pair: Both ends of each edge, shape (E, 2).
+        third: The third corner of the face that looks toward the camera, shape (E,).
         depth: Of the mesh, shape (H, W).
         hidden: Of the scan, shape (H, W).
         behind: Depths differ by no more than this at the same place.
         covered: The scan may lie so far behind and still cover.
-
-    Returns:
-        Edge, place along it (0 to 1), column, row and depth, outward normal, length [px] of each point.
     """
     height, width = depth.shape
     total = 0
-    counts = np.zeros(len(ends), np.int64)
-    for e in range(len(ends)):
-        long = np.hypot(ends[e, 1, 0] - ends[e, 0, 0], ends[e, 1, 1] - ends[e, 0, 1])
+    counts = np.zeros(len(pair), np.int64)
+    for e in range(len(pair)):
+        a, b = pixel[pair[e, 0]], pixel[pair[e, 1]]
+        long = np.hypot(b[0] - a[0], b[1] - a[1])
         if 1e-9 < long < 4.0 * (width + height):
             counts[e] = int(np.ceil(long / SPACING))
             total += counts[e]
-    edge, along = np.empty(total, np.int64), np.empty(total)
-    at, outward, length = np.empty((total, 3)), np.empty((total, 2)), np.empty(total)
+    point, at, outward = np.empty((total, 3)), np.empty((total, 2)), np.empty((total, 2))
+    away, length = np.empty(total), np.empty(total)
     n = 0
-    for e in range(len(ends)):
+    for e in range(len(pair)):
         if counts[e] == 0:
             continue
-        a, b = ends[e, 0], ends[e, 1]
+        a, b, c = pixel[pair[e, 0]], pixel[pair[e, 1]], pixel[third[e]]
         long = np.hypot(b[0] - a[0], b[1] - a[1])
         nx, ny = (b[1] - a[1]) / long, -(b[0] - a[0]) / long
-        if nx * (third[e, 0] - a[0]) + ny * (third[e, 1] - a[1]) > 0:
+        if nx * (c[0] - a[0]) + ny * (c[1] - a[1]) > 0:
             nx, ny = -nx, -ny
         for k in range(counts[e]):
             t = (k + 0.5) / counts[e]
@@ -158,8 +165,9 @@ def _seen(ends, third, depth, hidden, behind, covered):  # type: ignore[no-untyp
                 continue
             if hidden[int(np.round(v)), int(np.round(u))] < z + covered:
                 continue
-            edge[n], along[n], length[n] = e, t, long / counts[e]
-            at[n, 0], at[n, 1], at[n, 2] = u, v, z
-            outward[n, 0], outward[n, 1] = nx, ny
+            for d in range(3):
+                point[n, d] = (1 - t) * vertices[pair[e, 0], d] + t * vertices[pair[e, 1], d]
+            at[n, 0], at[n, 1], away[n] = u, v, z
+            outward[n, 0], outward[n, 1], length[n] = nx, ny, long / counts[e]
             n += 1
-    return edge[:n], along[:n], at[:n], outward[:n], length[:n]
+    return point[:n], at[:n], outward[:n], away[:n], length[:n]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,6 +32,8 @@ LARGEST_FORMS = (40_000, 10_000, 4_000)
 """Faces, for photos of full size, of half, and smaller; an outline at their pixels is not changed by more."""
 SAME_PLACE = 0.02
 """Placements whose points differ by no more than this on average are one [share of the form's size]."""
+MET = 0.004
+"""Placements no farther apart than this take the same steps from here on [share of the form's size]."""
 SHARED_PX = 0.5
 """What cameras may all have wrong alike, so that photos do not disagree over it [px]."""
 
@@ -109,24 +111,14 @@ def place_by_outline(
     some = np.unique(np.linspace(0, len(photos) - 1, min(len(photos), FEW_PHOTOS)).round().astype(int))
     few = OutlineProblem(meshes, distance, scan, [photos[k] for k in some])
     free: tuple[int, ...] = (*UPRIGHT, 6) if free_scale else UPRIGHT
-    rough = []
-    for number, start in enumerate(starts):
-        placement = _inverse(start)
-        for reach in np.geomspace(WIDEST, COARSE, COARSE_STEPS) * mesh.size:
-            placement = few.step(placement, reach, free).scan_from_form
-        rough.append(few.step(placement, COARSE * mesh.size, free, move=False))
-        job.progress(0.4 + 0.3 * (number + 1) / len(starts), f"outline: start {number + 1} of {len(starts)}")
-    chosen = _distinct(sorted(rough, key=_worth, reverse=True), mesh)[: config.refined]
+    job.progress(0.4, f"outline: {len(starts)} starts")
+    rough = _followed([_inverse(start) for start in starts], few, free, WIDEST, COARSE_STEPS, lambda _: COARSE)
+    chosen = _distinct(rough, mesh, SAME_PLACE)[: config.refined]
+    job.progress(0.7, f"outline: {len(chosen)} placements")
     every = OutlineProblem(meshes, distance, scan, photos)
-    free = tuple(range(7 if free_scale else 6))
-    fits = []
-    for number, one in enumerate(chosen):
-        placement, last = one.scan_from_form, FINEST_PX * _pixel(one.scan_from_form, photos, mesh)
-        for reach in np.geomspace(2 * COARSE * mesh.size, last, FINE_STEPS):
-            placement = every.step(placement, max(reach, last), free).scan_from_form
-        fits.append(every.step(placement, last, free, move=False))
-        job.progress(0.7 + 0.3 * (number + 1) / len(chosen), f"outline: placement {number + 1} of {len(chosen)}")
-    fits = _distinct(sorted(fits, key=_worth, reverse=True), mesh)
+    free, finest = tuple(range(7 if free_scale else 6)), _finest(photos, mesh)
+    fits = _followed([fit.scan_from_form for fit in chosen], every, free, 2 * COARSE, FINE_STEPS, finest)
+    fits = _distinct(fits, mesh, SAME_PLACE)
     found = _accept(fits, mesh, photos, free_scale, config, job)
     return found if free_scale else _sized(found, every, photos, mesh)
 
@@ -135,16 +127,49 @@ def _sized(
     found: OutlinePlacement, every: OutlineProblem, photos: Sequence[EdgePhoto], mesh: ContourMesh
 ) -> OutlinePlacement:
     """Return a rigid placement with the size in which the outline would fit best."""
-    placement, free = found.fit.scan_from_form, tuple(range(7))
+    placement, finest = found.fit.scan_from_form, _finest(photos, mesh)
+    sized = _followed([placement], every, tuple(range(7)), 2 * COARSE, SIZE_STEPS, finest)[0]
     pixel = _pixel(placement, photos, mesh)
-    last = FINEST_PX * pixel
-    for reach in np.geomspace(2 * COARSE * mesh.size, last, SIZE_STEPS):
-        placement = every.step(placement, max(reach, last), free).scan_from_form
-    sized = every.step(placement, last, free, move=False)
     error = np.hypot(np.sqrt(sized.covariance[6, 6]), SHARED_PX * pixel / (0.5 * mesh.size))
     size = float(np.cbrt(np.linalg.det(_inverse(sized.scan_from_form)[:3, :3])))
     merit = _worth(sized) / max(_worth(found.fit), 1e-9)
     return replace(found, size=size, size_error=float(error), size_merit=merit)
+
+
+def _followed(
+    placements: list[FloatArray],
+    problem: OutlineProblem,
+    free: Sequence[int],
+    widest: float,
+    steps: int,
+    finest: Callable[[FloatArray], float],
+) -> list[OutlineFit]:
+    """Follow placements to where the outline lies on edges; of those that meet on the way, the first goes on.
+
+    Args:
+        placements: scan_from_form, each (4, 4).
+        problem: The photos.
+        free: Which ways they may move.
+        widest: Reach of the first step [share of the form's size].
+        steps: How many.
+        finest: Of a placement, the reach of the last step [share of the form's size].
+
+    Returns:
+        Where they end, the best first.
+    """
+    form, size = problem.forms[-1], problem.form.size
+    fits: list[OutlineFit] = []
+    for along in np.linspace(0.0, 1.0, steps):
+        reaches = [max(widest, last) ** (1 - along) * last**along for last in map(finest, placements)]
+        fits = [problem.step(one, size * reach, free) for one, reach in zip(placements, reaches, strict=True)]
+        placements = [fit.scan_from_form for fit in _distinct(fits, form, MET)]
+    ends = [problem.step(one, size * finest(one), free, move=False) for one in placements]
+    return sorted(ends, key=_worth, reverse=True)
+
+
+def _finest(photos: Sequence[EdgePhoto], mesh: ContourMesh) -> Callable[[FloatArray], float]:
+    """The reach of the last step of a placement: some pixels on the form [share of its size]."""
+    return lambda placement: FINEST_PX * _pixel(placement, photos, mesh) / mesh.size
 
 
 def _inverse(transform: FloatArray) -> FloatArray:
@@ -155,11 +180,11 @@ def _worth(fit: OutlineFit) -> float:
     return fit.support - fit.inside
 
 
-def _distinct(fits: list[OutlineFit], mesh: ContourMesh) -> list[OutlineFit]:
-    """Of placements that are one, the first."""
+def _distinct(fits: list[OutlineFit], mesh: ContourMesh, least: float) -> list[OutlineFit]:
+    """Of placements less than this apart [share of the form's size], the first."""
     kept: list[OutlineFit] = []
     for fit in fits:
-        if all(_apart(fit, other, mesh) > SAME_PLACE for other in kept):
+        if all(_apart(fit, other, mesh) > least for other in kept):
             kept.append(fit)
     return kept
 

@@ -7,7 +7,10 @@ import numpy as np
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.mesh import TriangleMesh
-from vto_pipeline.numerics.rasterise import rasterise_depth
+from vto_pipeline.numerics.rasterise import projected, rasterise_depth
+
+NEAREST = 1e-6
+"""What is no farther ahead than this is not before the camera [m]."""
 
 
 def depth_picture(mesh: TriangleMesh, camera: Intrinsics, cam_from_world: FloatArray) -> FloatArray:
@@ -18,10 +21,6 @@ def depth_picture(mesh: TriangleMesh, camera: Intrinsics, cam_from_world: FloatA
         camera: Whose distortion is not regarded.
         cam_from_world: Rigid transform [m], shape (4, 4).
     """
-    local = mesh.vertices @ cam_from_world[:3, :3].T + cam_from_world[:3, 3]
-    ahead = local[:, 2] > 1e-6
-    z = np.where(ahead, local[:, 2], 1.0)
-    placed = np.column_stack(
-        [camera.fx * local[:, 0] / z + camera.cx, camera.fy * local[:, 1] / z + camera.cy, np.where(ahead, z, 0.0)]
-    )
+    lens = (camera.fx, camera.fy, camera.cx, camera.cy)
+    placed = projected(mesh.vertices, np.ascontiguousarray(cam_from_world), lens, NEAREST)
     return np.asarray(rasterise_depth(placed, mesh.faces, camera.width, camera.height))
