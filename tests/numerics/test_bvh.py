@@ -82,6 +82,36 @@ def test_each_region_of_the_triangle(point, weights, feature):
     assert_allclose(found, weights, rtol=0, atol=1e-15)  # known by construction
 
 
+def halves(count, leaves, first=0, last=None):
+    """Where the places of the leaves of each inner node begin, are halved and end."""
+    last = leaves if last is None else last
+    if last - first > 1:
+        middle = (first + last) // 2
+        yield tuple(leaf * count // leaves for leaf in (first, middle, last))
+        yield from halves(count, leaves, first, middle)
+        yield from halves(count, leaves, middle, last)
+
+
+@pytest.mark.parametrize("count", [1, 4, 5, 700])
+def test_each_node_is_halved_across_the_longest_side(soup, count):
+    vertices, faces = soup[0], soup[1][:count]
+    order = bvh.build(vertices, faces).order
+    assert_array_equal(np.sort(order), np.arange(count))
+    centres = vertices[faces].mean(axis=1)
+    leaves = 2 ** int(np.ceil(np.log2(np.ceil(count / 4))))
+    for begin, middle, end in halves(count, leaves):
+        along = centres[order[begin:end]]
+        along = along[:, np.ptp(along, axis=0).argmax()]
+        assert along[: middle - begin].max() <= along[middle - begin :].min()
+
+
+def test_triangles_at_one_place_are_halved_by_their_number():
+    vertices, faces = np.zeros((3, 3)), np.zeros((100, 3), dtype=np.int32) + np.arange(3, dtype=np.int32)
+    order = bvh.build(vertices, faces).order
+    for begin, middle, end in halves(100, 32):
+        assert order[begin:middle].max() < order[middle:end].min()
+
+
 def test_morton_order_keeps_neighbours_together():
     points = np.random.default_rng(0).uniform(0, 1, (4000, 3))
     order = morton_order(points)

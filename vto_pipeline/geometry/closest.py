@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
-from numpy.typing import NDArray
 
 from vto_pipeline.model.arrays import FloatArray, IntArray
+from vto_pipeline.numerics.spatial.bvh import Bvh, build, closest_triangles
+
+Closest: TypeAlias = tuple[IntArray, FloatArray, FloatArray]
+"""Face, closest point and distance [m] of each query."""
 
 
-def closest_points(
-    points: FloatArray, vertices: FloatArray, faces: IntArray
-) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
-    """Return face, closest point and distance [m] for each point."""
-    import igl
+def closest_points(points: FloatArray, vertices: FloatArray, faces: IntArray) -> Closest:
+    """Return what of a surface is closest to each point (N, 3)."""
+    corners, triangles = np.array(vertices, order="C"), np.array(faces, dtype=np.int32, order="C")
+    return closest_in_tree(points, build(corners, triangles), corners, triangles)
 
-    squared, face, closest = igl.point_mesh_squared_distance(
-        np.ascontiguousarray(points), np.ascontiguousarray(vertices), np.ascontiguousarray(faces, dtype=np.int64)
-    )
-    return np.asarray(face).astype(np.int64), np.asarray(closest), np.sqrt(np.asarray(squared))
+
+def closest_in_tree(points: FloatArray, tree: Bvh, vertices: FloatArray, faces: IntArray) -> Closest:
+    """Return the same where there is a tree; vertices and faces are as it was built of."""
+    asked = np.array(points, order="C")  # kernels are compiled again for arrays that are read-only
+    face, weights, _ = closest_triangles(tree, vertices, faces, asked, np.full(len(asked), np.inf))
+    point = np.einsum("nk,nkd->nd", weights, vertices[faces[face]])
+    return face, point, np.linalg.norm(asked - point, axis=1)
 
 
 def barycentric(points: FloatArray, corners: FloatArray) -> FloatArray:

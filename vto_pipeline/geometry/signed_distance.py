@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vto_pipeline.geometry.closest import closest_in_tree
 from vto_pipeline.model.arrays import FloatArray, IntArray
 from vto_pipeline.model.mesh import TriangleMesh
+from vto_pipeline.numerics.spatial.bvh import Bvh, build
 
 _ROUGH, _FINE = 1.0, 2.0  # how many of its radii a cluster of triangles is away, to count as one
 _DOUBT = 0.4  # of a turn: rough numbers of bodies and garments, from a tenth of a millimetre off, miss by 0.28 at most
@@ -44,12 +46,12 @@ class SurfaceDistance:
 
     def __init__(self, mesh: TriangleMesh) -> None:
         self._vertices = np.array(mesh.vertices, order="C")  # a copy: whose arrays are changed meanwhile is not asked
-        self._faces = np.array(mesh.faces, dtype=np.int64, order="C")
+        self._faces = np.array(mesh.faces, dtype=np.int32, order="C")
 
     def nearest(self, points: FloatArray) -> SurfacePoints:
         """Return the nearest surface points; distances are not negative."""
-        squared, face, point = self._tree.squared_distance(self._vertices, self._faces, np.ascontiguousarray(points))
-        return SurfacePoints(np.sqrt(squared), face.astype(np.int32), point)
+        face, point, distance = closest_in_tree(points, self._tree, self._vertices, self._faces)
+        return SurfacePoints(distance, face, point)
 
     def signed(self, points: FloatArray) -> SurfacePoints:
         """Return the nearest surface points; distances are negative inside."""
@@ -66,17 +68,13 @@ class SurfaceDistance:
         return np.asarray(number > above)
 
     @cached_property
-    def _tree(self) -> Any:
-        import igl
-
-        tree = igl.AABB()
-        tree.init(self._vertices, self._faces)
-        return tree
+    def _tree(self) -> Bvh:
+        return build(self._vertices, self._faces)
 
     @cached_property
     def _winding(self) -> Any:
         import igl
 
         winding = igl.FastWindingNumberBVH()
-        winding.init(self._vertices, self._faces)
+        winding.init(self._vertices, self._faces.astype(np.int64))
         return winding

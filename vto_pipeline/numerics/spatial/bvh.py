@@ -1,8 +1,7 @@
 """A bounding volume hierarchy of triangles: built once, refitted when they move, queried for nearest points.
 
-The triangles are put in Morton order and cut into 2^k equal leaves, so the tree is a heap without pointers: the
-children of node i are 2i+1 and 2i+2. Karras 2012 gives the ordering; the equal cut trades a little tightness for
-brevity.
+The triangles are halved by their centres, each time across the longest side of the box about these, into 2^k equal
+leaves. So the tree is a heap without pointers: the children of node i are 2i+1 and 2i+2.
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ from numpy.typing import NDArray
 
 from vto_pipeline.numerics.distance import FACE, barycentric_point, closest_on_triangle
 from vto_pipeline.numerics.spatial.boxes import EMPTY, area, box_union, load_box, store_box, swept_boxes
-from vto_pipeline.numerics.spatial.morton import morton_order
 from vto_pipeline.numerics.vector import dot, load, sub
 
 _LEAF = 4  # triangles
@@ -43,13 +41,73 @@ class Bvh(NamedTuple):
 
 def build(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Bvh:
     """Return the tree over these triangles; vertices [m] shape (V, 3), faces shape (F, 3)."""
-    order = morton_order(vertices[faces].mean(axis=1))
     leaves = 1
     while leaves * _LEAF < len(faces):
         leaves *= 2
+    order = _halved(vertices[faces].mean(axis=1), leaves)
     tree = Bvh(order, np.empty((2 * leaves - 1, 6)), np.empty((len(faces), 6)), 0.0)
     refit(tree, vertices, faces)
     return tree._replace(cost=float(_cost(tree.nodes, tree.triangles)))
+
+
+@njit(cache=True, error_model="numpy")
+def _halved(centres, leaves):
+    """Return the triangles in the order of the leaves, shape (F,); `centres` of shape (F, 3)."""
+    count = len(centres)
+    order = np.arange(count).astype(np.int32)
+    stack = np.empty((64, 2), np.int64)
+    stack[0, 0], stack[0, 1], depth = 0, leaves, 1
+    while depth > 0:
+        depth -= 1
+        left, right = stack[depth, 0], stack[depth, 1]
+        if right - left == 1:
+            continue
+        middle = (left + right) // 2
+        first, place, last = left * count // leaves, middle * count // leaves, right * count // leaves
+        axis, longest = 0, -1.0
+        for d in range(3):
+            low, high = np.inf, -np.inf
+            for k in range(first, last):
+                x = centres[order[k], d]
+                low, high = min(low, x), max(high, x)
+            if high - low > longest:
+                axis, longest = d, high - low
+        _select(order, centres, axis, first, last, place)
+        stack[depth, 0], stack[depth, 1] = middle, right
+        stack[depth + 1, 0], stack[depth + 1, 1] = left, middle
+        depth += 2
+    return order
+
+
+@njit(cache=True, error_model="numpy")
+def _select(order, centres, axis, first, last, place):
+    """Bring the least of order[first:last] along an axis before `place` (Hoare 1961, "Algorithm 65: find")."""
+    low, high = first, last - 1
+    while low < high:
+        pivot = order[(low + high) // 2]
+        i, j = low, high
+        while i <= j:
+            while _is_before(centres, axis, order[i], pivot):
+                i += 1
+            while _is_before(centres, axis, pivot, order[j]):
+                j -= 1
+            if i <= j:
+                order[i], order[j] = order[j], order[i]
+                i += 1
+                j -= 1
+        if place <= j:
+            high = j
+        elif place >= i:
+            low = i
+        else:
+            return
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _is_before(centres, axis, one, other):
+    """Whether a triangle comes before another along an axis; of equal ones, that with the smaller index."""
+    x, y = centres[one, axis], centres[other, axis]
+    return x < y or (x == y and one < other)
 
 
 def refit(tree: Bvh, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> None:
@@ -174,8 +232,8 @@ def _closest_parallel(tree, vertices, faces, points, reach, guess, triangle, wei
 
 @njit(cache=True)
 def _closest_range(tree, vertices, faces, points, reach, guess, first, last, triangle, weights, feature):
-    stack = np.empty(64, np.int64)
-    order, nodes = tree.order, tree.nodes
+    stack, away_sq = np.empty(64, np.int64), np.empty(64)
+    order, nodes, triangles = tree.order, tree.nodes, tree.triangles
     leaves = (len(nodes) + 1) // 2
     for i in range(first, last):
         p = load(points, i)
@@ -185,21 +243,28 @@ def _closest_range(tree, vertices, faces, points, reach, guess, first, last, tri
             found, on, d_sq = _to_triangle(vertices, faces, guess[i], p)
             if d_sq <= best_sq:
                 best, best_sq, best_weights, best_feature = guess[i], d_sq, found, on
-        stack[0], depth = 0, 1
+        stack[0], away_sq[0], depth = 0, _box_distance_sq(nodes, 0, p), 1
         while depth > 0:
             depth -= 1
             node = stack[depth]
-            if _box_distance_sq(nodes, node, p) > best_sq:
+            if away_sq[depth] > best_sq:
                 continue
             if node < leaves - 1:
                 near, far = 2 * node + 1, 2 * node + 2
-                if _box_distance_sq(nodes, far, p) < _box_distance_sq(nodes, near, p):
-                    near, far = far, near
-                stack[depth], stack[depth + 1] = far, near
-                depth += 2
+                near_sq, far_sq = _box_distance_sq(nodes, near, p), _box_distance_sq(nodes, far, p)
+                if far_sq < near_sq:
+                    near, far, near_sq, far_sq = far, near, far_sq, near_sq
+                if far_sq <= best_sq:
+                    stack[depth], away_sq[depth] = far, far_sq
+                    depth += 1
+                if near_sq <= best_sq:
+                    stack[depth], away_sq[depth] = near, near_sq
+                    depth += 1
                 continue
             first_place, last_place = leaf_range(len(order), leaves, node)
             for k in range(first_place, last_place):
+                if _box_distance_sq(triangles, order[k], p) > best_sq:
+                    continue
                 found, on, d_sq = _to_triangle(vertices, faces, order[k], p)
                 if d_sq < best_sq or (d_sq == best_sq and best < 0):
                     best, best_sq, best_weights, best_feature = order[k], d_sq, found, on
