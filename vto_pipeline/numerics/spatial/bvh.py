@@ -44,15 +44,24 @@ def build(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Bvh:
     leaves = 1
     while leaves * _LEAF < len(faces):
         leaves *= 2
-    order = _halved(vertices[faces].mean(axis=1), leaves)
+    order = _halved(_centres(vertices, faces), leaves)
     tree = Bvh(order, np.empty((2 * leaves - 1, 6)), np.empty((len(faces), 6)), 0.0)
     refit(tree, vertices, faces)
     return tree._replace(cost=float(_cost(tree.nodes, tree.triangles)))
 
 
 @njit(cache=True, error_model="numpy")
+def _centres(vertices, faces):
+    centres = np.empty((len(faces), 3))
+    for f in range(len(faces)):
+        for d in range(3):
+            centres[f, d] = (vertices[faces[f, 0], d] + vertices[faces[f, 1], d] + vertices[faces[f, 2], d]) / 3.0
+    return centres
+
+
+@njit(cache=True, error_model="numpy")
 def _halved(centres, leaves):
-    """Return the triangles in the order of the leaves, shape (F,); `centres` of shape (F, 3)."""
+    """Return the triangles in the order of the leaves, shape (F,). `centres` of shape (F, 3) end in this order, too."""
     count = len(centres)
     order = np.arange(count).astype(np.int32)
     stack = np.empty((64, 2), np.int64)
@@ -64,14 +73,12 @@ def _halved(centres, leaves):
             continue
         middle = (left + right) // 2
         first, place, last = left * count // leaves, middle * count // leaves, right * count // leaves
-        axis, longest = 0, -1.0
-        for d in range(3):
-            low, high = np.inf, -np.inf
-            for k in range(first, last):
-                x = centres[order[k], d]
-                low, high = min(low, x), max(high, x)
-            if high - low > longest:
-                axis, longest = d, high - low
+        around = EMPTY
+        for k in range(first, last):
+            x, y, z = centres[k, 0], centres[k, 1], centres[k, 2]
+            around = box_union(around, (x, y, z, x, y, z))
+        x, y, z = around[3] - around[0], around[4] - around[1], around[5] - around[2]
+        axis = 0 if x >= y and x >= z else (1 if y >= z else 2)
         _select(order, centres, axis, first, last, place)
         stack[depth, 0], stack[depth, 1] = middle, right
         stack[depth + 1, 0], stack[depth + 1, 1] = left, middle
@@ -81,18 +88,24 @@ def _halved(centres, leaves):
 
 @njit(cache=True, error_model="numpy")
 def _select(order, centres, axis, first, last, place):
-    """Bring the least of order[first:last] along an axis before `place` (Hoare 1961, "Algorithm 65: find")."""
+    """Bring the least between first and last along an axis before `place` (Hoare 1961, "Algorithm 65: find").
+
+    Of equal ones, that with the smaller index is less.
+    """
     low, high = first, last - 1
     while low < high:
-        pivot = order[(low + high) // 2]
+        middle = (low + high) // 2
+        x, index = centres[middle, axis], order[middle]
         i, j = low, high
         while i <= j:
-            while _is_before(centres, axis, order[i], pivot):
+            while centres[i, axis] < x or (centres[i, axis] == x and order[i] < index):
                 i += 1
-            while _is_before(centres, axis, pivot, order[j]):
+            while x < centres[j, axis] or (x == centres[j, axis] and index < order[j]):
                 j -= 1
             if i <= j:
                 order[i], order[j] = order[j], order[i]
+                for d in range(3):
+                    centres[i, d], centres[j, d] = centres[j, d], centres[i, d]
                 i += 1
                 j -= 1
         if place <= j:
@@ -101,13 +114,6 @@ def _select(order, centres, axis, first, last, place):
             low = i
         else:
             return
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _is_before(centres, axis, one, other):
-    """Whether a triangle comes before another along an axis; of equal ones, that with the smaller index."""
-    x, y = centres[one, axis], centres[other, axis]
-    return x < y or (x == y and one < other)
 
 
 def refit(tree: Bvh, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> None:
