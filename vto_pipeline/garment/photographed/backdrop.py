@@ -74,7 +74,7 @@ def find_backdrops(
         beyond = np.where(background, inwards - 0.5, 0.5 - outwards).astype(np.float32)
         return Backdrop(beyond, camera, cam_from_world)
 
-    return [backdrop for backdrop in of_small_photos(photos, find) if backdrop is not None]
+    return [backdrop for backdrop in of_small_photos(photos, (garment, mannequin), find) if backdrop is not None]
 
 
 def background_of(

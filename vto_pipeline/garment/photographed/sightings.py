@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
@@ -16,7 +16,7 @@ from vto_pipeline.garment.align import PosedPhotos
 from vto_pipeline.garment.subtraction.color_model import color_evidence
 from vto_pipeline.garment.subtraction.variety import picture_variety, variety_evidence
 from vto_pipeline.geometry.sampling import sample_surface
-from vto_pipeline.geometry.seen.depth_picture import depth_picture
+from vto_pipeline.geometry.seen.depth_picture import depth_picture, pixels_of
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import submesh, surface_area
 from vto_pipeline.io.captures.images import read_image
@@ -46,6 +46,8 @@ SURE = 1.0
 CLOTH_TOLD, FORM_TOLD = 0.8, 0.4
 """So much of the garment, and of what shows of the mannequin, must be told in a photo: part of what shows of
 the mannequin may be cloth that the surface lacks."""
+AROUND_PX = 32
+"""So much around what is asked about is looked at, too."""
 VARIETY_PX = 15
 """Side of the square in which colours vary: a few centimetres of cloth."""
 LEAST_VIEWS = 2
@@ -127,7 +129,7 @@ def look_at_mannequin(
         return None if evidence is None else _read(points, normals, pose, camera, form, evidence)
 
     score, views, told, read = np.zeros(count), np.zeros(count, dtype=int), 0, 0
-    for found in of_small_photos(photos, ask):
+    for found in of_small_photos(photos, (garment, mannequin), ask):
         read += 1
         if found is not None:
             told += 1
@@ -144,11 +146,14 @@ def look_at_mannequin(
     return Sightings(points[enough], mean > SURE, area / count)
 
 
-def of_small_photos(photos: PosedPhotos, ask: Callable[[ByteArray, Intrinsics, FloatArray], T]) -> Iterator[T]:
+def of_small_photos(
+    photos: PosedPhotos, things: Sequence[TriangleMesh], ask: Callable[[ByteArray, Intrinsics, FloatArray], T]
+) -> Iterator[T]:
     """Yield what is asked of photos, in their order; they are read side by side.
 
     Args:
         photos: With their cameras.
+        things: What is asked about: no more of a photo is looked at than shows these, and a little around.
         ask: Of a photo without distortion and of limited size, its lens and its pose (world_from_cam).
     """
     at = {path.name: path for path in photos.paths}
@@ -157,10 +162,30 @@ def of_small_photos(photos: PosedPhotos, ask: Callable[[ByteArray, Intrinsics, F
 
     def read(number: int) -> T:
         k = usable[chosen[number]]
+        pose = photos.cameras.world_from_cam[k]
         picture, camera = _small(at[photos.cameras.names[k]], photos.cameras.intrinsics[k])
-        return ask(picture, camera, photos.cameras.world_from_cam[k])
+        return ask(*_cropped(picture, camera, pose, things), pose)
 
     return in_order(read, len(chosen))
+
+
+def _cropped(
+    picture: ByteArray, camera: Intrinsics, pose: FloatArray, things: Sequence[TriangleMesh]
+) -> tuple[ByteArray, Intrinsics]:
+    """Return what of a photo shows things, and its camera; the whole photo where they reach behind it."""
+    cam_from_world: FloatArray = np.asarray(np.linalg.inv(pose), dtype=np.float64)
+    pixel = np.vstack([pixels_of(thing, camera, cam_from_world) for thing in things])
+    if not np.all(pixel[:, 2] > 0.0):
+        return picture, camera
+    end = np.array([camera.width, camera.height])
+    low = np.clip(np.floor(pixel[:, :2].min(axis=0)) - AROUND_PX, 0, end).astype(int)
+    high = np.clip(np.ceil(pixel[:, :2].max(axis=0)) + AROUND_PX + 1, 0, end).astype(int)
+    if not np.all(low < high):
+        return picture, camera
+    (left, top), (right, bottom) = low, high
+    width, height = int(right - left), int(bottom - top)
+    part = replace(camera, width=width, height=height, cx=camera.cx - left, cy=camera.cy - top)
+    return np.ascontiguousarray(picture[top:bottom, left:right]), part
 
 
 def _small(path: Path, lens: Intrinsics) -> tuple[ByteArray, Intrinsics]:

@@ -21,6 +21,15 @@ def depth_picture(mesh: TriangleMesh, camera: Intrinsics, cam_from_world: FloatA
         camera: Whose distortion is not regarded.
         cam_from_world: Rigid transform [m], shape (4, 4).
     """
-    lens = (camera.fx, camera.fy, camera.cx, camera.cy)
-    placed = projected(mesh.vertices, np.ascontiguousarray(cam_from_world), lens, NEAREST)
+    placed = pixels_of(mesh, camera, cam_from_world)
     return np.asarray(rasterise_depth(placed, mesh.faces, camera.width, camera.height))
+
+
+def pixels_of(mesh: TriangleMesh, camera: Intrinsics, cam_from_world: FloatArray) -> FloatArray:
+    """Return column, row and depth [m] of each vertex, shape (V, 3); zeros for those not before the camera.
+
+    Args:
+        mesh, camera, cam_from_world: As for `depth_picture`.
+    """
+    lens = (camera.fx, camera.fy, camera.cx, camera.cy)
+    return np.asarray(projected(mesh.vertices, np.ascontiguousarray(cam_from_world), lens, NEAREST))
