@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from vto_pipeline.garment.outline.contour import ContourMesh
 from vto_pipeline.garment.outline.edges import EdgeLevel, EdgePhoto, _gradient
 from vto_pipeline.garment.outline.fit import OutlineProblem
+from vto_pipeline.garment.outline.search import _followed
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.model.camera import Intrinsics
 from vto_pipeline.model.mesh import TriangleMesh
@@ -102,3 +103,24 @@ def test_a_ball_of_another_size_tells_its_scale(ball):
     for _ in range(3):
         placement = problem.step(placement, 0.02, (3, 4, 6)).scan_from_form
     assert_allclose(np.cbrt(np.linalg.det(placement[:3, :3])), 1.03, rtol=2e-3, atol=0)  # of 33 px: a fifteenth pixel
+
+
+def test_placements_that_meet_are_followed_once(ball, monkeypatch):
+    photo = EdgePhoto("ball", np.eye(4), (level(CENTER),))
+    problem = OutlineProblem([ball], SurfaceDistance(ball.mesh), np.array([[5.0, 5.0, 5.0]]), [photo])
+    taken, step = [], problem.step
+    monkeypatch.setattr(problem, "step", lambda *args, **how: (taken.append(args[0]), step(*args, **how))[1])
+
+    def followed(*shifts):
+        taken.clear()
+        starts = [placed(CENTER + np.array([shift, 0.0, 0.0])) for shift in shifts]
+        return _followed(starts, problem, (3, 4), 0.06, 6, lambda _: 0.02), len(taken)
+
+    (alone,), steps = followed(0.003)
+    (found,), with_another = followed(0.003, -0.003)
+    assert with_another == steps + 1 == 8  # six steps and a look; the other met it after its first
+    assert_array_equal(found.scan_from_form, alone.scan_from_form)
+    (best, astray), far = followed(0.2, 0.003)  # no edge is near the first
+    assert far == 2 * steps
+    assert_array_equal(best.scan_from_form, alone.scan_from_form)
+    assert astray.support < 0.1
