@@ -46,7 +46,8 @@ def test_a_part_of_the_photo_shows_the_thing_where_the_whole_does(tmp_path, midd
 
 
 def test_what_reaches_behind_the_camera_is_looked_for_in_the_whole_photo(tmp_path):
-    part, camera, picture = asked(tmp_path, tetrahedron((0.0, 0.0, 0.05), 0.1))
+    corners = np.array([[0.0, 0.0, 1.0], [0.01, 0.0, 1.0], [0.5, 0.3, -1.0]])  # from the middle to the right
+    part, camera, picture = asked(tmp_path, TriangleMesh(corners, np.array([[0, 1, 2]], dtype=np.int32)))
     assert_array_equal(part, picture)
     assert camera == CAMERA
 
