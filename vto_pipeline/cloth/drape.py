@@ -16,6 +16,7 @@ from vto_pipeline.cloth.judge.elsewhere import warn_if_elsewhere
 from vto_pipeline.cloth.judge.limits import warn_beyond_limits
 from vto_pipeline.cloth.judge.residual import covers_all_energies
 from vto_pipeline.cloth.judge.too_small import warn_if_too_small
+from vto_pipeline.cloth.judge.turned_up import warn_if_turned_up
 from vto_pipeline.cloth.model.settings import checked
 from vto_pipeline.cloth.placement.clear_body import OVERSTRETCHED
 from vto_pipeline.cloth.placement.place import place_garment
@@ -107,6 +108,7 @@ def drape(
         ),
         **warn_if_too_small(draped, garment.rest, config.stretch_limit, job),
         **warn_beyond_limits(draped, garment.rest, fabric, job),
+        **warn_if_turned_up(draped, job),
         **(warn_if_elsewhere(mesh, draped, garment.rest, body.final, job) if len(body.keyframes) == 1 else {}),
     }
     judged = findings.get("judged_residual")

@@ -8,6 +8,6 @@ gap: how near a cloth comes to itself
 order: whether what is worn beneath lies beneath
 strain, too_small: stretch against the rest shape; whether the garment is too small
 limits: whether threads are drawn or sheared farther than the fabric is known to bear
-elsewhere: whether it ended far from where it was put on
+elsewhere, turned_up: whether it ended far from where it was put on; whether part of a hem ended turned up
 worn: strain of the yarns and pressure on the body, vertex by vertex
 """
