@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 from test_drape import double_vest, pear, vest
 
+import vto_pipeline.cloth.model.coarsening as coarsening
 import vto_pipeline.cloth.rest.multiresolution as levels_module
 from vto_pipeline.cloth.drape import drape
 from vto_pipeline.cloth.model.coarsening import coarsen
@@ -93,7 +94,7 @@ def test_a_garment_that_cannot_be_made_coarser_is_draped_as_it_is(monkeypatch):
     def refuse(*_):
         raise GarmentError("remeshing broke the surface")
 
-    monkeypatch.setattr(levels_module, "coarsen", refuse)
+    monkeypatch.setattr(coarsening, "coarsen", refuse)
     job = Job()
     found = drape(vest(), pear(), fabric(), {"settle_seconds": 0.1, "coarsen_above": 1000}, job)
     assert {row.level for row in found.trace} == {0}
@@ -227,3 +228,23 @@ def test_a_mesh_is_gone_through_once_more_while_there_is_time(budget, times, mon
     job = Job()
     drape(vest(), pear(), fabric(), {"settle_seconds": 0.1, "time_budget_s": budget}, job)
     assert sum("parts of the body came between" in note for note in job.notes) == times
+
+
+@pytest.mark.parametrize(("above", "meshes"), [(100_000, 1), (1000, 2)])
+def test_what_is_gone_through_once_more_is_not_put_on_again(above, meshes, monkeypatch):
+    """Planning how the body grows, and letting it, took longer than all the rest."""
+    grow, grown = levels_module.Phases.grow_body, []
+
+    def counted(self, state, body):
+        self._job.warn("it was put on")
+        grown.append(len(state.positions))
+        return grow(self, state, body)
+
+    monkeypatch.setattr(levels_module.Phases, "grow_body", counted)
+    monkeypatch.setattr(levels_module, "intersecting_faces", lambda *_: np.zeros((7, 2), np.int32))
+    monkeypatch.setattr(levels_module, "freed_of_body", lambda *_: None)
+    job = Job()
+    drape(vest(), pear(), fabric(), {"settle_seconds": 0.1, "coarsen_above": above}, job)
+    assert len(grown) == meshes
+    assert sum("parts of the body came between" in note for note in job.notes) == meshes
+    assert job.warnings.count("it was put on") == 1

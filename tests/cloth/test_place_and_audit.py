@@ -340,3 +340,15 @@ def test_rest_shape_as_scanned():
     assert found.mode == "as_scanned"
     assert_allclose(found.positions, mesh.vertices, rtol=0, atol=0)
     assert "as scanned" in job.notes[0]
+
+
+@pytest.mark.parametrize("bending", ["shape_operator", "hinge"])
+def test_a_triangle_of_no_size_is_no_cloth(bending):
+    rest, x = crumpled()
+    weave = fabric(stretch=1500, weft=900, shear=60, poisson=0.2, bending=1e-3)
+    corner, count = 1e-10 * np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 0.9, 0.0]]), len(x)
+    faces = np.vstack([rest.faces, count + np.arange(3), [count, count + 2, rest.faces[0, 0]]]).astype(np.int32)
+    more = TriangleMesh(np.vstack([rest.vertices, rest.vertices[rest.faces[0, 0]] + corner]), faces)
+    found = ElasticEnergies(more, RestShape(more.vertices), weave, bending)
+    without = ElasticEnergies(rest, RestShape(rest.vertices), weave, bending)
+    assert_allclose(found.energy(np.vstack([x, x[rest.faces[0, 0]] + corner])), without.energy(x), rtol=1e-12)

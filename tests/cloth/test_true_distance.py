@@ -9,7 +9,7 @@ from test_drape import pear, vest
 import vto_pipeline.cloth.rest.multiresolution as levels_module
 from vto_pipeline.cloth.drape import drape
 from vto_pipeline.cloth.dynamics.stepper import Stepper
-from vto_pipeline.cloth.model.coarsening import coarsen
+from vto_pipeline.cloth.model.coarsening import coarser_ones
 from vto_pipeline.cloth.rest.true_distance import some_positions, with_true_distances
 from vto_pipeline.model.cloth import TraceRow, seconds_within
 from vto_pipeline.model.job import Job
@@ -57,11 +57,11 @@ def test_a_drape_knows_how_far_each_look_was(monkeypatch):
         return after
 
     def noted(*given):
-        coarser.append(coarsen(*given))
-        return coarser[-1]
+        coarser.extend(coarser_ones(*given))
+        return coarser
 
     monkeypatch.setattr(Stepper, "run", kept)
-    monkeypatch.setattr(levels_module, "coarsen", noted)
+    monkeypatch.setattr(levels_module, "coarser_ones", noted)
     settings = {"settle_seconds": 4.0, "target_error_mm": 1.0, "coarsen_above": 1000}
     found = drape(vest(), pear(), fabric(bending=1e-5), settings, job := Job())
     some = some_positions(len(found.mesh.vertices))

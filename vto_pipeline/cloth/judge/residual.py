@@ -58,12 +58,13 @@ class ElasticEnergies:
         self._faces = mesh.faces[self._rest.solid]
         self._weight = self._rest.area * np.minimum(1.0, _slenderness(laid[self._rest.solid]) / _SLIVER)
         self._stiffness = _plane_stiffness(fabric)
+        bends = self._rest.solid & (_slenderness(laid) > _SLIVER)
         if bending == "hinge":
-            self.hinges, rigidity = _bending(mesh, laid, fabric)
+            self.hinges, rigidity = _bending(mesh, laid, bends, fabric)
             self.coupling = diags_array(rigidity).tocsr()
         else:
             self.hinges = hinges(mesh)
-            self.coupling = curvature_stiffness(mesh, laid, _slenderness(laid) > _SLIVER, fabric)
+            self.coupling = curvature_stiffness(mesh, laid, bends, fabric)
         self._angles = _angles(rest.positions[self.hinges]) if rest.rest_angles else np.zeros(len(self.hinges))
         area = np.zeros(len(mesh.faces))
         area[self._rest.solid] = self._rest.area
@@ -166,12 +167,21 @@ def _plane_stiffness(fabric: Fabric) -> FloatArray:
     return stiffness
 
 
-def _bending(mesh: TriangleMesh, laid: FloatArray, fabric: Fabric) -> tuple[NDArray[np.int32], FloatArray]:
-    """Return the hinges that bend, shape (H, 4), and B l²/A of each [N·m], shape (H,); laid flat, shape (F, 3, 3)."""
+def _bending(
+    mesh: TriangleMesh, laid: FloatArray, bends: NDArray[np.bool_], fabric: Fabric
+) -> tuple[NDArray[np.int32], FloatArray]:
+    """Return the hinges between faces that bend, shape (H, 4), and B l²/A of each [N·m], shape (H,).
+
+    Args:
+        mesh: The cloth.
+        laid: Corners of its faces, laid flat [m], shape (F, 3, 3).
+        bends: Which faces do, shape (F,).
+        fabric: Bending rigidities.
+    """
     found, half = hinges(mesh), hinge_halves(mesh)
+    both = bends[half // 3].all(axis=1)
+    found, half = found[both], half[both]
     one, two = (_turned(laid, half[:, k]) for k in (0, 1))
-    solid = np.minimum(_slenderness(one), _slenderness(two)) > _SLIVER
-    found, one, two = found[solid], one[solid], two[solid]
     first = rest_triangles(one)
     warp = np.linalg.inv(first.inverse)[:, 0]  # of the two edges that meet in the third corner
     along = (warp[:, 1] - warp[:, 0]) ** 2 / np.sum((one[:, 1] - one[:, 0]) ** 2, axis=1)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vto_pipeline.errors import InputError
+from vto_pipeline.errors import GarmentError, InputError
 from vto_pipeline.geometry.remeshing.flat_faces import carry_flat_faces
 from vto_pipeline.geometry.remeshing.remesh import RemeshConfig, remesh
 from vto_pipeline.geometry.riding.binding import Binding, apply, bind
@@ -19,6 +19,8 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 _ROUNDS = 5  # of the remesher: more make no better triangles
 _SHORTEST, _LONGEST = 1e-3, 0.1  # m, edges that it makes
+_FEWER = 4  # times fewer vertices on the next coarser mesh: edges twice as long
+_LAYERED = 0.03  # m: of longer edges, layers about an arm cannot lie clear of it and of each other
 
 
 class CoarseGarment(NamedTuple):
@@ -63,3 +65,19 @@ def coarsen(fine: Garment, vertices: int, longest: float = _LONGEST) -> CoarseGa
     rest = replace(fine.rest, positions=coarse.vertices, panels=panels)
     garment = Garment(TriangleMesh(now, coarse.faces), rest)
     return CoarseGarment(garment, bind(laid, coarse))
+
+
+def coarser_ones(garment: Garment, most: int, job: Job) -> list[CoarseGarment]:
+    """Return coarser garments, each of a quarter of the vertices of the last, until one has no more than `most`."""
+    made: list[CoarseGarment] = []
+    what = "coming to rest on a coarser mesh first"
+    while (count := len(garment.mesh.vertices)) > most:
+        try:
+            made.append(coarsen(garment, count // _FEWER, _LAYERED))
+        except (InputError, GarmentError) as error:
+            job.leave_out(what, f"{count} vertices cannot be reduced to {count // _FEWER}: {error.problem}")
+            return made
+        garment = made[-1].garment
+    if not made:
+        job.leave_out(what, f"{count} vertices; it pays off above {most} (coarsen_above)")
+    return made

@@ -20,7 +20,7 @@ from vto_pipeline.cloth.drape_config import DrapeConfig
 from vto_pipeline.cloth.dynamics.body_motion import VariableSpeedBody
 from vto_pipeline.cloth.dynamics.stepper import Stepper
 from vto_pipeline.cloth.model.build import ClothModel, ClothState, at_rest, build_cloth
-from vto_pipeline.cloth.model.coarsening import CoarseGarment, coarsen
+from vto_pipeline.cloth.model.coarsening import coarser_ones
 from vto_pipeline.cloth.placement.clear_body import edge_stretches
 from vto_pipeline.cloth.placement.collision_free_start import freed_of_body
 from vto_pipeline.cloth.rest.convergence import SettlingResult
@@ -29,7 +29,7 @@ from vto_pipeline.cloth.rest.phases import ENLARGED, ROUGH, Phases
 from vto_pipeline.cloth.rest.softened import softened
 from vto_pipeline.cloth.rest.true_distance import some_positions, with_true_distances
 from vto_pipeline.cloth.simulation import default_skin
-from vto_pipeline.errors import GarmentError, InputError, IntersectingError
+from vto_pipeline.errors import IntersectingError
 from vto_pipeline.geometry.intersections import intersecting_faces
 from vto_pipeline.model.arrays import FloatArray
 from vto_pipeline.model.body import MovingBody
@@ -39,8 +39,6 @@ from vto_pipeline.model.garment import Garment
 from vto_pipeline.model.job import Job
 from vto_pipeline.model.mesh import TriangleMesh
 
-_FEWER = 4  # times fewer vertices on the next coarser mesh: edges twice as long
-_LONGEST = 0.03  # m: of longer edges, layers about an arm cannot lie clear of it and of each other
 _FIRST = 0.5  # of the progress, and of the time there is: the coarser meshes
 
 
@@ -52,6 +50,8 @@ class RestOnMesh(NamedTuple):
         phases: What it went through.
         stepper: The cloth among its colliders.
         settling: How it went.
+        put_on: Where it was put on, before the body moved and it settled.
+        warned: How many warnings there were then.
         before: What it went through on coarser meshes.
     """
 
@@ -59,6 +59,8 @@ class RestOnMesh(NamedTuple):
     phases: Phases
     stepper: Stepper
     settling: SettlingResult
+    put_on: Garment
+    warned: int
     before: tuple[Phases, ...] = ()
 
 
@@ -110,7 +112,7 @@ class _CoarseToFine:
         self._job = job
         skin_mm = 1e3 * default_skin(model.edge_length) if config.skin_mm is None else config.skin_mm
         self._rough = config.model_copy(update={"skin_mm": skin_mm})
-        self._coarser = _coarser_ones(garment, config.coarsen_above, job)
+        self._coarser = coarser_ones(garment, config.coarsen_above, job)
 
     def run(self, body: MovingBody, deadline: float) -> RestOnMesh:
         """Return the garment at rest on its own mesh.
@@ -156,17 +158,20 @@ class _CoarseToFine:
             level, garment, body, deadline, fresh: See `_rest_on`.
         """
         told = len(self._job.warnings)
+        fails = _TooCoarse("parts of the body go through the cloth", len(garment.mesh.vertices))
         for closely in (False,) if self._config.body_features else (False, True):
-            if closely and not self._may_try_again(garment, deadline):
+            if closely and not self._may_try_again(len(garment.mesh.vertices), deadline):
                 break
             found = self._rest_on(level, garment, body, deadline, fresh=fresh, closely=closely)
             if isinstance(found, _TooCoarse):
-                return found
+                fails = found
+                break
             finer = self._finer_start(level, found.settling.state.positions, body.final)
             if finer is not None:
                 return found, finer
-            del self._job.warnings[told:]
-        return _TooCoarse("parts of the body go through the cloth", len(garment.mesh.vertices))
+            garment, fresh = found.put_on, False
+        del self._job.warnings[told:]  # a finer mesh tells its own
+        return fails
 
     def _finer_start(self, level: int, positions: FloatArray, body: TriangleMesh) -> Garment | None:
         """Return the next finer garment where this one lies, moved a little so that it is clear of the body.
@@ -197,25 +202,25 @@ class _CoarseToFine:
         Args:
             garment, body, deadline, fresh: See `_rest_on`.
         """
-        told = len(self._job.warnings)
         found = self._rest_on(0, garment, body, deadline, fresh=fresh)
         assert isinstance(found, RestOnMesh)  # only coarser ones are given up
         config, settling = self._config, found.settling
         if config.body_features or not config.self_collision or settling.caught or settling.jammed:
             return found
         lies = TriangleMesh(settling.state.positions, garment.mesh.faces)
-        if len(intersecting_faces(lies, body.final)) == 0 or not self._may_try_again(garment, deadline):
+        if len(intersecting_faces(lies, body.final)) == 0 or not self._may_try_again(
+            len(garment.mesh.vertices), deadline
+        ):
             return found
-        del self._job.warnings[told:]
-        again = self._rest_on(0, garment, body, deadline, fresh=fresh, closely=True)
+        del self._job.warnings[found.warned :]
+        again = self._rest_on(0, found.put_on, body, deadline, fresh=False, closely=True)
         assert isinstance(again, RestOnMesh)
         return again
 
-    def _may_try_again(self, garment: Garment, deadline: float) -> bool:
-        """Return whether there is time to go through a mesh once more, and say that it is done."""
+    def _may_try_again(self, count: int, deadline: float) -> bool:
+        """Return whether there is time to go through so many vertices once more, and say that it is done."""
         in_time = time.perf_counter() < deadline
         if in_time:
-            count = len(garment.mesh.vertices)
             self._job.note(f"parts of the body came between {count} vertices: once more, so that they cannot")
         return in_time
 
@@ -242,8 +247,7 @@ class _CoarseToFine:
         phases.some = partial(self._some, level)
         first = TriangleMesh(body.keyframes[0], body.faces)
         state = phases.resolve_crossings(at_rest(garment.mesh.vertices))
-        untangled = len(job.warnings)
-        put_on = untangled
+        untangled = warned = len(job.warnings)
         if fresh:  # the others start outside the body, but for corners that edges have cut
             try:
                 grown = phases.grow_body(state, first)
@@ -251,10 +255,10 @@ class _CoarseToFine:
                 if level == 0:
                     raise
                 return _TooCoarse(error.problem, len(model.mass))
-            put_on = len(job.warnings)
+            warned = len(job.warnings)
             state = phases.resolve_crossings(grown, first)
-        cloth = TriangleMesh(state.positions, model.faces)
-        collider = phases.collider(phases.give_way(body, cloth), cloth)
+        put_on = Garment(TriangleMesh(state.positions, model.faces), garment.rest)
+        collider = phases.collider(phases.give_way(body, put_on.mesh), put_on.mesh)
         stepper = phases.stepper(model, collider, config.damping)
         stepper.prepare(state.positions)
         job.note(f"{stepper.choice.method}, {stepper.substeps} steps per 1/60 s: {stepper.choice.reason}")
@@ -282,10 +286,10 @@ class _CoarseToFine:
             return _TooCoarse(f"{what}, {weights}", len(model.mass))
         settling.trace = [replace(row, seconds=before + row.seconds, level=level) for row in settling.trace]
         if level > 0:  # how it was put on is done but once; what else matters in the end warns again
-            self._job.warnings += job.warnings[untangled:put_on]
-            others = job.warnings[:untangled] + job.warnings[put_on:]
+            self._job.warnings += job.warnings[untangled:warned]
+            others = job.warnings[:untangled] + job.warnings[warned:]
             self._job.notes += [f"on {len(model.mass)} vertices: {text}" for text in others]
-        return RestOnMesh(model, phases, stepper, settling)
+        return RestOnMesh(model, phases, stepper, settling, put_on, warned)
 
     def _measure_distance(
         self,
@@ -378,19 +382,3 @@ def _by_softer_threads(
     settling.trace = nearly.trace + [replace(row, seconds=spent + row.seconds) for row in settling.trace]
     settling.looks = nearly.looks + settling.looks
     return settling
-
-
-def _coarser_ones(garment: Garment, most: int, job: Job) -> list[CoarseGarment]:
-    """Return coarser garments, each of a quarter of the vertices of the last, until one has no more than `most`."""
-    made: list[CoarseGarment] = []
-    what = "coming to rest on a coarser mesh first"
-    while (count := len(garment.mesh.vertices)) > most:
-        try:
-            made.append(coarsen(garment, count // _FEWER, _LONGEST))
-        except (InputError, GarmentError) as error:
-            job.leave_out(what, f"{count} vertices cannot be reduced to {count // _FEWER}: {error.problem}")
-            return made
-        garment = made[-1].garment
-    if not made:
-        job.leave_out(what, f"{count} vertices; it pays off above {most} (coarsen_above)")
-    return made

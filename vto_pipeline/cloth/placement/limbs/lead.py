@@ -2,7 +2,8 @@
 
 The tube of cloth behind an opening is laid along the limb's line: its rings about the line, turned from the tube's own
 direction to the limb's. How far up the limb is found as a tailor does: from cuff to cuff across the back, the body
-measures as much as the garment. The rest of the garment follows as rigidly as it can.
+measures as much as the garment. Trousers that reach below the ankle are gathered above the foot, which is wider than a
+leg of trousers. The rest of the garment follows as rigidly as it can.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ from vto_pipeline.model.mesh import TriangleMesh
 
 _ROUNDS = 40
 _STILL = 1e-3  # m: no vertex moves farther in the last round
+_ANKLE = 0.06  # of the body's height
+_FOLD, _BULGE = 6.0, 0.3  # edges along each fold of what is gathered, and how far out it goes, of the tube's radius
 _HELD = 1e-3  # of the weight of a sleeve: what nothing leads stays where it is
 
 
@@ -44,7 +47,9 @@ def lead_onto_limbs(
             if opening < 0 or piece.meant.count(opening) > 1 or limbs.limbs[number].name == "head":
                 continue
             far = _up_the_limb(piece, number, body, limbs.limbs)
-            behind, places = _laid_along(piece, opening, limbs.limbs[number], far, ways[number])
+            limb = limbs.limbs[number]
+            least = _ankle(limb, body) if limb.name.endswith("leg") else -np.inf
+            behind, places = _laid_along(piece, opening, limb, far, least, ways[number])
             wanted[piece.vertices[behind]], weight[piece.vertices[behind]] = places, 1.0
     if (weight == _HELD).all():
         return garment
@@ -74,14 +79,24 @@ def _up_the_limb(piece: Piece, number: int, body: TriangleMesh, limbs: Sequence[
     return 0.5 * float(whole - across)
 
 
-def _laid_along(piece: Piece, opening: int, limb: Limb, far: float, way: FloatArray) -> tuple[IntArray, FloatArray]:
+def _ankle(leg: Limb, body: TriangleMesh) -> float:
+    """Return how far from the end of a leg its ankle is, along the foot and up [m]."""
+    height = body.vertices[:, 1]
+    above = leg.axis[:, 1] - height.min() > _ANKLE * np.ptp(height)
+    return float(leg.along[above.argmax()])
+
+
+def _laid_along(
+    piece: Piece, opening: int, limb: Limb, far: float, least: float, way: FloatArray
+) -> tuple[IntArray, FloatArray]:
     """Return the vertices of the tube behind an opening, shape (N,), and their places about a limb [m], shape (N, 3).
 
     Args:
         piece: With the opening.
         opening: Its index.
         limb: That goes there.
-        far: From the limb's end to the opening [m].
+        far: From the limb's end to the opening, were the tube straight [m].
+        least: As far at least is the opening to be: then the tube is gathered behind it [m].
         way: In along the limb's middle, where an armhole goes, shape (M, 3) [m].
     """
     mesh, loop = piece.mesh, piece.openings[opening]
@@ -96,13 +111,21 @@ def _laid_along(piece: Piece, opening: int, limb: Limb, far: float, way: FloatAr
     middle = np.stack([np.bincount(ring, x, count) for x in mesh.vertices[behind].T], axis=1) / size[:, None]
     middle[0] = mesh.vertices[loop].mean(axis=0)
     at = far + np.bincount(ring, depth[behind], count) / size
+    gathered = 1.0
+    if far < least < at[-1]:
+        gathered = float((at[-1] - least) / (at[-1] - at[0]))
+        at = at[-1] - gathered * (at[-1] - at)
     own = _direction(middle) if count > 2 else np.repeat(_normal(mesh.vertices[loop])[None], count, axis=0)
     goal, theirs = _on_line(limb, at)
     if count <= 2:  # an armhole
         goal[:] = _nearest(way, middle[0])
         own *= np.sign((own * theirs).sum(axis=1, keepdims=True))
     turn = _between(own, theirs, 1.0 if count > 2 else 0.5)
-    places = goal[ring] + np.einsum("nij,nj->ni", turn[ring], mesh.vertices[behind] - middle[ring])
+    off = mesh.vertices[behind] - middle[ring]
+    along = (off * own[ring]).sum(axis=1, keepdims=True) * own[ring]
+    folds = np.cos(2.0 * np.pi * depth[behind] / (_FOLD * step))[:, None]
+    off = gathered * along + (1.0 + (1.0 - gathered) * _BULGE * folds) * (off - along)
+    places = goal[ring] + np.einsum("nij,nj->ni", turn[ring], off)
     return behind, places
 
 
