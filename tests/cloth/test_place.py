@@ -16,6 +16,7 @@ from vto_pipeline.cloth.placement.thinning import Thinning
 from vto_pipeline.cloth.placement.voxel_fit import BodyCubes, quarter_turns
 from vto_pipeline.errors import InputError
 from vto_pipeline.geometry.remeshing.remesh import RemeshConfig, remesh
+from vto_pipeline.geometry.remeshing.repair import RepairConfig, repair
 from vto_pipeline.geometry.signed_distance import SurfaceDistance
 from vto_pipeline.geometry.topology import boundary_loops
 from vto_pipeline.io.meshes import read_mesh
@@ -317,3 +318,14 @@ def test_a_garment_that_fewer_triangles_would_join_is_placed():
     garment = read_mesh(DATA / "garments" / "makehuman" / "male_casualsuit01.obj")
     person = read_mesh(DATA / "bodies" / "mh_male_averageweight.ply")
     assert_allclose(find_placement(garment, person, PlaceConfig(), Job()).turn, np.eye(3), rtol=0, atol=0)
+
+
+@pytest.mark.real_data
+@pytest.mark.skipif(not DATA.exists(), reason="the data folder is absent")
+def test_a_suit_too_small_is_not_put_on_upside_down():
+    """In its own size a head fills it best, with arms and legs astray."""
+    body = fit_measurements(Measurements({"stature": 1.78, "chest_girth": 1.16, "hip_girth": 1.12}, sex="male")).mesh
+    whole = read_mesh(DATA / "garments" / "makehuman" / "female_elegantsuit01.obj")
+    found = find_placement(repair(whole, RepairConfig(), Job()), body, PlaceConfig(), Job())
+    assert_allclose(found.turn, np.eye(3), rtol=0, atol=0)
+    assert found.stretch > 1.0

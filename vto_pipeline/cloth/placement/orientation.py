@@ -73,23 +73,29 @@ def other_way_up(
     few: TriangleMesh,
     body: BodyCubes,
     best: VoxelPlacement,
+    enlarged: Callable[[], tuple[float, VoxelPlacement]],
     limbs_astray: Callable[[TriangleMesh], int],
     turned_well: float,
 ) -> VoxelPlacement | None:
     """Return the best place the other way up, where limbs tell that it is worn so; None where they do not.
 
     A shirt upside down is filled as well as a shirt: by hips. But arms are nowhere near its sleeves, and legs go
-    through its neck.
+    through its neck. What is too small is filled best by a head, with limbs astray, however it is turned: it is looked
+    at as large as it starts.
 
     Args:
         garment: In metres.
         few: The same in few triangles.
         body: Where it shall go.
         best: Its best place.
+        enlarged: Finds how many times its size it starts, and its place then.
         limbs_astray: Counts the limbs that are not where they are meant to be, with a garment there.
         turned_well: Share of the best score that another way needs.
     """
     before = limbs_astray(best.placed(few))
+    if before >= _LIMBS_TELL:
+        times, there = enlarged()
+        before = min(before, limbs_astray(there.placed(TriangleMesh(times * few.vertices, few.faces))))
     if before < _LIMBS_TELL:
         return None
     cubes = body.fit(garment)

@@ -143,7 +143,8 @@ def find_placement(
         )
     best = best_orientation(metres, cubes, ways, config.turned_well)
     thinning, few = Thinning(body), of_few_triangles(metres)
-    if (turned := other_way_up(metres, few, cubes, best, thinning.limbs_astray, config.turned_well)) is not None:
+    sized = partial(_enlarge_until_body_inside, metres, cubes, best, thinning, config)
+    if (turned := other_way_up(metres, few, cubes, best, sized, thinning.limbs_astray, config.turned_well)) is not None:
         job.note("garment turned the other way up: more limbs are where its openings are then")
         best = turned
     if (turned := other_way_round(metres, few, cubes, best, thinning.neck_lean, config.turned_well)) is not None:
