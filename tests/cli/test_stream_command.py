@@ -55,13 +55,14 @@ def run(tmp_path: Path) -> Path:
 
 
 def recording() -> bytes:
-    """A step ahead, as a camera sees it."""
+    """A step ahead, as a camera sees it, and half a second of standing, for cloth that late frames left behind."""
     clip, joints = (lambda read: (read.clip, read.joints))(read_motion("walking_step"))
     _, places = world_transforms(clip.parents, quaternion_matrices(clip.rotations), clip.translations)
     frames = [
         {name: places[t, k].tolist() for name, k in joints.indices.items() if name in LANDMARKS}
         for t in range(len(places))
     ]
+    frames += frames[-1:] * round(0.5 / clip.frame_time)
     lines = [json.dumps({"time_s": t * clip.frame_time, "joints": frame}) for t, frame in enumerate(frames)]
     return ("\n".join(lines) + "\n").encode()
 
