@@ -160,7 +160,7 @@ class _CoarseToFine:
         told = len(self._job.warnings)
         fails = _TooCoarse("parts of the body go through the cloth", len(garment.mesh.vertices))
         for closely in (False,) if self._config.body_features else (False, True):
-            if closely and not self._may_try_again(len(garment.mesh.vertices), deadline):
+            if closely and not self._may_try_again(garment, deadline):
                 break
             found = self._rest_on(level, garment, body, deadline, fresh=fresh, closely=closely)
             if isinstance(found, _TooCoarse):
@@ -208,19 +208,18 @@ class _CoarseToFine:
         if config.body_features or not config.self_collision or settling.caught or settling.jammed:
             return found
         lies = TriangleMesh(settling.state.positions, garment.mesh.faces)
-        if len(intersecting_faces(lies, body.final)) == 0 or not self._may_try_again(
-            len(garment.mesh.vertices), deadline
-        ):
+        if len(intersecting_faces(lies, body.final)) == 0 or not self._may_try_again(garment, deadline):
             return found
         del self._job.warnings[found.warned :]
         again = self._rest_on(0, found.put_on, body, deadline, fresh=False, closely=True)
         assert isinstance(again, RestOnMesh)
         return again
 
-    def _may_try_again(self, count: int, deadline: float) -> bool:
-        """Return whether there is time to go through so many vertices once more, and say that it is done."""
+    def _may_try_again(self, garment: Garment, deadline: float) -> bool:
+        """Return whether there is time to go through a mesh once more, and say that it is done."""
         in_time = time.perf_counter() < deadline
         if in_time:
+            count = len(garment.mesh.vertices)
             self._job.note(f"parts of the body came between {count} vertices: once more, so that they cannot")
         return in_time
 
